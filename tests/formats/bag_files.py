@@ -149,7 +149,7 @@ def image_of(fields, t, value, encoding):
     fields.array((pixel * IMAGE_WIDTH + b"\0\0") * IMAGE_HEIGHT)
 
 
-def messages(serialization, kind, encoding="evt3", image="mono8", restart=0, frames=FRAMES):
+def messages(serialization, kind, encoding="evt3", image="mono8", restart=0):
     """[(topic, time of recording in microseconds, bytes)], by that time. restart: the packet with which the
     camera, which does not drift then, counts from 0 again; 0: none."""
     evt3, all_messages = Evt3(), []
@@ -161,7 +161,7 @@ def messages(serialization, kind, encoding="evt3", image="mono8", restart=0, fra
         else:
             array_of(fields, events)
         all_messages.append(("/camera/events", events[0][0] + DELAY, fields.message()))
-    for t, value in frames:
+    for t, value in FRAMES:
         fields = serialization()
         image_of(fields, t, value, image)
         all_messages.append(("/camera/image", t + DELAY, fields.message()))
@@ -192,8 +192,7 @@ def record(opcode, content):
 COMPRESS = {"": bytes, "lz4": lz4.frame.compress, "zstd": lambda content: zstandard.compress(content)}
 
 
-def write_mcap(path, all_messages, topics, compression="", chunked=True, summary=True, ros1=False,
-               message_indexes=True):
+def write_mcap(path, all_messages, topics, compression="", chunked=True, summary=True, ros1=False):
     """Writes two channels for each topic's type: the schemas are within the chunks, as they come."""
     magic = b"\x89MCAP0\r\n"
     out = magic + record(1, sized("ros1" if ros1 else "ros2") + sized("test"))
@@ -216,7 +215,7 @@ def write_mcap(path, all_messages, topics, compression="", chunked=True, summary
         out += record(6, struct.pack("<QQQI", min(times), max(times), len(chunk), zlib.crc32(chunk))
                       + sized(compression) + struct.pack("<Q", len(stored)) + stored)
         size, offsets = len(out) - at, b""
-        for channel, entries in index.items() if message_indexes else ():
+        for channel, entries in index.items():
             offsets += struct.pack("<HQ", channel, len(out))
             out += record(7, struct.pack("<H", channel)
                           + sized(b"".join(struct.pack("<QQ", *entry) for entry in entries)))
@@ -365,13 +364,6 @@ def main():
     write_bag(folder / "prophesee-bz2.bag", ros1, topics, "bz2")
     write_bag(folder / "prophesee-lz4.bag", ros1, topics, "lz4")
     write_bag(folder / "prophesee-no-index.bag", ros1, topics, "lz4", index=False)
-    # All but the events ends after 7.5 s.
-    silent, topics = folder / "silent", topics_of("array")
-    silent.mkdir(exist_ok=True)
-    cdr = messages(Cdr, "array", frames=FRAMES[:16])
-    write_mcap(silent / "array.mcap", cdr, topics)
-    write_mcap(silent / "without-message-indexes.mcap", cdr, topics, message_indexes=False)
-    write_bag(silent / "array.bag", messages(Ros1, "array", frames=FRAMES[:16]), topics)
 
 
 if __name__ == "__main__":

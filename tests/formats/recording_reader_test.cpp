@@ -21,7 +21,6 @@
 #include "src/formats/one_stream_decoder.hpp"
 #include "tests/formats/pieces.hpp"
 #include "tests/formats/recordings.hpp"
-#include "tests/formats/watched_bytes.hpp"
 
 namespace eventcamera {
 namespace {
@@ -321,6 +320,29 @@ TEST(RecordingReader, ReadsStreamsThatAreWrittenOneAfterTheOther) {
     EXPECT_EQ(part.pictures.size(), 2U);
   }
 }
+
+/// File that is read in small pieces, and tells how far.
+class WatchedBytes final : public ByteSource {
+ public:
+  explicit WatchedBytes(const Bytes& bytes) : bytes_(bytes) {}
+
+  std::uint64_t size() const override { return bytes_.size(); }
+  std::optional<std::size_t> read(std::uint64_t position,
+                                  std::span<std::uint8_t> out) noexcept override {
+    return bytes_.read(position, out);
+  }
+  std::optional<std::span<const std::uint8_t>> piece(std::uint64_t position) override {
+    const auto piece =
+        bytes_.piece(position)->first(std::min<std::uint64_t>(size() - position, 4096));
+    end = std::max(end, position + piece.size());
+    return piece;
+  }
+
+  std::uint64_t end = 0;
+
+ private:
+  MemoryBytes bytes_;
+};
 
 /// The index of the file tells that a stream has no more items in the segment.
 TEST(RecordingReader, DoesNotReadOnWhileAStreamIsSilent) {

@@ -170,9 +170,7 @@ std::optional<Item> BagDecoder::next_part() {
 }
 
 void BagDecoder::learn_delay(Microseconds t) {
-  const auto delay = logged_ - std::clamp(t, -Chunker::max_time, Chunker::max_time);
-  if (!delay_) delay_ = delay;
-  delays_.try_emplace(*decoding_, delay);
+  if (!delay_) delay_ = logged_ - std::clamp(t, -Chunker::max_time, Chunker::max_time);
 }
 
 std::optional<SeekPoint> BagDecoder::seek_point_before(Microseconds t) const {
@@ -199,18 +197,6 @@ bool BagDecoder::knows_all_streams() const {
 
 std::optional<SeekPoint> BagDecoder::first_of(std::size_t stream) const {
   return file_ ? file_->first_of(stream) : std::nullopt;
-}
-
-std::optional<std::uint64_t> BagDecoder::end_of(std::size_t stream, Microseconds t) const {
-  if (!file_) return std::nullopt;
-  const auto delay = delays_.find(stream);
-  if (delay == delays_.end() || t >= Chunker::max_time)
-    return file_->end_of(stream, std::numeric_limits<Microseconds>::max());
-  return file_->end_of(stream, std::max(t, -Chunker::max_time) + delay->second + max_jitter);
-}
-
-std::uint64_t BagDecoder::position() const {
-  return file_ ? file_->position() : 0;
 }
 
 std::optional<Microseconds> BagDecoder::last_time() {

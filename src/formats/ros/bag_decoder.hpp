@@ -36,8 +36,6 @@ class BagDecoder final : public RecordingDecoder {
   std::optional<Microseconds> last_time() override;
   bool knows_all_streams() const override;
   std::optional<SeekPoint> first_of(std::size_t stream) const override;
-  std::optional<std::uint64_t> end_of(std::size_t stream, Microseconds t) const override;
-  std::uint64_t position() const override;
   std::string format_name() const override { return format_name_; }
   std::string left_out() const override;
 
@@ -64,8 +62,7 @@ class BagDecoder final : public RecordingDecoder {
   std::optional<std::size_t> decoding_;  ///< topic of the message being decoded
   bool events_due_ = false;              ///< its decoder has events to be returned
   Microseconds logged_ = 0;              ///< time of its recording
-  std::optional<Microseconds> delay_;    ///< from the time of the first message to its recording
-  std::map<std::size_t, Microseconds> delays_;  ///< the same of the first of each topic
+  std::optional<Microseconds> delay_;    ///< from the time of a message to its recording
   bool finished_ = false;
   bool last_time_due_ = true;  ///< it was not searched for yet
   std::optional<Microseconds> last_time_;

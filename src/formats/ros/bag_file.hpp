@@ -66,15 +66,6 @@ class BagFile {
   /// Where to restart for the first message of a topic, if the file states it.
   virtual std::optional<SeekPoint> first_of(std::size_t topic) const = 0;
 
-  /// As RecordingDecoder::end_of(), of the messages of a topic that were recorded before `logged`.
-  virtual std::optional<std::uint64_t> end_of(std::size_t /*topic*/,
-                                              Microseconds /*logged*/) const {
-    return std::nullopt;
-  }
-
-  /// Position of what is read next, if the file states where topics end.
-  virtual std::uint64_t position() const { return 0; }
-
   /// Time of the last message, if the file states it.
   virtual std::optional<Microseconds> last_logged() const = 0;
 

@@ -19,7 +19,6 @@ class ChunkIndex {
  public:
   struct Chunk {
     std::uint64_t position;  ///< in the file, bytes
-    Microseconds first;      ///< time of its earliest message
     Microseconds last;       ///< time of its latest message
   };
 
@@ -39,13 +38,10 @@ class ChunkIndex {
   }
 
   /// Takes a chunk with messages of a topic from the index of a file.
-  void set_topic(std::size_t topic, const Chunk& chunk) {
-    auto& chunks = of_topics_[topic];
-    if (chunks.empty() || chunks.back().position != chunk.position) chunks.push_back(chunk);
+  void set_topic(std::size_t topic, std::uint64_t position) {
+    auto& first = first_.try_emplace(topic, SeekPoint{before_all, position}).first->second;
+    first.position = std::min(first.position, position);
   }
-
-  /// Says that the index does not tell the topics of all chunks.
-  void miss_topics() { misses_topics_ = true; }
 
   /// Records that a chunk or a message was reached, if no index was set.
   void reached(std::uint64_t position) {
@@ -66,20 +62,8 @@ class ChunkIndex {
 
   /// Where to begin for the first message of a topic, if the index says it.
   std::optional<SeekPoint> first_of(std::size_t topic) const {
-    const auto found = of_topics_.find(topic);
-    if (found == of_topics_.end()) return std::nullopt;
-    return SeekPoint{before_all, std::ranges::min(found->second, {}, &Chunk::position).position};
-  }
-
-  /// Position from which on no messages of a topic were recorded before `logged`, if the index says
-  /// it; 0 if there are none at all.
-  std::optional<std::uint64_t> end_of(std::size_t topic, Microseconds logged) const {
-    if (indexed_.empty() || misses_topics_) return std::nullopt;
-    std::uint64_t end = 0;
-    if (const auto found = of_topics_.find(topic); found != of_topics_.end())
-      for (const auto& chunk : found->second)
-        if (chunk.first < logged) end = std::max(end, chunk.position + 1);
-    return end;
+    const auto first = first_.find(topic);
+    return first == first_.end() ? std::nullopt : std::optional(first->second);
   }
 
   /// Continues at a seek point.
@@ -91,9 +75,8 @@ class ChunkIndex {
  private:
   static constexpr auto before_all = std::numeric_limits<Microseconds>::min();
 
-  std::vector<SeekPoint> indexed_;  ///< the chunks of the index; t: the latest before them
-  std::map<std::size_t, std::vector<Chunk>> of_topics_;
-  bool misses_topics_ = false;
+  std::vector<SeekPoint> indexed_;          ///< the chunks of the index; t: the latest before them
+  std::map<std::size_t, SeekPoint> first_;  ///< chunks of the index, by topic
   std::optional<Microseconds> last_;
   SeekPoints read_;  ///< if there is no index
   Microseconds latest_ = before_all;

@@ -31,10 +31,6 @@ class ChunkedBagFile : public BagFile {
   std::optional<SeekPoint> first_of(std::size_t topic) const final {
     return index_.first_of(topic);
   }
-  std::optional<std::uint64_t> end_of(std::size_t topic, Microseconds logged) const final {
-    return index_.end_of(topic, logged);
-  }
-  std::uint64_t position() const final { return queue_.position(); }
   std::optional<Microseconds> last_logged() const final { return index_.last(); }
 
  protected:

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <utility>
 
 #include "src/formats/ros/bag_magic.hpp"
@@ -85,43 +86,33 @@ void McapFile::read_index(ByteSource& source) {
   std::vector<std::uint8_t> bytes(summary_end - summary_at);
   if (source.read(summary_at, bytes) != bytes.size()) return;
 
-  const auto for_each_record = [&](const auto& take) {
-    ByteCursor records(bytes);
-    while (!records.rest().empty()) {
-      const auto record_at = summary_at + records.position();
-      const auto opcode = static_cast<McapOpcode>(records.number<std::uint8_t>());
-      const ByteCursor content(records.sized_bytes<std::uint64_t>());
-      if (records.failed()) return false;
-      take(opcode, content, record_at);
-    }
-    return true;
-  };
-  const bool is_whole =
-      for_each_record([&](McapOpcode opcode, ByteCursor content, std::uint64_t record_at) {
-        if (opcode == McapOpcode::schema) take_schema(content, record_at);
-        if (opcode == McapOpcode::channel) take_channel(content, record_at);
-      });
-  if (!is_whole) return;
   std::vector<ChunkIndex::Chunk> chunks;
-  for_each_record([&](McapOpcode opcode, ByteCursor content, std::uint64_t) {
-    if (opcode != McapOpcode::chunk_index) return;
-    const auto first = microseconds(content.number<std::uint64_t>());
+  std::map<std::uint16_t, std::uint64_t> first;  // chunk of each channel
+  ByteCursor records(bytes);
+  while (!records.rest().empty()) {
+    const auto record_at = summary_at + records.position();
+    const auto opcode = static_cast<McapOpcode>(records.number<std::uint8_t>());
+    ByteCursor content(records.sized_bytes<std::uint64_t>());
+    if (records.failed()) return;
+    if (opcode == McapOpcode::schema) take_schema(content, record_at);
+    if (opcode == McapOpcode::channel) take_channel(content, record_at);
+    if (opcode != McapOpcode::chunk_index) continue;
+    content.number<std::uint64_t>();  // first time
     const auto last = microseconds(content.number<std::uint64_t>());
     const auto position = content.number<std::uint64_t>();
     content.number<std::uint64_t>();  // its size
     ByteCursor indexes(content.sized_bytes<std::uint32_t>());
-    if (content.failed()) return;
-    chunks.push_back({position, first, last});
-    if (indexes.rest().empty()) index_.miss_topics();
+    if (content.failed()) continue;
+    chunks.push_back({position, last});
     while (!indexes.failed() && !indexes.rest().empty()) {
-      const auto known = channels_.find(indexes.number<std::uint16_t>());
-      if (known == channels_.end())
-        index_.miss_topics();
-      else if (known->second)
-        index_.set_topic(*known->second, chunks.back());
+      auto& chunk = first.try_emplace(indexes.number<std::uint16_t>(), position).first->second;
+      chunk = std::min(chunk, position);
       indexes.number<std::uint64_t>();  // where the index of its messages is
     }
-  });
+  }
+  for (const auto& [channel, position] : first)
+    if (const auto known = channels_.find(channel); known != channels_.end() && known->second)
+      index_.set_topic(*known->second, position);
   index_.set(std::move(chunks), mcap_magic.size());
 }
 

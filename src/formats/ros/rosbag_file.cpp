@@ -118,19 +118,14 @@ void RosbagFile::read_index(ByteSource& source) {
     const Record whole(record);
     if (whole.header.op() == Op::connection) take_record(record, 0);
     const auto position = whole.header.number<std::uint64_t>("chunk_pos");
-    const auto first = whole.header.time("start_time");
     const auto last = whole.header.time("end_time");
     if (whole.header.op() != Op::chunk_info || !position || !last) continue;
-    chunks.push_back({*position, first.value_or(0), *last});
+    chunks.push_back({*position, *last});
     ByteCursor counts(whole.data);
-    if (counts.rest().empty()) index_.miss_topics();
     while (!counts.failed() && !counts.rest().empty()) {
       const auto known = connections_.find(counts.number<std::uint32_t>());
       counts.number<std::uint32_t>();  // of its messages
-      if (known == connections_.end())
-        index_.miss_topics();
-      else if (known->second)
-        index_.set_topic(*known->second, chunks.back());
+      if (known != connections_.end() && known->second) index_.set_topic(*known->second, *position);
     }
   }
   index_.set(std::move(chunks), rosbag_magic.size());
