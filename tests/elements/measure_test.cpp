@@ -434,6 +434,9 @@ TEST_F(CompareTest, ComparesEachSegment) {
     EXPECT_EQ(count_in(within(figures, "candidate")), 1U);
     EXPECT_EQ(number_in(within(figures, "reference-matches"), "within-1ms"), 1);
   }
+  for (auto* h : {reference, candidate}) end(h);  // of nothing more
+  ASSERT_TRUE(next_event(candidate, GST_EVENT_EOS));
+  EXPECT_FALSE(compare->message(GST_MESSAGE_ELEMENT));
 }
 
 TEST_F(CompareTest, EndsWithoutAnyEvent) {

@@ -103,6 +103,7 @@ class EventCompare final : public EventAggregator {
   PerRole<std::optional<SensorSize>> sensors_;
   std::optional<StreamComparison> comparison_;  // set once both sensors are known
   bool concluded_ = true;                       // no events since the last report
+  bool reported_ = false;                       // and there was one
   WarnOnce warn_of_missing_{GST_CAT_DEFAULT};
 };
 
@@ -190,7 +191,7 @@ GstStructure* structure_of(const StreamComparison& comparison) {
 
 /// Posts and writes the statistics; those of empty streams if the comparison has not begun.
 void EventCompare::conclude() {
-  concluded_ = true;
+  concluded_ = reported_ = true;
   const StreamComparison nothing(1, 1);
   const auto& comparison = comparison_ ? *comparison_ : nothing;
   GST_DEBUG_OBJECT(element(), "concluding%s",
@@ -213,7 +214,7 @@ void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
   }
   GST_LOG_OBJECT(pads_[role], "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                  mapped.events().size(), GST_TIME_ARGS(interval->start));
-  if (!mapped.events().empty()) concluded_ = false;
+  if (!mapped.events().empty()) concluded_ = reported_ = false;
   const GstSegment segment = segment_of(pads_[role]);
   const auto skipped =
       comparison_->add(role, mapped.events(), stream_time(segment, interval->start),
@@ -262,7 +263,7 @@ GstFlowReturn EventCompare::take_next() {
 
 GstFlowReturn EventCompare::aggregate(bool) {
   if (has_ended(main_pad()) && !waits_for_reference()) {
-    conclude();
+    if (!reported_) conclude();
     return GST_FLOW_EOS;
   }
   return has_one_size() ? take_next() : GST_FLOW_NOT_NEGOTIATED;
@@ -310,6 +311,7 @@ bool EventCompare::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
 void EventCompare::stop() {
   if (comparison_ && !concluded_) conclude();
   flush();
+  reported_ = false;
   sensors_ = {};
   warn_of_missing_.reset();
 }
@@ -323,7 +325,7 @@ static void gst_event_compare_class_init(GstEventCompareClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
   add_report_properties(properties,
                         "PNG file of the events per pixel, of both streams and of their "
-                        "difference, written at EOS or on stop");
+                        "difference, written at EOS, at the end of a segment or on stop");
 
   auto* const aggregator = GST_EVENT_AGGREGATOR_CLASS(klass);
   add_aggregator_pad_template(aggregator, "reference", GST_PAD_SINK, EVENT_CAPS);
