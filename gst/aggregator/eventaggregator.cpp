@@ -116,17 +116,19 @@ struct EventAggregatorFunctions {
   static GstFlowReturn end(EventAggregator& self) {
     const auto pads = sink_pads(self.element_);
     OwnedEvent done;
+    const auto all_have_ended = [&] {
+      return std::ranges::all_of(pads, [](const auto& pad) { return has_ended(pad.get()); });
+    };
     if (self.main_pad_ != nullptr)
       done = segment_end_of(self.main_pad_);
-    else
+    else if (all_have_ended())  // otherwise downstream has
       for (const auto& pad : pads)
         if (auto end = segment_end_of(pad.get())) done = std::move(end);
     if (!done) return GST_FLOW_EOS;
     self.segment_ended_ = true;
     for (const auto& pad : pads)
       while (next_buffer(pad.get())) gst_aggregator_pad_drop_buffer(pad.get());
-    if (!std::ranges::all_of(pads, [](const auto& pad) { return has_ended(pad.get()); }))
-      return GST_AGGREGATOR_FLOW_NEED_DATA;
+    if (!all_have_ended()) return GST_AGGREGATOR_FLOW_NEED_DATA;
     GST_DEBUG_OBJECT(self.element_, "the segment of all inputs has ended");
     for (const auto& pad : pads) gst_aggregator_pad_drop_buffer(pad.get());
     flush(self.element_);
