@@ -98,13 +98,13 @@ double exposure_gain(const ImageView<Pixel>& last, const ImageView<Pixel>& now, 
 ///   m = max over the tile of |F.x| and |F.y|; NaN counts as 0
 ///   n = ceil(m <= 4 ? m : sqrt(4 m)), in 1 ... max
 inline int steps_of_tile(const Image<Flow>& flow, int x, int y, int max) {
-  double longest = 0;
+  float longest = 0;
   for (int v = y / 8 * 8; v < std::min(y / 8 * 8 + 8, flow.height()); ++v)
     for (int u = x / 32 * 32; u < std::min(x / 32 * 32 + 32, flow.width()); ++u)
-      for (const double motion : {flow.at(u, v).x, flow.at(u, v).y})
+      for (const float motion : {flow.at(u, v).x, flow.at(u, v).y})
         if (!std::isnan(motion)) longest = std::max(longest, std::abs(motion));
-  const double steps = longest > 4 ? std::sqrt(4 * longest) : longest;
-  return static_cast<int>(std::clamp<double>(std::ceil(steps), 1, max));
+  const float steps = longest > 4 ? std::sqrt(4 * longest) : longest;
+  return static_cast<int>(std::min(std::max(std::ceil(steps), 1.0F), static_cast<float>(max)));
 }
 
 /// Luma of a pixel at step j of n, a = j/n, in grey levels of the frames:
