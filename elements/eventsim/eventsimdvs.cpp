@@ -93,7 +93,7 @@ static GType upsampling_type() {
       {static_cast<int>(Upsampling::linear),
        "Linear interpolation per pixel, in units of the response", "linear"},
       {static_cast<int>(Upsampling::motion),
-       "Motion along dense optical flow, in steps of a pixel or a few", "motion"},
+       "Motion along dense optical flow, in steps of a pixel, longer where much moves", "motion"},
       {0, nullptr, nullptr},
   };
   return enum_type("GstEventSimDvsUpsampling", values);

@@ -6,8 +6,9 @@
 #include "gst/base/owned.hpp"
 
 /// Ends of segments on sink pads. GstAggregator would pass SEGMENT_DONE on from each pad, and go on
-/// waiting for a buffer of the pad. Here a GAP event that carries it takes its place; GstAggregator
-/// queues a buffer for that, which stays the next one of the pad until all pads have ended.
+/// waiting for a buffer of the pad. Here a GAP event replaces SEGMENT_DONE and carries it;
+/// GstAggregator queues a buffer for that, which stays the next one of the pad until all pads have
+/// ended.
 
 inline GQuark segment_end_quark() {
   static const GQuark quark = g_quark_from_static_string("event-segment-end");
@@ -52,13 +53,14 @@ inline void forget_segment_end(GstAggregatorPad* pad) {
   g_object_set_qdata(G_OBJECT(pad), segment_end_quark(), nullptr);
 }
 
-/// True if a pad has reached the end of its stream, or of a segment that is to be played alone.
+/// True if a pad has reached the end of its stream, or of the segment of a segment seek.
 inline bool has_ended(GstAggregatorPad* pad) {
   return segment_end_of(pad) ||
          (gst_aggregator_pad_is_eos(pad) && !gst_aggregator_pad_has_buffer(pad));
 }
 
-/// The next buffer of a pad, which stays queued; null if there is none yet, or in its segment.
+/// The next buffer of a pad, which stays queued; null if there is none yet, or no more in its
+/// segment.
 inline OwnedBuffer next_buffer(GstAggregatorPad* pad) {
   return OwnedBuffer(segment_end_of(pad) ? nullptr : gst_aggregator_pad_peek_buffer(pad));
 }

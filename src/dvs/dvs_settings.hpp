@@ -22,7 +22,7 @@ enum class Response {
 /// Model of light between two frames.
 enum class Upsampling {
   linear,  ///< linear interpolation per pixel, in units of the response
-  motion,  ///< motion along the optical flow, in steps of a pixel or a few
+  motion,  ///< motion along the optical flow, in steps of a pixel, longer where much moves
 };
 
 /// Reference level of a pixel after an event.

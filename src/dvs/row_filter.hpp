@@ -78,10 +78,10 @@ struct RunLuma {
   const void* shade;   ///< that bandwidth and noise depend on
 };
 
-/// Advances a run of pixels through a sub-interval: targets and signals of all pixels; references
-/// and noise budgets of those that cannot fire, which are most. The others become `candidates`. The
-/// decision has a margin for float rounding, and is the same on every processor. A run that does
-/// not end with the row must be a multiple of max_lanes pixels wide.
+/// Advances a run of pixels through a sub-interval: targets, and with bandwidth signals, of all
+/// pixels; references and noise budgets of those that cannot fire, which are most. The others
+/// become `candidates`. The decision has a margin for float rounding, and is the same on every
+/// processor. A run that does not end with the row must be a multiple of max_lanes pixels wide.
 void filter_run(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
                 const Run& run, Candidates& candidates);
 

@@ -14,7 +14,7 @@
 
 namespace eventcamera {
 
-/// Decodes payloads of RTP packets that are valid in every detail.
+/// Decodes payloads of RTP packets; rejects those that are not valid in every detail.
 class RtpPayloadDecoder {
  public:
   RtpPayloadDecoder(SensorSize sensor, RtpEventFormat format);

@@ -24,7 +24,7 @@ class PictureQos {
       earliest_ = late > 0 ? time + factor * static_cast<GstClockTime>(late) : 0;
   }
 
-  /// Counts a picture for a running time, if it has one. Returns true if it is too late.
+  /// Counts a picture. Returns true if it is too late; one without a running time never is.
   bool is_late(std::optional<GstClockTime> running_time) {
     GstClockTime earliest = 0;
     {
@@ -48,7 +48,7 @@ class PictureQos {
     return message;
   }
 
-  /// Takes no picture for late until the next QoS event.
+  /// Treats no picture as late until the next QoS event.
   void start_over() {
     const std::lock_guard lock(mutex_);
     earliest_ = 0;

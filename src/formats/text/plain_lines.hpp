@@ -33,7 +33,7 @@ class PlainLines {
     std::ranges::transform(columns, columns_.begin(), [](const auto& column) { return *column; });
   }
 
-  /// Returns the start of the next line, or nullptr for any other line.
+  /// Returns the start of the next line, or nullptr if the line is not such a line.
   const char* read(const char* at, Row& row) const {
     std::array<std::uint64_t, event_columns> values;
     for (const auto& column : columns_) {
