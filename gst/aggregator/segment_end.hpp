@@ -4,6 +4,7 @@
 #include <gst/base/gstaggregator.h>
 
 #include "gst/base/owned.hpp"
+#include "gst/base/played_segment.hpp"
 
 /// Ends of segments on sink pads. GstAggregator would pass SEGMENT_DONE on from each pad, and go on
 /// waiting for a buffer of the pad. Here a GAP event replaces SEGMENT_DONE and carries it;
@@ -24,10 +25,9 @@ inline void unref_event(gpointer event) {
 inline GstEvent* gap_at_segment_end(GstAggregatorPad* pad, GstEvent* done) {
   const OwnedEvent sticky(gst_pad_get_sticky_event(GST_PAD(pad), GST_EVENT_SEGMENT, 0));
   if (!sticky) return done;
-  const GstSegment* segment = nullptr;
-  gst_event_parse_segment(sticky.get(), &segment);
-  if (segment->format != GST_FORMAT_TIME) return done;
-  GstEvent* const gap = gst_event_new_gap(segment->start, GST_CLOCK_TIME_NONE);
+  const GstSegment& segment = segment_of(sticky.get());
+  if (segment.format != GST_FORMAT_TIME) return done;
+  GstEvent* const gap = gst_event_new_gap(segment.start, GST_CLOCK_TIME_NONE);
   gst_mini_object_set_qdata(GST_MINI_OBJECT(gap), segment_end_quark(), done, unref_event);
   return gap;
 }

@@ -510,9 +510,7 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
 /// Replaces a segment in another format than TIME, as from byte sources, by a TIME segment for the
 /// timestamps that frames get here. Takes ownership of `event`.
 static GstEvent* segment_of_times(GstEvent* event) {
-  const GstSegment* segment = nullptr;
-  gst_event_parse_segment(event, &segment);
-  if (segment->format == GST_FORMAT_TIME) return event;
+  if (segment_of(event).format == GST_FORMAT_TIME) return event;
   GstSegment times;
   gst_segment_init(&times, GST_FORMAT_TIME);
   GstEvent* replacement = gst_event_new_segment(&times);
