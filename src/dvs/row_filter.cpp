@@ -47,7 +47,6 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
   const auto share = hn::Set(floats, static_cast<float>(row_filter.sub_interval.share));
   const auto rise = hn::Set(floats, static_cast<float>(row_filter.sub_interval.rise));
   float* targets = pixels.target;
-  [[maybe_unused]] float* signals = pixels.signal;
   float* references = pixels.reference;
   const float* positives = pixels.positive;
   const float* negatives = pixels.negative;
@@ -78,7 +77,7 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
     auto signal = target;
     auto margin = hn::Set(floats, rounding);  // excess beyond the values at both ends
     if constexpr (has_bandwidth) {
-      last_signal = hn::LoadU(floats, signals + x);
+      last_signal = hn::LoadU(floats, pixels.signal + x);
       const auto decay_factor = hn::GatherIndex(floats, tables.decay_factor.data(), shade);
       const auto mean_decay_factor =
           hn::GatherIndex(floats, tables.mean_decay_factor.data(), shade);
@@ -115,7 +114,7 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
     happens = hn::And(happens, hn::FirstN(floats, static_cast<std::size_t>(count)));
 
     hn::StoreU(target, floats, targets + x);
-    if constexpr (has_bandwidth) hn::StoreU(signal, floats, signals + x);
+    if constexpr (has_bandwidth) hn::StoreU(signal, floats, pixels.signal + x);
     if (HWY_LIKELY(hn::AllFalse(floats, happens))) {
       hn::StoreU(next_reference, floats, references + x);
       if (row_filter.has_noise) hn::StoreU(noise_budget, counts, noise_budgets + x);
