@@ -103,6 +103,11 @@ std::optional<WindowQueue::Window> WindowQueue::next() {
   return settings_.duration > 0 ? next_by_time() : next_by_intervals();
 }
 
+bool WindowQueue::is_open() const {
+  if (settings_.events > 0) return first_ < events_.size();
+  return settings_.duration > 0 ? start_.has_value() : !intervals_.empty();
+}
+
 std::optional<WindowQueue::Window> WindowQueue::finish() {
   if (returned_ == events_.size()) return std::nullopt;
   if (settings_.events > 0)

@@ -65,6 +65,9 @@ class WindowQueue {
   /// Returns the last window, shorter than the others, if it has an event that no other had.
   std::optional<Window> finish();
 
+  /// True if a window has begun that is not complete: it starts before what is added next.
+  bool is_open() const;
+
   /// End of the last interval; nothing before the first.
   std::optional<Nanoseconds> reached() const { return reached_; }
 

@@ -164,11 +164,30 @@ TEST_F(Tensor, GoesOnThroughGaps) {
   EXPECT_FALSE(h->pull_event(GST_EVENT_GAP));
 }
 
-TEST_F(Tensor, PassesGapsOnWhereWindowsGoByCount) {
-  begin("event-count=3");
+TEST_F(Tensor, PassesGapsOnBetweenWindowsByCount) {
+  begin("event-count=2");
   push_columns(0, 0);
   gst_harness_push_event(h->get(), gst_event_new_gap(10 * ms, 20 * ms));
   EXPECT_TRUE(h->pull_event(GST_EVENT_GAP));
+}
+
+TEST_F(Tensor, ComesAfterNoGapThatIsLater) {
+  begin("event-count=3");
+  push_columns(0, 0);
+  for (const GstClockTime start : {10, 20, 30})
+    gst_harness_push_event(h->get(), gst_event_new_gap(start * ms, 10 * ms));
+  push_columns(4, 4);
+  expect_tensor(3'333'000, 40 * ms, 0, 3);
+  EXPECT_FALSE(h->pull_event(GST_EVENT_GAP));
+}
+
+TEST_F(Tensor, ComesAfterNoLaterGapOfUnknownLength) {
+  begin("accumulation-time=20000000");
+  push_columns(0, 0);
+  gst_harness_push_event(h->get(), gst_event_new_gap(10 * ms, GST_CLOCK_TIME_NONE));
+  push_columns(1, 1);
+  expect_tensor(0, 20 * ms, 0, 4);
+  EXPECT_FALSE(h->pull_event(GST_EVENT_GAP));
 }
 
 TEST_F(Tensor, IsOneOfAGapWhereWindowsAreBuffers) {

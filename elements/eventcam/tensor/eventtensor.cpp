@@ -246,15 +246,17 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
                  [&] { return add(self, mapped.events(), mapped.start(), *interval, taken); });
 }
 
-/// Returns true if tensors take the place of the gap. The next buffer gets the result.
+/// Returns true if tensors take the place of the gap, such as that of a window that began before
+/// it. The next buffer gets the result.
 static bool take_gap(GstEventTensor* self, GstEvent* event) {
   auto& priv = *self->priv;
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
-  if (!priv.state || priv.state->window_settings.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
+  if (!priv.state) return false;
+  if (priv.state->window_settings.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
       start > max_tensor_time || duration > max_tensor_time - start)
-    return false;
+    return priv.state->windows.is_open();
   priv.gap_result = guarded(self, no_memory, [&] {
     return add(self, {}, 0, {start, start + duration}, nullptr);
   });
