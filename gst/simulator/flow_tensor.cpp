@@ -24,8 +24,8 @@ static bool are_dimensions(std::string_view dimensions, const std::string& of_fl
 }
 
 static float limited(float flow) {
-  constexpr float longest = eventcamera::max_side;
-  return std::isfinite(flow) ? std::clamp(flow, -longest, longest) : 0;
+  constexpr float max_length = eventcamera::max_side;
+  return std::isfinite(flow) ? std::clamp(flow, -max_length, max_length) : 0;
 }
 
 /// Copies a tensor of the size of `flow`.

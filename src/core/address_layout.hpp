@@ -17,10 +17,11 @@ struct AddressLayout {
   std::uint32_t sample;    ///< bit of samples of frames and of the IMU, if any
   std::uint32_t external;  ///< bit of external events, if any
   std::uint32_t pixel;     ///< bits that are 0 in an external event
-  std::uint32_t largest;   ///< maximum address
+  std::uint32_t max_address;
 
-  constexpr int width() const { return static_cast<int>(x_mask) + 1; }   ///< largest
-  constexpr int height() const { return static_cast<int>(y_mask) + 1; }  ///< largest
+  // Maximum size of the sensor.
+  constexpr int width() const { return static_cast<int>(x_mask) + 1; }
+  constexpr int height() const { return static_cast<int>(y_mask) + 1; }
 
   std::uint32_t address(int x, int y, bool on) const {
     return static_cast<std::uint32_t>(x) << x_shift | static_cast<std::uint32_t>(y) << y_shift |

@@ -53,12 +53,11 @@ std::string PropheseeHeader::value(const std::string& key) const {
   return found == values_.end() ? std::string() : found->second;
 }
 
-int PropheseeHeader::number(const std::string& text, int largest) {
+int PropheseeHeader::number(const std::string& text, int max) {
   int number = 0;
   const auto end = text.data() + text.size();
   const auto parsed = std::from_chars(text.data(), end, number);
-  return parsed.ec == std::errc() && parsed.ptr == end && number >= 1 && number <= largest ? number
-                                                                                           : 0;
+  return parsed.ec == std::errc() && parsed.ptr == end && number >= 1 && number <= max ? number : 0;
 }
 
 }  // namespace eventcamera

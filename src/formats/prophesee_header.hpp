@@ -26,8 +26,8 @@ class PropheseeHeader {
   /// Value of a key; empty if there is none.
   std::string value(const std::string& key) const;
 
-  /// Parses a number from 1 to `largest`; 0 if it is not one.
-  static int number(const std::string& text, int largest);
+  /// Parses a number from 1 to `max`; 0 if it is not one.
+  static int number(const std::string& text, int max);
 
  private:
   std::map<std::string, std::string> values_;

@@ -101,10 +101,10 @@ class UnitDecoder {
 /// Bounds of a sensor.
 class Bounds {
  public:
-  /// A sensor of unknown size has sides of `largest` pixels.
-  constexpr Bounds(SensorSize size, int largest)
-      : width_(static_cast<std::uint32_t>(size.width > 0 ? size.width : largest)),
-        height_(static_cast<std::uint32_t>(size.height > 0 ? size.height : largest)) {}
+  /// A sensor of unknown size has sides of `default_side` pixels.
+  constexpr Bounds(SensorSize size, int default_side)
+      : width_(static_cast<std::uint32_t>(size.width > 0 ? size.width : default_side)),
+        height_(static_cast<std::uint32_t>(size.height > 0 ? size.height : default_side)) {}
 
   constexpr bool contain(std::uint32_t x, std::uint32_t y) const {
     return static_cast<bool>(static_cast<int>(x < width_) & static_cast<int>(y < height_));

@@ -19,9 +19,9 @@ using Motion = std::int32_t;
 /// max_side.
 inline Motion motion_per_step(float flow, int steps) {
   if (!(flow == flow)) return 0;
-  constexpr float longest = max_side;
-  return static_cast<Motion>(
-      std::lrint(std::clamp(flow, -longest, longest) * (65536.0F / static_cast<float>(steps))));
+  constexpr float max_length = max_side;
+  return static_cast<Motion>(std::lrint(std::clamp(flow, -max_length, max_length) *
+                                        (65536.0F / static_cast<float>(steps))));
 }
 
 /// Position of a pixel after j steps from p, rounded to whole pixels.

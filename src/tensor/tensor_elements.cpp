@@ -34,17 +34,15 @@ void convert(const float* values, std::size_t count, Out* out, const Convert& co
   std::copy_n(last, count - i, out + i);
 }
 
-float largest_magnitude(const float* values, std::size_t count) {
+float max_magnitude(const float* values, std::size_t count) {
   const Floats floats;
   const std::size_t lanes = hn::Lanes(floats);
-  auto largest = hn::Zero(floats);
+  auto max = hn::Zero(floats);
   std::size_t i = 0;
-  for (; i + lanes <= count; i += lanes)
-    largest = hn::Max(largest, hn::Abs(hn::LoadU(floats, values + i)));
+  for (; i + lanes <= count; i += lanes) max = hn::Max(max, hn::Abs(hn::LoadU(floats, values + i)));
   if (i < count)
-    largest =
-        hn::Max(largest, hn::Abs(load_first(floats, values + i, static_cast<int>(count - i))));
-  return hn::GetLane(hn::MaxOfLanes(floats, largest));
+    max = hn::Max(max, hn::Abs(load_first(floats, values + i, static_cast<int>(count - i))));
+  return hn::GetLane(hn::MaxOfLanes(floats, max));
 }
 
 /// (value - mean) / divisor; 0 stays 0.
@@ -67,7 +65,7 @@ void to_float16(const float* values, std::size_t count, std::uint16_t* out) {
   constexpr int dropped_bits = 13;
   constexpr std::uint32_t bias_difference = (127U - 15U) << 10U;
   constexpr std::uint32_t infinity = 0x7c00;
-  constexpr std::uint32_t smallest_normal = (127U - 14U) << 23U;  // 2^-14
+  constexpr std::uint32_t min_normal = (127U - 14U) << 23U;  // 2^-14
   // Between 0.5 and 1, the last bit of a float is worth the last bit of a subnormal half.
   const auto half = hn::Set(floats, 0.5F);
   convert(values, count, out, [&](auto value) {
@@ -80,9 +78,8 @@ void to_float16(const float* values, std::size_t count, std::uint16_t* out) {
         hn::Min(hn::Sub(rounded, hn::Set(words, bias_difference)), hn::Set(words, infinity));
     const auto subnormal =
         hn::Sub(hn::BitCast(words, hn::Add(magnitude, half)), hn::BitCast(words, half));
-    const auto is_subnormal =
-        hn::Lt(hn::BitCast(signed_words, bits),
-               hn::Set(signed_words, static_cast<std::int32_t>(smallest_normal)));
+    const auto is_subnormal = hn::Lt(hn::BitCast(signed_words, bits),
+                                     hn::Set(signed_words, static_cast<std::int32_t>(min_normal)));
     const auto sign =
         hn::ShiftRight<16>(hn::And(hn::BitCast(words, value), hn::Set(words, 0x80000000U)));
     const auto joined =
@@ -111,7 +108,7 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 namespace {
 
-HWY_EXPORT(largest_magnitude);
+HWY_EXPORT(max_magnitude);
 HWY_EXPORT(standardize);
 HWY_EXPORT(to_float16);
 HWY_EXPORT(to_uint8);
@@ -145,8 +142,8 @@ void normalize(std::span<float> values, Normalization normalization) {
     case Normalization::max:
       break;
   }
-  const float largest = HWY_DYNAMIC_DISPATCH(largest_magnitude)(values.data(), values.size());
-  if (largest > 0) HWY_DYNAMIC_DISPATCH(standardize)(values.data(), values.size(), 0, largest);
+  const float max = HWY_DYNAMIC_DISPATCH(max_magnitude)(values.data(), values.size());
+  if (max > 0) HWY_DYNAMIC_DISPATCH(standardize)(values.data(), values.size(), 0, max);
 }
 
 void write_float16(std::span<const float> values, std::uint16_t* out) {

@@ -282,7 +282,7 @@ class Jaer {
       const auto t = in.clock.at(load<std::uint32_t>(&bytes[4], std::endian::big));
       const int x = width_ - 1 - addresses_.x(address);
       const int y = height_ - 1 - addresses_.y(address);
-      if (address > addresses_.largest) return outside;
+      if (address > addresses_.max_address) return outside;
       if (const auto* fault = in.add(t, x, y, addresses_.is_on(address))) return fault;
     }
     return nullptr;

@@ -50,9 +50,9 @@ std::size_t RtpPacker::pack_one(Nanoseconds start, Nanoseconds duration,
 std::size_t RtpPacker::append_evt3(std::span<const Event> events, std::size_t max_size) {
   Evt3Words state(width_);
   WordWriter<std::uint16_t> words(payload_);
-  const auto longest =
+  const auto max_words =
       std::min(events.size(), max_events) * (max_pause_words + Evt3Words::max_words);
-  words.reserve(std::min((max_size - payload_.size()) / sizeof(std::uint16_t), longest));
+  words.reserve(std::min((max_size - payload_.size()) / sizeof(std::uint16_t), max_words));
   std::size_t count = 0;
   while (count < events.size() && count + Evt3Words::max_events <= max_events) {
     const std::uint64_t time = events[count].t - events.front().t;

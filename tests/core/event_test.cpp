@@ -58,11 +58,11 @@ TEST(EventBuckets, AreCopiedAlikeByAnyNumberOfThreads) {
   std::vector<Event> expected(count);
   ThreadPool threads;
   buckets.write_to(expected.data(), threads);
-  for (const int most : {1, 2, 0}) {
-    threads.set_threads(most);
+  for (const int max_threads : {1, 2, 0}) {
+    threads.set_threads(max_threads);
     std::vector<Event> events(count);
     buckets.write_to(events.data(), threads);
-    EXPECT_TRUE(events == expected) << most << " threads";
+    EXPECT_TRUE(events == expected) << max_threads << " threads";
   }
   buckets.reset(1, 1);
   buckets.write_to(nullptr, threads);
@@ -92,11 +92,11 @@ TEST(EventBuckets, OfPixelsAreWrittenOnceByAnyNumberOfThreads) {
   }
   ASSERT_EQ(buckets.size(), expected.size());
   ThreadPool threads;
-  for (const int most : {1, 2, 0}) {
-    threads.set_threads(most);
+  for (const int max_threads : {1, 2, 0}) {
+    threads.set_threads(max_threads);
     std::vector<Event> events(expected.size());
     buckets.write_to(events.data(), threads);
-    EXPECT_TRUE(events == expected) << most << " threads";
+    EXPECT_TRUE(events == expected) << max_threads << " threads";
   }
 }
 
@@ -126,11 +126,11 @@ TEST(EventBuckets, OfTimeSlicesAreSortedByAnyNumberOfThreads) {
       ASSERT_EQ(buckets.size(), expected.size());
       std::ranges::sort(expected, {},
                         [](const Event& event) { return std::tuple(event.t, event.y(), event.x); });
-      for (const int most : {1, 2, 0}) {
-        threads.set_threads(most);
+      for (const int max_threads : {1, 2, 0}) {
+        threads.set_threads(max_threads);
         std::vector<Event> events(expected.size());
         buckets.write_to(events.data(), threads);
-        EXPECT_TRUE(events == expected) << count << " in " << duration << ", " << most;
+        EXPECT_TRUE(events == expected) << count << " in " << duration << ", " << max_threads;
       }
     }
   }

@@ -32,9 +32,9 @@ void hold_to_the_reference(int width, int height, int bits, int limit) {
                                width, height};
   const auto expected = reference::denoised(frame, limit);
   targets::for_each([&](const char* target) {
-    for (const int most : {1, 2}) {
+    for (const int max_threads : {1, 2}) {
       ThreadPool threads;
-      threads.set_threads(most);
+      threads.set_threads(max_threads);
       Image<Pixel> out(width, height);
       denoise(frame, limit, threads, out);
       for (int y = 0; y < height; ++y)

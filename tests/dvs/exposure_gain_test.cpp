@@ -87,9 +87,9 @@ int hold_to_the_reference(int columns, int rows, int bits, bool linear_light) {
     const Padded last(exposed<Pixel>(light(0), 0.8, bits, linear_light));
     const Padded now(exposed<Pixel>(light(1), 0.8 * true_gain, bits, linear_light));
     const double expected = reference::exposure_gain(last.view(), now.view(), bits, linear_light);
-    for (const int most : {1, 2}) {
+    for (const int max_threads : {1, 2}) {
       ThreadPool threads;
-      threads.set_threads(most);
+      threads.set_threads(max_threads);
       ExposureGain gain(bits, linear_light);
       EXPECT_NEAR(gain.between(last.view(), now.view(), threads), expected, 1e-4)
           << columns << "x" << rows << ", " << bits << " bits, gain " << true_gain;
@@ -171,7 +171,7 @@ std::vector<Image<Pixel>> film(int bits, bool linear_light, const Gain& gain) {
 }
 
 template <class Pixel>
-void expect_events_of_the_scene(int bits, DvsSettings settings, double least) {
+void expect_events_of_the_scene(int bits, DvsSettings settings, double min_overlap) {
   const auto constant = [](int) { return 1.0; };
   const auto expected = play(film<Pixel>(bits, settings.linear_light, constant), bits, settings);
   const auto frames = film<Pixel>(bits, settings.linear_light, ramp);
@@ -179,8 +179,8 @@ void expect_events_of_the_scene(int bits, DvsSettings settings, double least) {
   settings.exposure_compensation = true;
   const auto found = play(frames, bits, settings);
   EXPECT_NEAR(count(found), count(expected), 0.03 * count(expected));
-  EXPECT_GT(overlap(found, expected), least);
-  EXPECT_LT(without, least - 0.1);
+  EXPECT_GT(overlap(found, expected), min_overlap);
+  EXPECT_LT(without, min_overlap - 0.1);
   // A constant exposure changes nothing.
   EXPECT_TRUE(play(film<Pixel>(bits, settings.linear_light, constant), bits, settings) == expected);
 }

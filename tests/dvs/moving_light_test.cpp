@@ -17,16 +17,17 @@ namespace {
 
 using namespace eventcamera;
 
-/// Smooth flow of up to about `longest` pixels, with a few pixels that move elsewhere.
-Image<Flow> flow_of(int width, int height, float longest) {
+/// Smooth flow of up to about `max_length` pixels, with a few pixels that move elsewhere.
+Image<Flow> flow_of(int width, int height, float max_length) {
   Image<Flow> flow(width, height);
   std::minstd_rand random(3);
-  std::uniform_real_distribution<float> anywhere(-2 * longest, 2 * longest);
+  std::uniform_real_distribution<float> anywhere(-2 * max_length, 2 * max_length);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const auto u = static_cast<float>(x);
       const auto v = static_cast<float>(y);
-      flow.at(x, y) = {longest * std::sin(0.05F * u - 0.1F * v), longest * std::cos(0.07F * u)};
+      flow.at(x, y) = {max_length * std::sin(0.05F * u - 0.1F * v),
+                       max_length * std::cos(0.07F * u)};
       if (random() % 50 == 0) flow.at(x, y) = {anywhere(random), anywhere(random)};
     }
   }
@@ -56,7 +57,7 @@ void move_rows(const Warp<Pixel>& warp, const Image<Flow>& flow, const Check& ch
 TEST(MovingLight, IsItsDefinitionOnAllTargets) {
   struct Case {
     int width, height;
-    float longest;
+    float max_length;
   };
   for (const Case& size : {Case{1, 1, 1}, Case{3, 5, 2}, Case{17, 9, 40}, Case{61, 33, 0.4F},
                            Case{90, 40, 6}, Case{130, 20, 30}}) {
@@ -64,7 +65,7 @@ TEST(MovingLight, IsItsDefinitionOnAllTargets) {
     const int height = size.height;
     const auto last = scene::texture<std::uint8_t>(width, height, 8, 3, 1);
     const auto now = scene::noise<std::uint8_t>(width, height, 8, 5);
-    const auto flow = flow_of(width, height, size.longest);
+    const auto flow = flow_of(width, height, size.max_length);
     for (const int steps : {2, 3, 11, 32}) {
       targets::for_each([&](const char* target) {
         SCOPED_TRACE(std::string(target) + " " + std::to_string(width) + " " +
@@ -93,11 +94,11 @@ TEST(MovingLight, KeepsTheDepthOfDeepFrames) {
 }
 
 template <class Pixel>
-void check_tiles(int width, int height, int bits, float longest) {
+void check_tiles(int width, int height, int bits, float max_length) {
   constexpr int max_steps = 20;
   const auto last = scene::texture<Pixel>(width, height, bits, 3, 1);
   const auto now = scene::texture<Pixel>(width, height, bits, 5, -2);
-  const auto flow = flow_of(width, height, longest);
+  const auto flow = flow_of(width, height, max_length);
   ThreadPool threads;
   threads.set_threads(2);
   MotionTiles tiles;

@@ -273,10 +273,10 @@ TEST_P(EveryElement, LetsNoIntervalsOverlap) {
 TEST_P(EveryElement, CutsIntervalsThatEventsCannotCount) {
   h.caps(uneven);
   flash(0);
-  const GstClockTime longest = GstClockTime{0xffffffff} * 1000;
-  flash(longest);
-  expect_interval(0, longest);
-  flash(2 * longest + 1);
+  const GstClockTime max_interval = GstClockTime{0xffffffff} * 1000;
+  flash(max_interval);
+  expect_interval(0, max_interval);
+  flash(2 * max_interval + 1);
   EXPECT_FALSE(h.pull());
   EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
 }

@@ -71,14 +71,15 @@ TEST(Aedat3, ABrokenPacketCostsNoOther) {
   const auto sound = aedat_files::aedat3(events, "DAVIS346", 1000);
   const auto header = aedat_files::aedat3_header("DAVIS346").size();
   constexpr std::size_t packet = 28 + 8000;
-  const auto broken = [&](const char* what, std::size_t first_lost, std::size_t most, auto change) {
+  const auto broken = [&](const char* what, std::size_t first_lost, std::size_t max_lost,
+                          auto change) {
     SCOPED_TRACE(what);
     auto bytes = sound;
     change(bytes);
     for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{0}}) {
       Aedat3Decoder decoder;
       const auto found = decoded(decoder, bytes, piece).events;
-      ASSERT_GE(found.size() + most, events.size());
+      ASSERT_GE(found.size() + max_lost, events.size());
       const auto before = static_cast<std::ptrdiff_t>(first_lost);
       EXPECT_TRUE(std::equal(events.begin(), events.begin() + before, found.begin()));
       EXPECT_TRUE(std::equal(events.end() - 3000, events.end(), found.end() - 3000));
@@ -115,14 +116,14 @@ TEST(Aedat3, AnEventOutsideIsDropped) {
 }
 
 TEST(Aedat3, EventsOutsideAreDroppedAlone) {
-  for (const std::size_t most : {100, 30}) {
+  for (const std::size_t max_events : {100, 30}) {
     std::vector<AbsoluteEvent> events(60, AbsoluteEvent::at(1, 2, 3, Polarity::on));
     auto expected = events;
     for (const auto i : {9, 10, 11, 13, 59}) {
       events[static_cast<std::size_t>(i)] = AbsoluteEvent::at(346, 2, 3, Polarity::on);
       expected.pop_back();
     }
-    const auto bytes = aedat_files::aedat3(events, "DAVIS346", most);
+    const auto bytes = aedat_files::aedat3(events, "DAVIS346", max_events);
     for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}}) {
       Aedat3Decoder decoder;
       EXPECT_TRUE(decoded(decoder, bytes, piece).events == expected);

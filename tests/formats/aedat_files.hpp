@@ -138,14 +138,15 @@ inline void add_aedat3_packet_header(Bytes& bytes, int type, int event_size, std
   for (int i = 0; i < 3; ++i) add_little(bytes, number, 4);
 }
 
-/// A packet ends at a wrap of the times, or after `most` events.
+/// A packet ends at a wrap of the times, or after `max_events`.
 inline Bytes aedat3(std::span<const AbsoluteEvent> events, std::string_view source,
-                    std::size_t most) {
+                    std::size_t max_events) {
   auto bytes = aedat3_header(source);
   while (!events.empty()) {
     const auto overflow = events.front().t >> 31;
     std::size_t count = 0;
-    while (count < events.size() && count < most && events[count].t >> 31 == overflow) ++count;
+    while (count < events.size() && count < max_events && events[count].t >> 31 == overflow)
+      ++count;
     add_aedat3_packet_header(bytes, 1, 8, overflow, static_cast<std::int64_t>(count));
     for (const auto& event : events.first(count)) {
       add_little(bytes,

@@ -154,10 +154,10 @@ TEST(Chunker, IgnoresAClockThatJumpsAheadAndComesBack) {
 }
 
 TEST(Chunker, RefusesImpossibleTimes) {
-  constexpr auto most = std::numeric_limits<Microseconds>::max();
-  constexpr auto least = std::numeric_limits<Microseconds>::min();
+  constexpr auto max = std::numeric_limits<Microseconds>::max();
+  constexpr auto min = std::numeric_limits<Microseconds>::min();
   Chunker chunker(length);
-  const auto cuts = slice(chunker, std::vector{at(most), at(0), at(least), at(1), at(most - 1)});
+  const auto cuts = slice(chunker, std::vector{at(max), at(0), at(min), at(1), at(max - 1)});
   EXPECT_EQ(chunker.dropped().stray, 3U);
   EXPECT_EQ(joined(cuts).size(), 2U);
   Chunker longest(length);

@@ -92,9 +92,9 @@ struct Types {
 class Time {
  public:
   std::string high(std::uint32_t count) {
-    constexpr std::uint32_t largest = (1U << 28) - 1;
+    constexpr std::uint32_t max_high = (1U << 28) - 1;
     // OpenEB detects a wrap if the time falls by its range minus at most 10 ms.
-    if (known_ && count < count_ && ((count_ - count) << 6) < (largest << 6) - 10'000)
+    if (known_ && count < count_ && ((count_ - count) << 6) < (max_high << 6) - 10'000)
       return "a TIME_HIGH that falls and is no wrap";
     known_ = true;
     count_ = count;

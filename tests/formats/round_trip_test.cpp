@@ -18,8 +18,10 @@ using recordings::random_events;
 class EveryFormat : public testing::TestWithParam<Format> {
  protected:
   SensorSize random_size(Random& random) const {
-    const int largest = std::min(2048, GetParam().max_side);
-    const auto side = [&] { return below(random, 4) == 0 ? largest : 1 + below(random, largest); };
+    const int max_side = std::min(2048, GetParam().max_side);
+    const auto side = [&] {
+      return below(random, 4) == 0 ? max_side : 1 + below(random, max_side);
+    };
     return {side(), side()};
   }
 
@@ -71,8 +73,8 @@ TEST_P(EveryFormat, ReadsTheSameHoweverTheBytesAreSplit) {
   EXPECT_EQ(decode(*one, bytes, [] { return 1; }).events, events);
   for (int i = 0; i < 50; ++i) {
     const auto decoder = GetParam().make_decoder(size);
-    const auto longest = 1 + below(random, 300);
-    EXPECT_EQ(decode(*decoder, bytes, [&] { return 1 + below(random, longest); }).events, events);
+    const auto max_bytes = 1 + below(random, 300);
+    EXPECT_EQ(decode(*decoder, bytes, [&] { return 1 + below(random, max_bytes); }).events, events);
     expect_sound(decoder->corruption());
   }
 }

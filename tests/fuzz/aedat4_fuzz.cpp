@@ -45,7 +45,7 @@ Sums sums_of(std::span<const std::uint8_t> bytes, Pieces pieces) {
   }
   sums.rest.add(reader.corruption());
   sums.rest.add(reader.streams().size());
-  if (reader.aedat4() != nullptr && pieces.longest == 0) seek(reader, bytes);
+  if (reader.aedat4() != nullptr && pieces.max_size == 0) seek(reader, bytes);
   return sums;
 }
 

@@ -29,7 +29,7 @@ inline void require(bool holds, const char* what) {
 
 /// Split of bytes: maximum piece size, and seed of random sizes.
 struct Pieces {
-  std::size_t longest = 0;  ///< 0: a single piece
+  std::size_t max_size = 0;  ///< 0: a single piece
   std::uint64_t chance = 0;
 };
 
@@ -37,11 +37,12 @@ struct Pieces {
 /// after its use.
 template <class Take>
 void in_pieces(std::span<const std::uint8_t> bytes, Pieces pieces, const Take& take) {
-  const auto longest = pieces.longest == 0 ? bytes.size() : std::min(pieces.longest, bytes.size());
-  std::vector<std::uint8_t> memory(longest);
+  const auto max_size =
+      pieces.max_size == 0 ? bytes.size() : std::min(pieces.max_size, bytes.size());
+  std::vector<std::uint8_t> memory(max_size);
   while (!bytes.empty()) {
     pieces.chance = pieces.chance * 6364136223846793005 + 1442695040888963407;
-    const auto wanted = pieces.longest == 0 ? longest : 1 + (pieces.chance >> 33) % longest;
+    const auto wanted = pieces.max_size == 0 ? max_size : 1 + (pieces.chance >> 33) % max_size;
     const auto piece = std::span(memory).last(std::min(wanted, bytes.size()));
     std::ranges::copy(bytes.first(piece.size()), piece.begin());
     take(std::span<const std::uint8_t>(piece));
@@ -111,7 +112,7 @@ auto outcome(const Make& make, std::span<const std::uint8_t> bytes, Pieces piece
   require(decoded.events.size() + decoded.triggers.size() <= bytes.size() * events_per_byte,
           "memory is bounded");
   require_within(decoder->size(), decoded.events);
-  if (error.empty() && pieces.longest == 0) {
+  if (error.empty() && pieces.max_size == 0) {
     MemoryBytes file({bytes.begin(), bytes.end()});
     Decoded tail;
     decoder->decode_tail(file, tail);

@@ -9,9 +9,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto reader = make_npz_decoder();
     reader->open(bytes);
     // A few compressed bytes can be many events.
-    constexpr std::size_t most = 1'000'000;
+    constexpr std::size_t max_events = 1'000'000;
     std::size_t count = 0;
-    while (count < most) {
+    while (count < max_events) {
       const auto item = reader->next();
       if (!item) break;
       const auto events = std::get<EventItem>(*item).events;

@@ -13,12 +13,12 @@ inline void read_hdf5(std::span<const std::uint8_t> bytes) {
     Hdf5Reader reader(
         std::make_unique<MemoryBytes>(std::vector<std::uint8_t>(bytes.begin(), bytes.end())));
     // A few compressed bytes can be many events.
-    constexpr std::size_t most = 100'000;
+    constexpr std::size_t max_events = 100'000;
     std::vector<AbsoluteEvent> events;
     std::vector<Trigger> triggers;
-    while (events.size() < most && reader.read(10'000, events) > 0) {
+    while (events.size() < max_events && reader.read(10'000, events) > 0) {
     }
-    require(events.size() <= most + 10'000, "no more is read than is asked for");
+    require(events.size() <= max_events + 10'000, "no more is read than is asked for");
     reader.read_triggers(10'000, triggers);
     if (const auto range = reader.time_range()) reader.seek(range->first / 2 + range->last / 2);
     reader.read(1, events);

@@ -313,7 +313,7 @@ TEST(Simulator, ReadsEventsBackWhileTheGpuWorksOnTheNextFrame) {
   const Make make_dense = [](const gl::Context& gl, const LumaFormat& of) {
     return std::unique_ptr<gl::Simulator>(gl::make_dense_simulator(gl, of));
   };
-  std::size_t most = 0;
+  std::size_t max_events = 0;
   for (const auto& [make, threshold] : {std::pair<Make, double>{gl::make_frame_simulator, 20},
                                         {make_dense, 20},
                                         {gl::make_sparse_simulator, 200},
@@ -346,7 +346,7 @@ TEST(Simulator, ReadsEventsBackWhileTheGpuWorksOnTheNextFrame) {
     made.push_back(scene::copy(*simulator->read()));
     EXPECT_GT(waits, 0);
     EXPECT_EQ(made, expected);
-    most = std::max(most, made.back().size());
+    max_events = std::max(max_events, made.back().size());
 
     simulator->queue(frame_of(2), 7 * scene::frame_time, settings);
     simulator->queue(frame_of(3), 8 * scene::frame_time, settings);
@@ -357,7 +357,7 @@ TEST(Simulator, ReadsEventsBackWhileTheGpuWorksOnTheNextFrame) {
     EXPECT_EQ(simulator->read(), nullptr);
     EXPECT_EQ(scene::copy(*simulator->read()), expected.front());
   }
-  EXPECT_GT(most, 4096U);  // so that lists grow
+  EXPECT_GT(max_events, 4096U);  // so that lists grow
 }
 
 /// What a lost context does, as drivers differ.

@@ -77,16 +77,16 @@ def write_hdf5(path, events, side):
 def make_files():
     """Writes the files to the current folder."""
     few = [(1, 10, 10, 1), (2, 16000, 16000, 1), (3, 5, 5, 1)]
-    largest_guess = scattered(4096, 2000)
+    max_guessed = scattered(4096, 2000)
     wide = scattered(LARGEST, 2000)
     at_once = [(0, 5, 5, 1)] * 10_000_000
     write_csv("few.csv", few)
     write_csv("beyond.csv", [(1, 10, 10, 1), (2, 20000, 20000, 1), (3, 5, 5, 1)])
-    write_csv("guessed.csv", largest_guess)
+    write_csv("guessed.csv", max_guessed)
     numpy.save("few.npy", table(few))
-    numpy.save("guessed.npy", table(largest_guess))
+    numpy.save("guessed.npy", table(max_guessed))
     numpy.savez("few.npz", **columns(few))
-    numpy.savez("guessed.npz", **columns(largest_guess))
+    numpy.savez("guessed.npz", **columns(max_guessed))
     numpy.savez("stated.npz", width=LARGEST, height=LARGEST, **columns(wide))
     numpy.savez_compressed("at-once.npz", **columns(at_once))
     write_dat("stated.dat", wide, LARGEST)

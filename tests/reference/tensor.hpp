@@ -91,9 +91,9 @@ inline void normalize(std::vector<float>& values, Normalization normalization) {
     for (auto& value : values)
       if (value != 0) value = (value - static_cast<float>(mean)) / (deviation > 0 ? deviation : 1);
   } else if (normalization == Normalization::max) {
-    float largest = 0;
-    for (const float value : values) largest = std::max(largest, std::abs(value));
-    for (auto& value : values) value = largest > 0 ? value / largest : value;
+    float max = 0;
+    for (const float value : values) max = std::max(max, std::abs(value));
+    for (auto& value : values) value = max > 0 ? value / max : value;
   }
 }
 

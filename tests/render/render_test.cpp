@@ -155,9 +155,9 @@ TEST(Accumulator, DrawsTheSameWithAnyNumberOfThreads) {
     return out;
   };
   const auto expected = drawn();
-  for (const int most : {1, 2, 0}) {
-    threads.set_threads(most);
-    EXPECT_EQ(drawn(), expected) << most << " threads";
+  for (const int max_threads : {1, 2, 0}) {
+    threads.set_threads(max_threads);
+    EXPECT_EQ(drawn(), expected) << max_threads << " threads";
   }
 }
 

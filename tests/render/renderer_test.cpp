@@ -100,10 +100,10 @@ std::span<const Event> between(const std::vector<Event>& events, int start, int 
 
 /// Largest difference between the bytes of two pictures.
 int distance(const Picture& a, const Picture& b) {
-  int most = a.size() == b.size() ? 0 : 255;
+  int max_difference = a.size() == b.size() ? 0 : 255;
   for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
-    most = std::max(most, std::abs(a[i] - b[i]));
-  return most;
+    max_difference = std::max(max_difference, std::abs(a[i] - b[i]));
+  return max_difference;
 }
 
 TEST(Renderer, DrawsAnIntervalAsTheAccumulatorDoes) {
@@ -211,15 +211,16 @@ TEST(Renderer, LetsSumsDecay) {
 
 TEST(Renderer, ShowsTheAgeOfTheLastEvent) {
   const auto events = events_by_chance(1500, 100'000, 6);
-  constexpr int longest = 30'000;
-  Renderer renderer(
-      width, height,
-      {.mode = RenderMode::time_surface, .palette = PaletteName::grey, .time_constant = longest});
+  constexpr int time_constant = 30'000;
+  Renderer renderer(width, height,
+                    {.mode = RenderMode::time_surface,
+                     .palette = PaletteName::grey,
+                     .time_constant = time_constant});
   for (int end = 10'000; end <= 100'000; end += 10'000) {
     renderer.add(between(events, end - 10'000, end), 0);
     std::vector<double> values(width * height);
-    for (const auto& e : between(events, end - longest, end)) {
-      const double young = 1 - (end - static_cast<double>(e.t)) / longest;
+    for (const auto& e : between(events, end - time_constant, end)) {
+      const double young = 1 - (end - static_cast<double>(e.t)) / time_constant;
       values[static_cast<std::size_t>(e.y() * width + e.x)] =
           e.polarity() == Polarity::on ? young : -young;
     }

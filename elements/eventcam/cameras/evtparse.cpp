@@ -364,10 +364,10 @@ static void note_transfer(GstEvtParse* self, GstClockTime arrival) {
   bool has_grown = false;
   {
     const auto stats = priv.stats.lock();
-    const auto longest = static_cast<GstClockTime>(length);
-    has_grown = longest > std::max(min_latency, stats->max_transfer);
+    const auto transfer = static_cast<GstClockTime>(length);
+    has_grown = transfer > std::max(min_latency, stats->max_transfer);
     // With a margin, so that the latency rarely changes.
-    if (has_grown) stats->max_transfer = longest + longest / 8;
+    if (has_grown) stats->max_transfer = transfer + transfer / 8;
   }
   if (!has_grown) return;
   GST_DEBUG_OBJECT(self, "a transfer takes %" GST_TIME_FORMAT, GST_TIME_ARGS(length));

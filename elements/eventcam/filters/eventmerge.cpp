@@ -479,14 +479,14 @@ static void release_pad(GstElement* element, GstPad* pad) {
 
 /// Duration of the longest stream.
 static gboolean answer_duration(GstElement* element, GstQuery* query) {
-  gint64 longest = -1;
+  gint64 max_duration = -1;
   for (const auto& pad : numbered_pads(element)) {
     gint64 duration = -1;
     if (gst_pad_peer_query_duration(GST_PAD(pad.get()), GST_FORMAT_TIME, &duration))
-      longest = std::max(longest, duration);
+      max_duration = std::max(max_duration, duration);
   }
-  if (longest < 0) return FALSE;
-  gst_query_set_duration(query, GST_FORMAT_TIME, longest);
+  if (max_duration < 0) return FALSE;
+  gst_query_set_duration(query, GST_FORMAT_TIME, max_duration);
   return TRUE;
 }
 

@@ -188,8 +188,8 @@ static void cover(GstEventStats* self, Nanoseconds start, Nanoseconds end) {
   const Nanoseconds from = measurement.end.value_or(start);
   for (auto* part : {&measurement.cumulative, &measurement.recent}) {
     if (!part->start) part->start = from;
-    const Nanoseconds most = std::numeric_limits<Nanoseconds>::max() - part->covered;
-    part->covered += std::clamp(end - from, Nanoseconds{0}, most);
+    const Nanoseconds max_added = std::numeric_limits<Nanoseconds>::max() - part->covered;
+    part->covered += std::clamp(end - from, Nanoseconds{0}, max_added);
   }
   measurement.end = std::max(end, from);
 }

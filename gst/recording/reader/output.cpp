@@ -207,12 +207,12 @@ bool EventReader::find_size(std::size_t index) {
     }
   }
   if (stream.is_implausible) {
-    const auto most = std::to_string(eventcamera::UsedPixels::max_guessed_side);
+    const auto max_side = std::to_string(eventcamera::UsedPixels::max_guessed_side);
     post_message(
         element_, GST_MESSAGE_ERROR,
         {GST_STREAM_ERROR_FORMAT,
-         "The file does not state its sensor size, and its events lie beyond " + most + "x" + most +
-             " pixels. If that is right, set width and height."},
+         "The file does not state its sensor size, and its events lie beyond " + max_side + "x" +
+             max_side + " pixels. If that is right, set width and height."},
         "columns and rows may have fractions, or other columns may have been read for them");
     return false;
   }

@@ -140,12 +140,12 @@ bool Aedat2Decoder::find_layout() {
 
 /// Takes the stated size, or that of all cameras with this layout.
 void Aedat2Decoder::find_size() {
-  constexpr SensorSize largest_davis{640, 480};
+  constexpr SensorSize max_davis_size{640, 480};
   if (size_ == SensorSize{}) size_ = assumed_;
   if (size_ == SensorSize{} && layout_ == dvs128_layout) size_ = {128, 128};
   if (size_ == SensorSize{} && layout_ == dvs640_layout) size_ = {640, 480};
   is_mirrored_ = size_ == SensorSize{};
-  limit_ = is_mirrored_ ? largest_davis : size_;
+  limit_ = is_mirrored_ ? max_davis_size : size_;
 }
 
 void Aedat2Decoder::read_records(Decoded& out) {
@@ -213,7 +213,7 @@ bool Aedat2Decoder::scan() {
 }
 
 bool Aedat2Decoder::within_sensor(std::uint32_t address) const {
-  if (address > layout_->largest) return false;
+  if (address > layout_->max_address) return false;
   return layout_->is_sample(address) || layout_->is_external(address) ||
          (layout_->x(address) < limit_.width && layout_->y(address) < limit_.height);
 }

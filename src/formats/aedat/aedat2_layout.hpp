@@ -27,13 +27,13 @@ inline constexpr Aedat2Camera aedat2_cameras[] = {
 
 /// Layout of addresses, told from their magnitude. v2e has no DVS128.
 inline AddressLayout aedat2_layout_of(std::span<const std::uint32_t> addresses, bool of_v2e) {
-  const auto many_are_past = [&](std::uint32_t largest) {
-    const auto count =
-        std::ranges::count_if(addresses, [&](std::uint32_t address) { return address > largest; });
+  const auto many_are_past = [&](std::uint32_t max_address) {
+    const auto count = std::ranges::count_if(
+        addresses, [&](std::uint32_t address) { return address > max_address; });
     return 16 * static_cast<std::size_t>(count) > addresses.size();
   };
-  if (many_are_past(dvs640_layout.largest)) return davis_layout;
-  return of_v2e || many_are_past(dvs128_layout.largest) ? dvs640_layout : dvs128_layout;
+  if (many_are_past(dvs640_layout.max_address)) return davis_layout;
+  return of_v2e || many_are_past(dvs128_layout.max_address) ? dvs640_layout : dvs128_layout;
 }
 
 }  // namespace eventcamera

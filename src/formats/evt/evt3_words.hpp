@@ -119,21 +119,21 @@ class Evt3Words {
   template <class AnyEvent>
   Vector vector_of(std::span<const AnyEvent> events) const {
     // A vector takes four words, like four events.
-    constexpr std::size_t least = 5;
-    if (width_ < 32 || events.size() < least) return {};
+    constexpr std::size_t min_events = 5;
+    if (width_ < 32 || events.size() < min_events) return {};
     const auto& event = events.front();
     const auto base = std::min<std::uint32_t>(event.x, width_ - 32);
     const auto fits = [&](const AnyEvent& next) {
       return next.t == event.t && next.y_p == event.y_p && next.x - base < 32;
     };
-    if (event.x - base >= 32 || !fits(events[least - 1])) return {};
+    if (event.x - base >= 32 || !fits(events[min_events - 1])) return {};
     Vector vector{1, base, std::uint32_t{1} << (event.x - base)};
     for (std::size_t i = 1; i < events.size() && fits(events[i]); ++i) {
       if (events[i].x <= events[i - 1].x) break;
       vector.mask |= std::uint32_t{1} << (events[i].x - base);
       ++vector.events;
     }
-    return vector.events >= least ? vector : Vector{};
+    return vector.events >= min_events ? vector : Vector{};
   }
 
   std::uint32_t width_;

@@ -106,9 +106,9 @@ class DsecTable final : public NumberTable {
     if (!Hdf5Dataset::exists(file, "t_offset", H5O_TYPE_DATASET)) return;
     Hdf5Dataset offset(file, "t_offset");
     std::vector<std::int64_t> number;
-    constexpr Microseconds most = INT64_MAX / 2;
+    constexpr Microseconds max_offset = INT64_MAX / 2;
     if (!offset.is_integers() || offset.rows() != 1 || offset.columns() != 1 ||
-        !offset.read(0, 1, number) || number[0] > most || number[0] < -most)
+        !offset.read(0, 1, number) || number[0] > max_offset || number[0] < -max_offset)
       throw UnsupportedFormat("HDF5 dataset /t_offset is not a time");
     offset_ = number[0];
   }

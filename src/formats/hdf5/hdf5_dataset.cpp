@@ -102,8 +102,8 @@ void Hdf5Dataset::check_storage(hid_t file) {
         refuse(path_, "has a corrupt index of its chunks");
       // Limits holes: they are read, unless they make up most of the file.
       const auto max_chunks = 2 * std::min<std::uint64_t>(chunks, UINT32_MAX) + max_holes;
-      const auto most = std::min<std::uint64_t>(max_chunks, UINT64_MAX / chunk_[0]) * chunk_[0];
-      rows_ = std::min<std::uint64_t>(claimed, most);
+      const auto max_rows = std::min<std::uint64_t>(max_chunks, UINT64_MAX / chunk_[0]) * chunk_[0];
+      rows_ = std::min<std::uint64_t>(claimed, max_rows);
       return;
     }
     case H5D_CONTIGUOUS: {
@@ -135,9 +135,9 @@ bool Hdf5Dataset::load(std::uint64_t block) {
   for (std::uint64_t column = 0; column < all_columns; column += chunk_stride) {
     const hsize_t offset[] = {block * chunk_[0], column};
     // Incompressible chunks are stored slightly larger.
-    const auto most = chunk_bytes_ + chunk_bytes_ / 64 + 1024;
+    const auto max_bytes = chunk_bytes_ + chunk_bytes_ / 64 + 1024;
     std::uint32_t left_out = 0;
-    if (!read_stored(offset, most, bytes, left_out) ||
+    if (!read_stored(offset, max_bytes, bytes, left_out) ||
         !undo_hdf5_filters(filters_, left_out, type_bytes_, chunk_bytes_, bytes))
       return false;
     if (all_columns == chunk_stride) {
@@ -276,7 +276,7 @@ void Hdf5Dataset::choose(std::span<const char* const> members) {
   }
 }
 
-bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t most,
+bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t max_stored,
                               std::vector<std::uint8_t>& out, std::uint32_t& left_out) {
   if (filters_.empty()) {
     // The library reads as many bytes as the file's index states, without reporting the number
@@ -287,23 +287,25 @@ bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t most,
           std::calloc(std::max<std::size_t>(max_bytes, chunk_bytes_), 1)));
       if (!scratch_) throw std::bad_alloc();
     }
-    if (chunk_bytes_ > most ||
+    if (chunk_bytes_ > max_stored ||
         H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &left_out, scratch_.get()) < 0)
       return false;
     out.assign(scratch_.get(), scratch_.get() + chunk_bytes_);
     return true;
   }
   hsize_t bytes = 0;
-  if (H5Dget_chunk_storage_size(dataset_.get(), offset, &bytes) < 0 || bytes == 0 || bytes > most)
+  if (H5Dget_chunk_storage_size(dataset_.get(), offset, &bytes) < 0 || bytes == 0 ||
+      bytes > max_stored)
     return false;
   out.resize(bytes);
   return H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &left_out, out.data()) >= 0;
 }
 
-bool Hdf5Dataset::read_chunk(std::uint64_t row, std::size_t most, std::vector<std::uint8_t>& out) {
+bool Hdf5Dataset::read_chunk(std::uint64_t row, std::size_t max_stored,
+                             std::vector<std::uint8_t>& out) {
   const hsize_t offset[] = {row, 0};
   std::uint32_t left_out = 0;
-  return read_stored(offset, most, out, left_out) && left_out == 0;
+  return read_stored(offset, max_stored, out, left_out) && left_out == 0;
 }
 
 std::uint64_t Hdf5Dataset::position(std::uint64_t row) const {

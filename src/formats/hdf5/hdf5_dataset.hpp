@@ -53,8 +53,8 @@ class Hdf5Dataset {
   /// True if this is the only filter of the chunks.
   bool has_only_filter(int filter) const { return filters_.size() == 1 && filters_[0] == filter; }
   /// Reads the stored bytes of the chunk that starts at a row. False if it is missing or larger
-  /// than `most`.
-  bool read_chunk(std::uint64_t row, std::size_t most, std::vector<std::uint8_t>& out);
+  /// than `max_stored` bytes.
+  bool read_chunk(std::uint64_t row, std::size_t max_stored, std::vector<std::uint8_t>& out);
 
   /// Position of a row, or its chunk, in the file; 0 if unknown. Slow: the library searches all
   /// chunks.
@@ -79,7 +79,7 @@ class Hdf5Dataset {
   void check_chunks();
   void check_storage(hid_t file);
 
-  bool read_stored(const hsize_t* offset, std::size_t most, std::vector<std::uint8_t>& out,
+  bool read_stored(const hsize_t* offset, std::size_t max_stored, std::vector<std::uint8_t>& out,
                    std::uint32_t& left_out);
   bool load(std::uint64_t block);
   bool read_elements(std::uint64_t first, std::uint64_t count, std::vector<std::uint8_t>& out);

@@ -12,10 +12,10 @@ namespace eventcamera {
 
 namespace {
 
-/// Decompresses zlib data. False if it is corrupt or larger than `most` bytes.
-bool inflate_within(std::size_t most, std::vector<std::uint8_t>& bytes) {
-  std::vector<std::uint8_t> out(most);
-  auto size = static_cast<uLongf>(most);
+/// Decompresses zlib data. False if it is corrupt or larger than `max_bytes`.
+bool inflate_within(std::size_t max_bytes, std::vector<std::uint8_t>& bytes) {
+  std::vector<std::uint8_t> out(max_bytes);
+  auto size = static_cast<uLongf>(max_bytes);
   if (uncompress(out.data(), &size, bytes.data(), bytes.size()) != Z_OK) return false;
   out.resize(size);
   bytes = std::move(out);

@@ -72,9 +72,9 @@ std::optional<Number> parsed(std::string_view text) {
 /// Nothing if the number is out of range.
 std::optional<Decimal> rounded_down(const Number& number) {
   auto [negative, digits, power, whole, has_fraction] = number;
-  constexpr auto most = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  constexpr auto max = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
   for (; power > 0 && digits != 0; --power) {
-    if (digits > most / 10) return std::nullopt;
+    if (digits > max / 10) return std::nullopt;
     digits *= 10;
   }
   // Cuts off digits, which are rest / scale.
@@ -85,8 +85,8 @@ std::optional<Decimal> rounded_down(const Number& number) {
     digits /= 10;
   }
   whole = whole && rest == 0;
-  if (digits >= most && !whole) return std::nullopt;
-  if (digits > most) return std::nullopt;
+  if (digits >= max && !whole) return std::nullopt;
+  if (digits > max) return std::nullopt;
   const auto next = static_cast<double>(digits) + 1;
   constexpr double max_uncertainty = 0.0005;  // three more digits are always believed
   const bool is_next = scale - rest <= scale * std::min(next * 0x1p-53, max_uncertainty);
