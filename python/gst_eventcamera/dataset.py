@@ -71,7 +71,7 @@ class DatasetVideo:
             raise PipelineError(f"{self.name}: {fault}")
 
     def fault(self, frames: Frames, duration: float) -> str:
-        """Why a video of these frames cannot be used, such as "corrupt: 2 of 90 frames are damaged"; empty if it can.
+        """Why a video of these frames cannot be used, such as "corrupt: 2 of 90 frames"; empty if it can.
         The duration is that of the file, in seconds, 0 if not known."""
         pictures = len(pictures_of(self.path)) if os.path.isdir(self.path) else 0
         return frames.fault(self.recipe.min_frames, duration, pictures)

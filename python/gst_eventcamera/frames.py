@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The frames that a video is decoded to: whether they are all there, and undamaged."""
+"""The frames that a video is decoded to: whether they are complete and intact."""
 from __future__ import annotations
 
 import numpy as np
@@ -32,7 +32,7 @@ class Frames:
         pad.add_probe(Gst.PadProbeType.BUFFER, look)
 
     def fault(self, min_frames: int, duration: float, pictures: int) -> str:
-        """Why the video cannot be used, such as "corrupt: 2 of 90 frames are damaged"; empty if it can.
+        """Why the video cannot be used, such as "corrupt: 2 of 90 frames"; empty if it can.
 
         duration: that of the file, in seconds; 0 if not known.
         pictures: number of pictures in the folder; 0 if it is a file."""
@@ -40,7 +40,7 @@ class Frames:
         if pictures > 0 and count != pictures:
             return f"corrupt: {count} of its {pictures} pictures can be decoded"
         if self.corrupted > 0:
-            return f"corrupt: {self.corrupted} of {count} frames are damaged"
+            return f"corrupt: {self.corrupted} of {count} frames"
         if count < min_frames:
             return f"too short: {count} frames of at least {min_frames}"
         missing = duration - (self.times[-1] - self.times[0]) / 1e9

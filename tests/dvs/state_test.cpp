@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // A simulator that continues with the state of another one makes the same events, wherever the
-// video is cut; damaged states and those of others are refused.
+// video is cut; corrupt states and those of others are refused.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -159,14 +159,14 @@ std::vector<std::uint8_t> sealed(std::vector<std::uint8_t> state) {
   return state;
 }
 
-TEST(State, IsRefusedIfDamaged) {
+TEST(State, IsRefusedIfCorrupt) {
   const LumaFormat format{16, 9, 8};
   const auto settings = everything();
   const auto state = played(format, settings).simulator().state();
   for (std::size_t i = 0; i < state.size(); i += 7) {
-    auto damaged = state;
-    damaged[i] ^= 0x40;
-    EXPECT_EQ(fault_of(damaged, format, settings), "its checksum is wrong") << i;
+    auto corrupt = state;
+    corrupt[i] ^= 0x40;
+    EXPECT_EQ(fault_of(corrupt, format, settings), "its checksum is wrong") << i;
   }
   for (std::size_t size = 8; size < state.size(); size += 31)
     EXPECT_EQ(fault_of(sealed({state.begin(), state.begin() + static_cast<std::ptrdiff_t>(size)}),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Damaged states of eventsim-dvs whose checksum is right. The first byte selects the settings, the
+// Corrupt states of eventsim-dvs whose checksum is right. The first byte selects the settings, the
 // second how much is missing at the end; three more are a place in the state and the byte there. A
 // state that is accepted makes events of the sensor, in order.
 #include <array>

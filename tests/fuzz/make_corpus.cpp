@@ -172,9 +172,9 @@ std::vector<Seed> mask_seeds() {
   return seeds;
 }
 
-/// A whole state of each kind, one that is cut, and one with a damaged pixel.
+/// A whole state of each kind, one that is cut, and one with a corrupt pixel.
 std::vector<Seed> dvs_state_seeds() {
-  std::vector<Seed> seeds{{"cut", {1, 9}}, {"damaged", {2, 0, 90, 1, 0xff}}};
+  std::vector<Seed> seeds{{"cut", {1, 9}}, {"corrupt", {2, 0, 90, 1, 0xff}}};
   for (std::uint8_t kind = 0; kind < 4; ++kind)
     seeds.push_back({"kind-" + std::to_string(kind), {kind, 0}});
   return seeds;

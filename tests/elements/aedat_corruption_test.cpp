@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// aedatdemux with AEDAT files that are damaged or empty, and with files that are not AEDAT.
+// aedatdemux with AEDAT files that are corrupt or empty, and with files that are not AEDAT.
 #include <set>
 
 #include "tests/elements/aedat_player.hpp"
@@ -152,7 +152,7 @@ TEST(AedatDemux, TellsDecodebinOfErrors) {
 }
 
 /// Any byte of the header may be wrong: decodebin ends with EOS or an error.
-TEST(AedatDemux, EndsWhereTheHeaderIsDamaged) {
+TEST(AedatDemux, EndsWhereTheHeaderIsCorrupt) {
   const auto ends = [](Bytes bytes, std::size_t at) {
     bytes[at] = 0x7f;
     const TemporaryFile file(bytes);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Readers of event files with files that are damaged or empty, or of another format.
+// Readers of event files with files that are corrupt or empty, or of another format.
 #include <tuple>
 
 #include "tests/elements/event_files.hpp"
