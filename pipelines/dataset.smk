@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # The workflow that event-dataset runs: a job for each video, in the folder of the data set, and before it one
-# for each of its segments, if it has any. A job writes its record last and at once; event-dataset removes the
+# for each of its clips, if it has any. A job writes its record last and at once; event-dataset removes the
 # records of videos that have to be made again.
 import json
 
@@ -8,14 +8,14 @@ with open(config["jobs"], encoding="utf-8") as file:
     videos = json.load(file)
 
 
-def segments_of(name):
+def clips_of(name):
     joints = videos[name]["joints"]
-    return [f"{config['segments']}/{name}.d/{number}.json" for number in range(len(joints) + 1 if joints else 0)]
+    return [f"{config['clips']}/{name}.d/{number}.json" for number in range(len(joints) + 1 if joints else 0)]
 
 
-def segment_before(wildcards):
+def clip_before(wildcards):
     number = int(wildcards.number)
-    return segments_of(wildcards.name)[number - 1 : number] if videos[wildcards.name]["in-order"] else []
+    return clips_of(wildcards.name)[number - 1 : number] if videos[wildcards.name]["in-order"] else []
 
 
 def arguments(wildcards):
@@ -29,25 +29,25 @@ rule all:
         lambda _: [f"{config['records']}/{name}.json" for name in videos],
 
 
-rule segment:
+rule clip:
     input:
-        segment_before,
+        clip_before,
     output:
-        config["segments"] + "/{name}.d/{number}.json",
+        config["clips"] + "/{name}.d/{number}.json",
     wildcard_constraints:
         number=r"\d+",
     params:
         arguments=arguments,
     log:
-        config["segments"] + "/{name}.d/{number}.log",
+        config["clips"] + "/{name}.d/{number}.log",
     shell:
-        "{config[command]} --segment-number {wildcards.number} --video={wildcards.name:q} {params.arguments:q}"
+        "{config[command]} --clip-number {wildcards.number} --video={wildcards.name:q} {params.arguments:q}"
         " >{log:q} 2>&1"
 
 
 rule video:
     input:
-        lambda wildcards: segments_of(wildcards.name),
+        lambda wildcards: clips_of(wildcards.name),
     output:
         config["records"] + "/{name}.json",
     params:

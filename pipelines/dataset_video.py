@@ -131,9 +131,9 @@ def path_in(output, folder, name, extension):
     return path
 
 
-def record_of(video, output, keep=True, segments=None):
+def record_of(video, output, keep=True, clips=None):
     """Simulates a video, and returns its record. The file of events is complete or not there, whenever the
-    process is killed; without `keep`, only its hash is. Its segments, if given, have been simulated before."""
+    process is killed; without `keep`, only its hash is. Its clips, if given, have been simulated before."""
     record = {"name": video.name, "state": state_of(video.path),
               "input": {"path": os.path.relpath(video.path, os.path.dirname(video.recipe.path)),
                         "sha256": hash_of(video.path)},
@@ -143,7 +143,7 @@ def record_of(video, output, keep=True, segments=None):
     with tempfile.TemporaryDirectory(dir=unfinished) as folder:
         path = os.path.join(folder, "events")
         try:
-            figures, picture, warnings, decoders = simulate(video, path, segments)
+            figures, picture, warnings, decoders = simulate(video, path, clips)
         except Refused as reason:
             return record | {"refused": str(reason)}
         except ec.PipelineError as failure:
@@ -168,8 +168,8 @@ def write_record(path, record):
     os.replace(file.name, path)
 
 
-def simulate(video, path, segments):
-    """Writes the events, or tensors, of a video or of all its segments. Returns figures, a picture, warnings,
+def simulate(video, path, clips):
+    """Writes the events, or tensors, of a video or of all its clips. Returns figures, a picture, warnings,
     and the decoders."""
     figures = Figures()
     is_tensors = video.recipe.output == TENSORS
@@ -179,10 +179,10 @@ def simulate(video, path, segments):
 
     rest = f"tee name=events ! queue ! {writer}  events. ! queue ! {SINK}"
     # One thread, since there is a job for each processor.
-    with segments.playing(rest) if segments else video.playing(rest, threads=1) as pipeline:
-        frames, decoders = (segments.frames, segments.decoders) if segments else (Frames(), decoders_of(pipeline))
+    with clips.playing(rest) if clips else video.playing(rest, threads=1) as pipeline:
+        frames, decoders = (clips.frames, clips.decoders) if clips else (Frames(), decoders_of(pipeline))
         pipeline.gaps_as_buffers()
-        if not segments:
+        if not clips:
             frames.watch(pipeline.element("decoded").get_static_pad("sink"))
         array = None
         if is_tensors:
@@ -196,7 +196,7 @@ def simulate(video, path, segments):
         for tensor in pipeline.samples("tensors") if array else ():
             array.append(tensor_of(tensor))
         pipeline.wait()
-        duration = segments.duration if segments else duration_of(pipeline)
+        duration = clips.duration if clips else duration_of(pipeline)
     if fault := video.fault(frames, duration):
         raise Refused(fault)
     if figures.chunks == 0:

@@ -23,7 +23,7 @@ import sys
 import time
 
 try:
-    import dataset_segments
+    import dataset_clips
     import gst_eventcamera as ec
     from dataset_report import write_reports
     from dataset_video import extension_of, hash_of, making_of, path_in, record_of, state_of, write_record
@@ -73,15 +73,15 @@ def options():
                         " a name that Snakemake knows")
     parser.add_argument("--part", type=part_of_all, default=(1, 1), metavar="K/N",
                         help="make only the K-th of N parts, such as 3/100, for data sets of more than 10,000 videos")
-    parser.add_argument("--segment", type=int, default=300, metavar="SECONDS",
-                        help="a video of two or more segments of this length is simulated in a job for each; the"
+    parser.add_argument("--clip-duration", type=int, default=300, metavar="SECONDS",
+                        help="a video of two or more clips of this length is simulated in a job for each; the"
                         " events are the same (default: %(default)s, 0 = never)")
     parser.add_argument("--manifest", metavar="FILE",
                         help="the manifest that verify compares with (default: that of the folder)")
     parser.add_argument("--video", metavar="NAME", help="make one video only, as the jobs do; needs --file")
     parser.add_argument("--file", help="the file of that video")
     parser.add_argument("--joints", nargs="+", type=int, default=[], help=argparse.SUPPRESS)
-    parser.add_argument("--segment-number", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--clip-number", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
                         help="print the version and exit")
     chosen = parser.parse_args()
@@ -90,8 +90,8 @@ def options():
         parser.error(f"give one recipe, not {' '.join(chosen.words)}")
     if (chosen.video is None) != (chosen.file is None):
         parser.error("--video and --file need each other")
-    if chosen.cores < 1 or chosen.retries < 0 or chosen.segment < 0:
-        parser.error("--cores is at least 1, --retries and --segment at least 0")
+    if chosen.cores < 1 or chosen.retries < 0 or chosen.clip_duration < 0:
+        parser.error("--cores is at least 1, --retries and --clip-duration at least 0")
     chosen.recipe = chosen.words[-1]
     chosen.output = os.path.abspath(chosen.output or os.path.splitext(chosen.recipe)[0])
     return chosen
@@ -172,26 +172,26 @@ def profile_options(profile):
     return ["--profile", own, "--cluster-status", shlex.quote(os.path.join(own, "status"))]
 
 
-def segments_root(chosen):
-    return "verified-segments" if chosen.verify else "segments"
+def clips_root(chosen):
+    return "verified-clips" if chosen.verify else "clips"
 
 
-def segments_folder(chosen, name):
-    return dataset_segments.folder_of(chosen.output, segments_root(chosen), name)
+def clips_folder(chosen, name):
+    return dataset_clips.folder_of(chosen.output, clips_root(chosen), name)
 
 
 def job_of(chosen, video):
-    """What the workflow has to know of a video. Segments of another input or recipe are removed."""
-    joints = dataset_segments.joints_of(video, chosen.segment)
-    if joints and (hindrance := dataset_segments.hindrance(video)):
-        print(f"{video.name}: in one job, not in segments: {hindrance}", file=sys.stderr)
+    """What the workflow has to know of a video. Clips of another input or recipe are removed."""
+    joints = dataset_clips.joints_of(video, chosen.clip_duration)
+    if joints and (hindrance := dataset_clips.hindrance(video)):
+        print(f"{video.name}: in one job, not in clips: {hindrance}", file=sys.stderr)
         joints = []
-    dataset_segments.remove_others(video, segments_folder(chosen, video.name), joints)
-    return {"path": os.path.abspath(video.path), "joints": joints, "in-order": dataset_segments.has_state(video)}
+    dataset_clips.remove_others(video, clips_folder(chosen, video.name), joints)
+    return {"path": os.path.abspath(video.path), "joints": joints, "in-order": dataset_clips.has_state(video)}
 
 
 def make(chosen, videos, lock):
-    """Runs a job for each video, or for each of its segments and then one that joins them. Those that fail
+    """Runs a job for each video, or for each of its clips and then one that joins them. Those that fail
     leave no record."""
     output, command = chosen.output, [os.path.realpath(__file__)]
     jobs = os.path.join(output, ".jobs-{}-of-{}.json".format(*chosen.part))
@@ -205,7 +205,7 @@ def make(chosen, videos, lock):
          "--nolock", "--keep-going", "--rerun-incomplete", "--retries", str(chosen.retries), "--nocolor",
          "--rerun-triggers", "mtime", "--drop-metadata", "--scheduler", "greedy",
          "--config", f"jobs={jobs}", f"records={records_folder(chosen)}",
-         f"segments={segments_root(chosen)}", f"command={shlex.join(command)}"],
+         f"clips={clips_root(chosen)}", f"command={shlex.join(command)}"],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", pass_fds=[lock.fileno()])
     progress = VideosDone(len(videos))
     try:
@@ -229,7 +229,7 @@ def records_folder(chosen):
 
 def failure_of(chosen, name):
     """The last line that the jobs of a video wrote."""
-    logs = glob.glob(glob.escape(segments_folder(chosen, name)) + "/*.log")
+    logs = glob.glob(glob.escape(clips_folder(chosen, name)) + "/*.log")
     for path in [*sorted(logs), os.path.join(chosen.output, "logs", f"{name}.log")]:
         with contextlib.suppress(FileNotFoundError), open(path, encoding="utf-8", errors="replace") as file:
             if lines := file.read().strip().splitlines():
@@ -267,26 +267,26 @@ def is_record(record):
 def make_one(chosen, recipe):
     name = chosen.video
     video = ec.DatasetVideo(recipe, name, chosen.file)
-    folder, segments, notes = segments_folder(chosen, name), None, {}
-    if chosen.segment_number is not None:
-        dataset_segments.make_segment(video, folder, chosen.joints, chosen.segment_number)
+    folder, clips, notes = clips_folder(chosen, name), None, {}
+    if chosen.clip_number is not None:
+        dataset_clips.make_clip(video, folder, chosen.joints, chosen.clip_number)
         return
     if chosen.joints:
         try:
-            segments = dataset_segments.Segments(video, folder, chosen.joints)
-        except dataset_segments.Doubt as doubt:
-            notes = {"whole": f"made as a whole, not in segments: {doubt}"}
-    record = record_of(video, chosen.output, keep=not chosen.verify, segments=segments)
+            clips = dataset_clips.Clips(video, folder, chosen.joints)
+        except dataset_clips.Doubt as doubt:
+            notes = {"whole": f"made as a whole, not in clips: {doubt}"}
+    record = record_of(video, chosen.output, keep=not chosen.verify, clips=clips)
     write_record(path_in(chosen.output, records_folder(chosen), name, "json"), record | notes)
     shutil.rmtree(folder, ignore_errors=True)
 
 
-def remove_segments(chosen, videos):
+def remove_clips(chosen, videos):
     """Of videos that are made, in case a job was killed before it did so."""
     for video in videos:
-        folder = segments_folder(chosen, video.name)
+        folder = clips_folder(chosen, video.name)
         shutil.rmtree(folder, ignore_errors=True)
-        with contextlib.suppress(OSError):  # other segments are there, or none have been
+        with contextlib.suppress(OSError):  # other clips are there, or none have been
             os.removedirs(os.path.dirname(folder))
 
 
@@ -315,7 +315,7 @@ def make_all(chosen, recipe):
         stale = stale_videos(mine, records_of(chosen, mine), chosen.output)
         status = make(chosen, stale, lock) if stale else 0
         records = records_of(chosen, videos)
-        remove_segments(chosen, [video for video in mine if records[video.name]])
+        remove_clips(chosen, [video for video in mine if records[video.name]])
         write_reports(chosen.output, recipe, videos, records)
     refused = [f"{name}: {record['refused']}" for name, record in records.items() if record and "refused" in record]
     failed = [video.name for video in stale if not records[video.name]]
@@ -347,12 +347,12 @@ def verify_all(chosen, recipe):
     expect_own_folder(chosen.output, videos)
     os.makedirs(chosen.output, exist_ok=True)
     with locked(chosen.output, chosen.part) as lock:
-        for folder in records_folder(chosen), segments_root(chosen):
+        for folder in records_folder(chosen), clips_root(chosen):
             shutil.rmtree(os.path.join(chosen.output, folder), ignore_errors=True)
         if present:
             make(chosen, present, lock)
         records = records_of(chosen, present)
-        remove_segments(chosen, [video for video in present if records[video.name]])
+        remove_clips(chosen, [video for video in present if records[video.name]])
     differences = [f"{name}: not among the videos" for name in expected
                    if chosen.part == (1, 1) and name not in records]
     differences += [f"{video.name}: not in the manifest" for video in videos

@@ -23,11 +23,11 @@
  *
  * With #GstEventSimDvs:label, events carry their cause. The pad `label_sink` takes images of
  * classes, such as a renderer's segmentation, in the size of the video: events then carry cause and
- * class, which is that of their pixel in the image in force at their time, the last one that is not
- * later. Images and frames are matched by their timestamps. The video waits for the image of each
- * frame, so if one source feeds both pads, a queue belongs before each. Where images are missing,
- * as in a GAP or after their end, the last one stays in force; before the first one, the class is
- * 0. Images without a timestamp are skipped with a warning; a different size is an error.
+ * class, which is that of their pixel in the most recent image at that time. Images and frames are
+ * matched by their timestamps. The video waits for the image of each frame, so if one source feeds
+ * both pads, put a queue before each. Where images are missing, as in a GAP or after their end, the
+ * last one is used; before the first one, the class is 0. Images without a timestamp are skipped
+ * with a warning; a different size is an error.
  *
  * The pad `flow_sink` takes optical flow that is known, such as a renderer's, instead of finding
  * it, with upsampling=motion: a tensor of NNStreamer for each frame, of the dimensions
@@ -35,11 +35,11 @@
  * in pixels. A tensor has the timestamp of its frame. Where one is missing, or has another duration
  * than the interval because frames were skipped, the flow is found as without the pad.
  *
- * A long video can be simulated in segments, as if it were one, also on different machines: with
- * #GstEventSimDvs:final-state, the state of all pixels is written to a file at the end of a
- * segment, and with #GstEventSimDvs:initial-state, the next one continues from it. Frames keep the
- * timestamps that they have in the whole video; those up to the time of the state are skipped, so
- * the next segment may begin earlier than needed.
+ * A long video can be simulated clip by clip, with the same events as in one piece, even on
+ * different machines: #GstEventSimDvs:final-state writes the state of all pixels to a file at the
+ * end of a clip, and #GstEventSimDvs:initial-state continues from it. Frames keep the timestamps
+ * that they have in the whole video; those up to the time of the state are skipped, so the next
+ * clip may begin earlier than needed.
  *
  * ## Example launch lines
  * |[

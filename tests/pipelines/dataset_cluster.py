@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """event-dataset --profile slurm: a controller and two nodes of Slurm on this machine make the same files as one
-process, also of videos in segments, and if the daemon of a node is killed on the way."""
+process, also of videos in clips, and if the daemon of a node is killed on the way."""
 
 import getpass
 import itertools
@@ -155,7 +155,7 @@ def main(folder, slurm_folder):
     slurm = Slurm(slurm_folder)
     try:
         program = subprocess.Popen([PROGRAM, recipe, "--output", f"{folder}/cluster", "--profile", "slurm",
-                                    "--segment", "1"])
+                                    "--clip-duration", "1"])
         while slurm.states()["node2"] not in ("allocated", "mixed"):
             assert program.poll() is None, "no job ran on node2"
             time.sleep(0.1)
@@ -169,7 +169,7 @@ def main(folder, slurm_folder):
     assert len(local) == CLIPS + len(VIDEOS)
     assert hashes(f"{folder}/cluster") == local
     with open(f"{folder}/cluster/snakemake.log", encoding="utf-8") as log:
-        assert log.read().count("rule segment:") >= 2 * len(VIDEOS)
+        assert log.read().count("rule clip:") >= 2 * len(VIDEOS)
     print(f"the {len(local)} files are the same")
 
 

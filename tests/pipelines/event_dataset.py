@@ -22,7 +22,7 @@ sys.path.insert(0, os.path.join(os.environ["BUILD"], "pipelines"))
 
 import gst_eventcamera as ec
 import numpy as np
-import dataset_segments
+import dataset_clips
 from dataset_video import hash_of, record_of
 from gst_eventcamera.recipe import OUTPUTS, Distribution, uniform_number
 
@@ -307,8 +307,8 @@ class Outputs(unittest.TestCase):
         self.assertGreater(len(there), 100)
 
 
-class Segments(unittest.TestCase):
-    """Videos of four seconds, in segments of one."""
+class Clips(unittest.TestCase):
+    """Videos of four seconds, in clips of one."""
 
     JOINTS = [1, 2, 3]
 
@@ -319,17 +319,17 @@ class Segments(unittest.TestCase):
                f" ! x264enc key-int-max=40 ! mp4mux ! filesink {shlex.quote('location=' + path)}")
         return path
 
-    def segmented(self, video):
-        """The folder of the segments of a video, all of which are made."""
-        folder = dataset_segments.folder_of(path_of("segments/made"), "segments", video.name)
+    def folder_of_clips(self, video):
+        """The folder of the clips of a video, all of which are made."""
+        folder = dataset_clips.folder_of(path_of("clips/made"), "clips", video.name)
         shutil.rmtree(folder, ignore_errors=True)
         for number in range(len(self.JOINTS) + 1):
-            dataset_segments.make_segment(video, folder, self.JOINTS, number)
+            dataset_clips.make_clip(video, folder, self.JOINTS, number)
         return folder
 
     def video(self, text, framerate=25):
-        self.make_video("segments", framerate)
-        return ec.Dataset(recipe_of("segments", f"videos: videos/*\n{text}"))[0]
+        self.make_video("clips", framerate)
+        return ec.Dataset(recipe_of("clips", f"videos: videos/*\n{text}"))[0]
 
     def test_are_those_of_the_whole(self):
         for simulator, output in {
@@ -342,64 +342,64 @@ class Segments(unittest.TestCase):
         }.items():
             with self.subTest(simulator):
                 video = self.video(f"simulator: {simulator}\noutput: {output}")
-                self.assertEqual(dataset_segments.joints_of(video, 1), self.JOINTS)
-                self.assertEqual(dataset_segments.hindrance(video), "")
-                segments = dataset_segments.Segments(video, self.segmented(video), self.JOINTS)
-                joined = record_of(video, path_of("segments/made"), segments=segments)
-                self.assertEqual(joined, record_of(video, path_of("segments/whole")))
+                self.assertEqual(dataset_clips.joints_of(video, 1), self.JOINTS)
+                self.assertEqual(dataset_clips.hindrance(video), "")
+                clips = dataset_clips.Clips(video, self.folder_of_clips(video), self.JOINTS)
+                joined = record_of(video, path_of("clips/made"), clips=clips)
+                self.assertEqual(joined, record_of(video, path_of("clips/whole")))
                 self.assertGreater(joined["figures"]["events"], 1000)
 
     def test_are_made_in_jobs_that_go_on_after_a_kill(self):
         self.make_video("jobs")
         recipe = recipe_of("jobs", RECIPE.replace("**/*.mkv", "*"))
-        second = path_of("jobs/recipe/segments/coded.d/1.json")
-        kill_once_there_is(second, recipe, "--segment", "1")
-        self.assertIn("1 made", event_dataset(recipe, "--segment", "1"))
+        second = path_of("jobs/recipe/clips/coded.d/1.json")
+        kill_once_there_is(second, recipe, "--clip-duration", "1")
+        self.assertIn("1 made", event_dataset(recipe, "--clip-duration", "1"))
         with open(path_of("jobs/recipe/snakemake.log"), encoding="utf-8") as file:
-            self.assertRegex(file.read(), r"segment +[1-3] ")
-        self.assertFalse(os.path.exists(path_of("jobs/recipe/segments")))
-        segmented = load("jobs", "manifest.json")
+            self.assertRegex(file.read(), r"clip +[1-3] ")
+        self.assertFalse(os.path.exists(path_of("jobs/recipe/clips")))
+        manifest = load("jobs", "manifest.json")
         self.assertIn("1 videos of the manifest compared, 0 differences",
-                      event_dataset("verify", recipe, "--segment", "1"))
+                      event_dataset("verify", recipe, "--clip-duration", "1"))
         shutil.rmtree(path_of("jobs/recipe"))
         event_dataset(recipe)
-        self.assertEqual(load("jobs", "manifest.json"), segmented)
+        self.assertEqual(load("jobs", "manifest.json"), manifest)
 
     def test_that_do_not_join_are_made_as_a_whole(self):
         video = self.video("simulator: eventsim-diff\noutput: npz")
-        folder = self.segmented(video)
+        folder = self.folder_of_clips(video)
         with open(f"{folder}/2.json", encoding="utf-8") as file:
             record = json.load(file)
         record["before"][-1][1] = "0"
         with open(f"{folder}/2.json", "w", encoding="utf-8") as file:
             json.dump(record, file)
-        event_dataset(video.recipe.path, "--output", path_of("segments/made"), "--video", video.name, "--file", video.path,
+        event_dataset(video.recipe.path, "--output", path_of("clips/made"), "--video", video.name, "--file", video.path,
                       "--joints", *map(str, self.JOINTS))
-        with open(path_of("segments/made/records/coded.json"), encoding="utf-8") as file:
+        with open(path_of("clips/made/records/coded.json"), encoding="utf-8") as file:
             made = json.load(file)
-        self.assertEqual(made.pop("whole"), "made as a whole, not in segments: a seek leads to other frames")
-        self.assertEqual(made, record_of(video, path_of("segments/whole")))
+        self.assertEqual(made.pop("whole"), "made as a whole, not in clips: a seek leads to other frames")
+        self.assertEqual(made, record_of(video, path_of("clips/whole")))
 
     def test_are_not_joined_without_all_their_events(self):
         video = self.video("simulator: eventsim-diff")
-        folder = self.segmented(video)
+        folder = self.folder_of_clips(video)
         for spoil in (lambda path: os.truncate(path, 100), os.remove):
             spoil(f"{folder}/1.events")
-            with self.assertRaisesRegex(dataset_segments.Doubt, "the events of segment 1 are missing or cut off"):
-                dataset_segments.Segments(video, folder, self.JOINTS)
+            with self.assertRaisesRegex(dataset_clips.Doubt, "the events of clip 1 are missing or cut off"):
+                dataset_clips.Clips(video, folder, self.JOINTS)
 
     def test_are_not_made_where_they_could_differ(self):
         for text, reason in {
             "simulator: eventsim-dvs\nframes: videorate": "videorate, in frames, may remember frames",
             "simulator: eventsim-dvs final-state=/x": "it sets a state of its own",
-            "simulator: identity": "identity cannot continue a segment",
+            "simulator: identity": "identity cannot continue a clip",
         }.items():
-            self.assertEqual(dataset_segments.hindrance(self.video(text)), reason)
+            self.assertEqual(dataset_clips.hindrance(self.video(text)), reason)
         video = self.video("simulator: eventsim-dvs", framerate=3)
-        with self.assertRaisesRegex(dataset_segments.Doubt, "a second of it has fewer than 4 frames"):
-            dataset_segments.Segments(video, self.segmented(video), self.JOINTS)
-        self.assertEqual(dataset_segments.joints_of(video, 300), [])
-        self.assertEqual(dataset_segments.joints_of(video, 0), [])
+        with self.assertRaisesRegex(dataset_clips.Doubt, "a second of it has fewer than 4 frames"):
+            dataset_clips.Clips(video, self.folder_of_clips(video), self.JOINTS)
+        self.assertEqual(dataset_clips.joints_of(video, 300), [])
+        self.assertEqual(dataset_clips.joints_of(video, 0), [])
 
 
 class Recipes(unittest.TestCase):

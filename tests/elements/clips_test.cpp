@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// eventsim-dvs in segments: with the state that one leaves behind, the next makes the events that
+// eventsim-dvs clip by clip: with the state that one leaves behind, the next makes the events that
 // the whole video has.
 #include <filesystem>
 #include <fstream>
@@ -50,7 +50,7 @@ std::string state() {
   return recording_files::Folder::path("state");
 }
 
-TEST(Segments, JoinWithoutASeam) {
+TEST(Clips, JoinWithoutASeam) {
   std::vector<Output> whole;
   Harness one(noisy);
   start(one);
@@ -72,7 +72,7 @@ TEST(Segments, JoinWithoutASeam) {
   EXPECT_EQ(joined, whole);
 }
 
-TEST(Segments, JoinWithoutASeamAtAGap) {
+TEST(Clips, JoinWithoutASeamAtAGap) {
   const auto gap = [](Harness& h) {
     gst_harness_push_event(h.get(),
                            gst_event_new_gap(GST_SECOND + 80 * GST_MSECOND, 200 * GST_MSECOND));
@@ -99,7 +99,7 @@ TEST(Segments, JoinWithoutASeamAtAGap) {
   EXPECT_EQ(joined, whole);
 }
 
-TEST(Segments, WarnIfAllFramesAreBeforeTheState) {
+TEST(Clips, WarnIfAllFramesAreBeforeTheState) {
   for (const bool has_state : {false, true}) {
     Harness h(noisy + "final-state=" + in_quotes(state()) +
               (has_state ? " initial-state=" + in_quotes(state()) : ""));
@@ -110,7 +110,7 @@ TEST(Segments, WarnIfAllFramesAreBeforeTheState) {
   }
 }
 
-TEST(Segments, ContinueAgainAfterASeek) {
+TEST(Clips, ContinueAgainAfterASeek) {
   {
     Harness h(noisy + "final-state=" + in_quotes(state()));
     start(h);
@@ -130,7 +130,7 @@ TEST(Segments, ContinueAgainAfterASeek) {
   EXPECT_EQ(outputs[0], outputs[1]);
 }
 
-TEST(Segments, RefuseStatesOfOthers) {
+TEST(Clips, RefuseStatesOfOthers) {
   {
     Harness h("eventsim-dvs seed=1 final-state=" + in_quotes(state()));
     start(h);
@@ -151,7 +151,7 @@ TEST(Segments, RefuseStatesOfOthers) {
   EXPECT_NE(error_of("seed=1" + initial).find("Cannot continue from the state"), std::string::npos);
 }
 
-TEST(Segments, ReportAStateThatCannotBeWritten) {
+TEST(Clips, ReportAStateThatCannotBeWritten) {
   Harness h("eventsim-dvs final-state=/nowhere/state");
   start(h);
   push_frames(h, 0, 2);
@@ -159,7 +159,7 @@ TEST(Segments, ReportAStateThatCannotBeWritten) {
   EXPECT_NE(h.error().find("Cannot write the state to \"/nowhere/state\""), std::string::npos);
 }
 
-TEST(Segments, LeaveADeviceInItsPlace) {
+TEST(Clips, LeaveADeviceInItsPlace) {
   Harness h("eventsim-dvs final-state=/dev/null");
   start(h);
   push_frames(h, 0, 2);

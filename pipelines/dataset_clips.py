@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Long videos of a data set in segments, each a job, whose events are joined without a seam.
+"""Long videos of a data set in clips, each a job, whose events are joined without a seam.
 
-A segment decodes from MARGIN before its start on. The frames of this time, which the segment before has as
-well, must be the same. Simulators that only remember a frame or two are warm after them; eventsim-dvs
-continues with the state that the segment before has left. Events, times and labels go to a file, from which
+A clip decodes from MARGIN before its start on. These frames, which the previous clip has as well, must
+be the same in both. Simulators that only remember a frame or two are warm after them; eventsim-dvs
+continues from the state that the previous clip left. Events, times and labels go to a file, from which
 another job feeds the filters and the writer, so that these see what they see of a whole video. Where
 anything is in doubt, that job makes the video as a whole."""
 import contextlib
@@ -31,7 +31,7 @@ MARGIN = SECOND
 # Frames that the margin must have: those that simulators remember, one more to compare, and the first after a
 # seek, whose time may be changed.
 MIN_MARGIN = 4
-# A file with fewer bytes for each second of two segments is not opened to look at its duration.
+# A file with fewer bytes for each second of two clips is not opened to look at its duration.
 MIN_RATE = 1000
 WARMED_UP = {"eventsim-frame", "eventsim-dense", "eventsim-sparse", "eventsim-diff"}
 WITH_STATE = {"eventsim-dvs"}
@@ -44,17 +44,17 @@ SEGMENT_FIELDS = ("rate", "applied_rate", "base", "offset", "start", "stop", "ti
 
 
 def folder_of(output, folder, name):
-    """Of the files of a video's segments."""
+    """Folder of a video's clips."""
     return os.path.join(output, folder, name + ".d")
 
 
 def has_state(video):
-    """A segment needs the one before."""
+    """True if a clip needs the one before it."""
     return _simulator(video) in WITH_STATE
 
 
 def joints_of(video, length):
-    """Where a video is cut into segments of so many seconds; at none if it has less than two, or fails."""
+    """Returns where to cut a video into clips of this length in seconds; nowhere if it has fewer than two, or fails."""
     if length == 0 or video.recipe.window or os.path.isdir(video.path):
         return []
     with contextlib.suppress(ec.PipelineError, OSError):
@@ -69,7 +69,7 @@ def joints_of(video, length):
 def hindrance(video):
     """Why a video of this recipe cannot be cut; empty if it can."""
     if _simulator(video) not in WARMED_UP | WITH_STATE:
-        return f"{_simulator(video)} cannot continue a segment"
+        return f"{_simulator(video)} cannot continue a clip"
     if "-state=" in video.line:
         return "it sets a state of its own"
     frames = [element.split()[0] for element in video.recipe.frames.split("!") if element.strip()]
@@ -82,7 +82,7 @@ def _simulator(video):
 
 
 def remove_others(video, folder, joints):
-    """Removes segments that were made of another input or in another way."""
+    """Removes clips that were made of another input or in another way."""
     with contextlib.suppress(FileNotFoundError):
         for file in os.listdir(folder):
             if file.endswith(".json") and _read(os.path.join(folder, file))["of"] != _origin(video, joints):
@@ -91,7 +91,7 @@ def remove_others(video, folder, joints):
 
 
 def _origin(video, joints):
-    """What the segments of a video are made from."""
+    """What the clips of a video are made from."""
     return {"making": making_of(video), "state": state_of(video.path), "joints": joints, "versions": versions()}
 
 
@@ -100,16 +100,16 @@ def _read(path):
         return json.load(file)
 
 
-# making a segment
+# making a clip
 
 
 class Doubt(Exception):
-    """The segments of a video may not be those of the whole."""
+    """The clips of a video may not be those of the whole."""
 
 
-class SegmentFrames(Frames):
-    """Watches the frames of a segment, in nanoseconds of stream time from `start` until `end`, where it ends
-    the stream. Keeps times and hashes of those that other segments have as well."""
+class ClipFrames(Frames):
+    """Watches the frames of a clip, in nanoseconds of stream time from `start` until `end`, where it ends
+    the stream. Keeps times and hashes of those that other clips have as well."""
 
     def __init__(self, start, end):
         super().__init__()
@@ -163,7 +163,7 @@ class SegmentFrames(Frames):
             self.doubt = "its frames are not one stream"
 
     def _hash_of(self, buffer):
-        """Of the luma, without what pads its rows."""
+        """Hash of the luma, without row padding."""
         height, width = self._layout
         meta = GstVideo.buffer_get_video_meta(buffer)
         offset, stride = (meta.offset[0], meta.stride[0]) if meta else (0, -(-width // 4) * 4)
@@ -172,12 +172,12 @@ class SegmentFrames(Frames):
         return hashlib.sha256(rows.tobytes()).hexdigest()
 
 
-def make_segment(video, folder, joints, number):
-    """Writes the events of a segment, and then its record."""
+def make_clip(video, folder, joints, number):
+    """Writes the events of a clip, and then its record."""
     os.makedirs(folder, exist_ok=True)
     start = joints[number - 1] * SECOND if number > 0 else 0
     end = joints[number] * SECOND if number < len(joints) else None
-    frames = SegmentFrames(start, end)
+    frames = ClipFrames(start, end)
     record = {"of": _origin(video, joints)}
     with tempfile.NamedTemporaryFile(dir=folder, suffix=".events", delete=False) as file:
         try:
@@ -199,11 +199,11 @@ def _simulate(video, folder, number, frames, file):
     found = {"caps": None}
     more = {"final-state": state_after(number)} if has_state(video) and frames.end is not None else {}
     if has_state(video) and number > 0 and _read(os.path.join(folder, f"{number - 1}.json"))["doubt"]:
-        raise Doubt("the segment before is in doubt")
+        raise Doubt("the previous clip is in doubt")
     with video.playing(SINK, threads=1, more=more, filters=False) as pipeline:
         decoders = decoders_of(pipeline)
         pipeline.gaps_as_buffers()
-        # A sink pad, behind the conversion: its frames begin with their luma.
+        # A sink pad, after the conversion: its frames begin with their luma.
         frames.watch(pipeline.element("decoded").get_static_pad("src").get_peer())
         if number > 0:
             pipeline.set_state(Gst.State.PAUSED)
@@ -231,11 +231,11 @@ def _write(file, buffer, is_discontinuous):
     file.write(labels)
 
 
-# joining segments
+# joining clips
 
 
-class Segments:
-    """All segments of a video, joined. Raises Doubt if they are not those of the whole."""
+class Clips:
+    """All clips of a video, joined. Raises Doubt if they are not those of the whole."""
 
     def __init__(self, video, folder, joints):
         self._video = video
@@ -257,9 +257,9 @@ class Segments:
             if record["doubt"]:
                 raise Doubt(record["doubt"])
             if not os.path.exists(self._paths[number]) or os.path.getsize(self._paths[number]) != record["size"]:
-                raise Doubt(f"the events of segment {number} are missing or cut off")
+                raise Doubt(f"the events of clip {number} are missing or cut off")
             if record["caps"] != self._records[0]["caps"] or not record["times"]:
-                raise Doubt(f"segment {number} has no events of the same caps")
+                raise Doubt(f"clip {number} has no events of the same caps")
         for before, after in zip(self._records, self._records[1:]):
             seen = after["before"][1:]
             if len(seen) < MIN_MARGIN - 1:
@@ -271,9 +271,9 @@ class Segments:
     def playing(self, rest):
         """A pipeline in which the elements `rest` take the filtered events."""
         filters = self._video.recipe.filters or "identity"
-        with Pipeline("appsrc name=segments format=time handle-segment-change=true ! identity"
+        with Pipeline("appsrc name=clips format=time handle-segment-change=true ! identity"
                       f" ! {filters} ! identity ! {EVENT_CAPS} ! {rest}") as pipeline:
-            source = pipeline.element("segments")
+            source = pipeline.element("clips")
             source.get_static_pad("src").add_probe(Gst.PadProbeType.BUFFER, _replace_by_gap)
             samples = self._samples()
 
