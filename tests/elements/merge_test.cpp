@@ -564,6 +564,23 @@ TEST(Merge, EndsASegmentOfAllRecordings) {
   EXPECT_EQ(end.get(), all.events.size());
 }
 
+/// Streams of one clock, the second of which starts 10 s later.
+TEST(Merge, LastsFromTheFirstStartToTheLastEnd) {
+  const TemporaryFile early(std::string("t,x,y,p\n0,1,1,1\n999000,2,1,1\n"));
+  const TemporaryFile late(std::string("t,x,y,p\n10000000,3,1,1\n10999000,4,1,1\n"));
+  const auto source = [](const TemporaryFile& file) {
+    return file.source() + "eventcsvdec width=8 height=4 ! ";
+  };
+  Player player("eventmerge name=m  " + source(early) + "m.sink_0  " + source(late) +
+                "m.sink_1  m.");
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED)) << player.error;
+  const auto duration = player.duration();
+  ASSERT_TRUE(player.play()) << player.error;
+  EXPECT_EQ(player.events.size(), 4U);
+  EXPECT_EQ(duration / ms, 10'999U);
+  EXPECT_EQ(player.position() / ms, 10'999U);
+}
+
 /// Streams reach it at different times.
 TEST(Merge, RefusesASeekThatDoesNotFlush) {
   const Recordings recordings;

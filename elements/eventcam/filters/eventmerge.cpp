@@ -477,16 +477,28 @@ static void release_pad(GstElement* element, GstPad* pad) {
   PARENT_ELEMENT_CLASS->release_pad(element, pad);
 }
 
-/// Duration of the longest stream.
+/// Timestamp that a stream has at a stream time; negative if that is before timestamp 0.
+static GstClockTimeDiff timestamp_at(GstAggregatorPad* pad, gint64 stream_time) {
+  const GstSegment segment = segment_of(pad);
+  guint64 distance = 0;
+  const gint sign = gst_segment_position_from_stream_time_full(
+      &segment, GST_FORMAT_TIME, static_cast<guint64>(stream_time), &distance);
+  return sign * static_cast<GstClockTimeDiff>(distance);
+}
+
+/// Duration from the start of the earliest stream to the end of the latest one.
 static gboolean answer_duration(GstElement* element, GstQuery* query) {
-  gint64 max_duration = -1;
+  GstClockTimeDiff start = G_MAXINT64;
+  std::optional<GstClockTimeDiff> end;
   for (const auto& pad : numbered_pads(element)) {
+    start = std::min(start, timestamp_at(pad.get(), 0));
     gint64 duration = -1;
-    if (gst_pad_peer_query_duration(GST_PAD(pad.get()), GST_FORMAT_TIME, &duration))
-      max_duration = std::max(max_duration, duration);
+    if (gst_pad_peer_query_duration(GST_PAD(pad.get()), GST_FORMAT_TIME, &duration) &&
+        duration >= 0)
+      end = std::max(end.value_or(G_MININT64), timestamp_at(pad.get(), duration));
   }
-  if (max_duration < 0) return FALSE;
-  gst_query_set_duration(query, GST_FORMAT_TIME, max_duration);
+  if (!end) return FALSE;
+  gst_query_set_duration(query, GST_FORMAT_TIME, *end - start);
   return TRUE;
 }
 
