@@ -11,6 +11,27 @@ namespace {
 using namespace harness;
 using namespace aedat_recordings;
 
+/// Waits for the end of the file, and returns what was not pulled before.
+Content rest_of_file(GstHarness* h) {
+  EXPECT_TRUE(next_event(h, GST_EVENT_EOS));
+  Bytes bytes;
+  while (const Buffer buffer{gst_harness_try_pull(h)}) {
+    const auto piece = bytes_of(buffer.get());
+    bytes.insert(bytes.end(), piece.begin(), piece.end());
+  }
+  return Content(bytes);
+}
+
+/// Pushes a segment in which this timestamp has this running time.
+void push_segment(GstHarness* h, GstClockTime pts, GstClockTime running_time, double rate = 1) {
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = pts;
+  segment.base = running_time;
+  segment.rate = rate;
+  EXPECT_TRUE(gst_harness_push_event(h, gst_event_new_segment(&segment)));
+}
+
 /// The muxer with one sink pad.
 struct Mux : Harness {
   Mux(const char* pad, const char* caps) : Harness("aedatmux", pad, "src") {
@@ -27,16 +48,7 @@ struct Mux : Harness {
   /// Ends the file, and returns what is not pulled yet.
   Content end() {
     EXPECT_TRUE(gst_harness_push_event(get(), gst_event_new_eos()));
-    bool ended = false;
-    while (const Owned<GstEvent> event{ended ? nullptr : gst_harness_pull_event(get())})
-      ended = GST_EVENT_TYPE(event.get()) == GST_EVENT_EOS;
-    EXPECT_TRUE(ended);
-    Bytes bytes;
-    while (const auto buffer = pull()) {
-      const auto piece = bytes_of(buffer.get());
-      bytes.insert(bytes.end(), piece.begin(), piece.end());
-    }
-    return Content(bytes);
+    return rest_of_file(get());
   }
 };
 
@@ -49,6 +61,68 @@ TEST(AedatMux, WritesTheTimesOfTheStream) {
                                     AbsoluteEvent::at(3, 4, 5'000'007, Polarity::on),
                                     AbsoluteEvent::at(345, 259, 5'019'999, Polarity::off)}));
   EXPECT_FALSE(content.has_table) << "nothing could seek to where the header tells of it";
+}
+
+TEST(AedatMux, WritesTheTimesOfTheStreamAtEachRate) {
+  Mux mux;
+  push_segment(mux.get(), GST_SECOND, 0, 2);
+  Events expected;
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_EQ(mux.push(GST_SECOND + static_cast<GstClockTime>(i) * 10 * GST_MSECOND,
+                       {{0, 1, 2}, {9'999, 3, 4}}),
+              GST_FLOW_OK);
+    expected.push_back(AbsoluteEvent::at(1, 2, 1'000'000 + i * 10'000, Polarity::off));
+    expected.push_back(AbsoluteEvent::at(3, 4, 1'009'999 + i * 10'000, Polarity::off));
+  }
+  EXPECT_EQ(mux.end().events, expected);
+}
+
+/// As when the clock of a camera is corrected: first the running time is late, then early.
+TEST(AedatMux, WritesTheTimesOfTheStreamInEachSegment) {
+  Mux mux;
+  EXPECT_EQ(mux.push(0, {{0, 1, 2}, {9'999, 3, 4}}), GST_FLOW_OK);
+  push_segment(mux.get(), 10 * GST_MSECOND, 12 * GST_MSECOND);
+  EXPECT_EQ(mux.push(10 * GST_MSECOND, {{0, 1, 2}, {9'999, 3, 4}}), GST_FLOW_OK);
+  push_segment(mux.get(), 20 * GST_MSECOND, 18 * GST_MSECOND);
+  EXPECT_EQ(mux.push(20 * GST_MSECOND, {{0, 1, 2}, {9'999, 3, 4}}), GST_FLOW_OK);
+  Events expected;
+  for (int start = 0; start < 30'000; start += 10'000) {
+    expected.push_back(AbsoluteEvent::at(1, 2, start, Polarity::off));
+    expected.push_back(AbsoluteEvent::at(3, 4, start + 9'999, Polarity::off));
+  }
+  EXPECT_EQ(mux.end().events, expected);
+}
+
+TEST(AedatMux, WritesFramesWithTheEventsOfTheirRunningTime) {
+  TwoInputs mux("aedatmux", "events_0", "video_0");
+  auto* const events = mux.first.get();
+  auto* const video = mux.second.get();
+  gst_harness_set_src_caps_str(
+      events, "application/x-event-camera, format=XYTP, width=8, height=4, framerate=0/1");
+  gst_harness_set_src_caps_str(video,
+                               "video/x-raw, format=GRAY8, width=4, height=4, framerate=0/1");
+  push_segment(events, 5 * GST_SECOND, 0, 2);
+  push_segment(video, GST_SECOND, 0);
+  const auto push_frame = [&](GstClockTime pts) {
+    GstBuffer* const frame = gst_buffer_new_allocate(nullptr, 16, nullptr);
+    gst_buffer_memset(frame, 0, 0, 16);
+    GST_BUFFER_PTS(frame) = pts;
+    EXPECT_EQ(gst_harness_push(video, frame), GST_FLOW_OK);
+  };
+  const auto push_events = [&](GstClockTime pts) {
+    EXPECT_EQ(gst_harness_push(events, buffer_of(pts, {{0, 1, 2}}, 10 * GST_MSECOND)), GST_FLOW_OK);
+  };
+  push_events(5 * GST_SECOND);
+  push_frame(GST_SECOND + 4 * GST_MSECOND);
+  push_segment(events, 5 * GST_SECOND + 10 * GST_MSECOND, 5 * GST_MSECOND);
+  push_events(5 * GST_SECOND + 10 * GST_MSECOND);
+  push_frame(GST_SECOND + 7 * GST_MSECOND);
+  for (auto* h : {events, video}) gst_harness_push_event(h, gst_event_new_eos());
+  const auto content = rest_of_file(events);
+  ASSERT_EQ(content.pictures.size(), 2U);
+  EXPECT_EQ(content.pictures[0].times[0], 5'008'000);
+  EXPECT_EQ(content.pictures[1].times[0], 5'012'000);
+  EXPECT_EQ(content.events.size(), 2U);
 }
 
 TEST(AedatMux, RefusesToRunBackwards) {
@@ -100,10 +174,7 @@ TEST(AedatMux, WritesAnewAfterAFlush) {
   flush({mux.get()});
   while (mux.pull()) continue;
   // The running time of the continued stream is 0 again.
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  segment.start = segment.time = 500 * GST_MSECOND;
-  EXPECT_TRUE(gst_harness_push_event(mux.get(), gst_event_new_segment(&segment)));
+  push_segment(mux.get(), 500 * GST_MSECOND, 0);
   EXPECT_EQ(mux.push(600 * GST_MSECOND, {{0, 3, 4}, {7, 5, 6}}), GST_FLOW_OK);
   EXPECT_EQ(mux.end().events, (Events{AbsoluteEvent::at(3, 4, 600'000, Polarity::off),
                                       AbsoluteEvent::at(5, 6, 600'007, Polarity::off)}));

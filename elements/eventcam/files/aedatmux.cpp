@@ -86,8 +86,8 @@ struct State {
   std::optional<GstVideoInfo> video;
   std::string source;                      ///< name of the camera
   std::unique_ptr<Aedat4Encoder> encoder;  ///< null until the header is written
-  gint64 shift = 0;                        ///< offset from running time to file time, nanoseconds
-  Microseconds flushed = 0;                ///< file time of the last flushed packet
+  std::optional<GstSegment> segment;       ///< of the events written last
+  Microseconds flushed = 0;                ///< time of the last flushed packet
   /// Set once they are announced, so that the header has a stream for them; then those waiting for
   /// the next buffer.
   std::optional<std::vector<Trigger>> triggers;
@@ -160,13 +160,20 @@ static Kind kind_of(GstAggregatorPad* pad) {
   return kind_of(caps.get());
 }
 
-/// Running time of a buffer; GST_CLOCK_TIME_NONE if it has none.
-static GstClockTime running_time(GstAggregatorPad* pad, GstBuffer* buffer) {
+/// Segment of a pad, if it is one of times.
+static std::optional<GstSegment> segment_of(GstAggregatorPad* pad) {
   GST_OBJECT_LOCK(pad);
   const GstSegment segment = pad->segment;
   GST_OBJECT_UNLOCK(pad);
-  if (segment.format != GST_FORMAT_TIME) return GST_CLOCK_TIME_NONE;
-  return gst_segment_to_running_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
+  if (segment.format != GST_FORMAT_TIME) return std::nullopt;
+  return segment;
+}
+
+/// Running time of a buffer; GST_CLOCK_TIME_NONE if it has none.
+static GstClockTime running_time(GstAggregatorPad* pad, GstBuffer* buffer) {
+  const auto segment = segment_of(pad);
+  if (!segment) return GST_CLOCK_TIME_NONE;
+  return gst_segment_to_running_time(&*segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
 }
 
 /// True if a buffer stands for a gap.
@@ -233,20 +240,6 @@ static void send_segment(GstAedatMux* self, guint64 position) {
   gst_aggregator_update_segment(GST_AGGREGATOR(self), &segment);
 }
 
-/// Offset from running time to the PTS of the event stream, or of the video if there is no event
-/// stream.
-static gint64 shift_of(GstAedatMux* self) {
-  Pad pad;
-  for (Pad& other : sink_pads(self))
-    if (!pad || kind_of(other.get()) == Kind::events) pad = std::move(other);
-  if (!pad) return 0;
-  GST_OBJECT_LOCK(pad.get());
-  const GstSegment segment = pad->segment;
-  GST_OBJECT_UNLOCK(pad.get());
-  if (segment.format != GST_FORMAT_TIME) return 0;
-  return static_cast<gint64>(segment.start + segment.offset - segment.base);
-}
-
 /// Writes the header. May throw.
 static GstFlowReturn begin_file(GstAedatMux* self) {
   State& state = self->priv->state;
@@ -262,14 +255,11 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
   settings.triggers = state.triggers.has_value();
   settings.imu_samples = state.imu_samples.has_value();
   self->priv->writable.begin_file(state.size);
-  state.shift = shift_of(self);
-  GST_DEBUG_OBJECT(
-      self,
-      "beginning a file of %dx%d pixels%s%s%s, %s a table of packets; running time 0 is "
-      "%" GST_STIME_FORMAT " in the file",
-      settings.size.width, settings.size.height, settings.frames ? ", frames" : "",
-      settings.triggers ? ", triggers" : "", settings.imu_samples ? ", IMU samples" : "",
-      settings.table ? "with" : "without", GST_STIME_ARGS(state.shift));
+  GST_DEBUG_OBJECT(self, "beginning a file of %dx%d pixels%s%s%s, %s a table of packets",
+                   settings.size.width, settings.size.height, settings.frames ? ", frames" : "",
+                   settings.triggers ? ", triggers" : "",
+                   settings.imu_samples ? ", IMU samples" : "",
+                   settings.table ? "with" : "without");
   state.encoder = std::make_unique<Aedat4Encoder>(settings);
   Bytes header;
   state.encoder->flush(header);
@@ -313,30 +303,43 @@ static GstFlowReturn end_file(GstAedatMux* self) {
   return push_bytes(self, std::move(patch->bytes));
 }
 
-/// Converts running time to file time, in microseconds.
-static Microseconds file_time(const State& state, GstClockTime running) {
-  return std::max<gint64>(static_cast<gint64>(running) + state.shift, 0) / 1000;
-}
-
-/// Encodes the events of a buffer that starts at `start`. May throw.
-static void write_events(GstAedatMux* self, GstBuffer* buffer, Microseconds start, Bytes& out) {
-  State& state = self->priv->state;
+/// Encodes the events of a buffer. May throw.
+static void write_events(GstAedatMux* self, GstBuffer* buffer, Bytes& out) {
   const MappedEvents mapped(buffer);
   if (!mapped) {
-    warn(
-        self, "a buffer with a partial event",
-        std::to_string(gst_buffer_get_size(buffer)) + " bytes at " + std::to_string(start) + " us");
+    warn(self, "a buffer with a partial event",
+         std::to_string(gst_buffer_get_size(buffer)) + " bytes");
     return;
   }
-  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" G_GINT64_FORMAT " us of the file",
-                 mapped.events().size(), gint64{start});
-  state.encoder->encode(self->priv->writable.pick(mapped.events(), start), out);
+  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, mapped.events().size(),
+                 GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
+  self->priv->state.encoder->encode(self->priv->writable.pick(mapped.events(), mapped.start()),
+                                    out);
+}
+
+/// Segment of the events before the next frame, or of those that come first; none without events.
+static std::optional<GstSegment> segment_of_events(GstAedatMux* self) {
+  if (const auto& segment = self->priv->state.segment) return segment;
+  for (const Pad& pad : sink_pads(self))
+    if (kind_of(pad.get()) == Kind::events) return segment_of(pad.get());
+  return std::nullopt;
+}
+
+/// Time of a frame in the file: the PTS that events have at its running time, or its own if there
+/// are none.
+static Microseconds frame_time(GstAedatMux* self, GstBuffer* frame, GstClockTime running) {
+  GstClockTime time = GST_BUFFER_PTS(frame);
+  const auto segment = segment_of_events(self);
+  if (segment &&
+      gst_segment_position_from_running_time_full(&*segment, GST_FORMAT_TIME, running, &time) < 0)
+    time = 0;  // timestamps are not negative
+  return static_cast<Microseconds>(time / GST_USECOND);
 }
 
 /// Encodes a frame. May throw.
 static void write_frame(GstAedatMux* self, GstBuffer* buffer, Microseconds t, Bytes& out) {
   State& state = self->priv->state;
-  GST_LOG_OBJECT(self, "frame at %" G_GINT64_FORMAT " us of the file", gint64{t});
+  GST_LOG_OBJECT(self, "frame at %" G_GINT64_FORMAT " us", gint64{t});
   const auto reject = [&](const char* cause) {
     warn(self, "a frame that does not fit into the file",
          std::string(cause) + ", at " + std::to_string(t) + " us");
@@ -368,10 +371,14 @@ static GstFlowReturn write_next(GstAedatMux* self) {
     return GST_FLOW_OK;
   }
   Bytes out = waiting_items(self);
-  const Microseconds t = file_time(state, running);
+  const bool of_events = kind_of(pad.get()) == Kind::events;
+  const Microseconds t = of_events
+                             ? static_cast<Microseconds>(GST_BUFFER_PTS(buffer.get()) / GST_USECOND)
+                             : frame_time(self, buffer.get(), running);
+  if (of_events) state.segment = segment_of(pad.get());
   const bool silent = is_silent(buffer.get());
-  if (!silent && kind_of(pad.get()) == Kind::events)
-    write_events(self, buffer.get(), t, out);
+  if (!silent && of_events)
+    write_events(self, buffer.get(), out);
   else if (!silent)
     write_frame(self, buffer.get(), t, out);
   if (t - state.flushed >= max_wait) {
@@ -469,13 +476,9 @@ static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* c
 
 /// Adds triggers or IMU samples to the waiting ones. False if the event has other contents.
 template <class Sample>
-static bool take_waiting(GstAedatMux* self, std::optional<std::vector<Sample>>&& samples,
+static bool take_waiting(std::optional<std::vector<Sample>>&& samples,
                          std::optional<std::vector<Sample>>& waiting) {
   if (!samples) return false;
-  // Their times are stream times, whose offset to file times may have changed.
-  const State& state = self->priv->state;
-  const gint64 moved = state.encoder ? (state.shift - shift_of(self)) / 1000 : 0;
-  for (auto& sample : *samples) sample.t += moved;
   if (!waiting) waiting.emplace();
   waiting->insert(waiting->end(), samples->begin(), samples->end());
   return true;
@@ -494,8 +497,8 @@ static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, Gst
       gst_event_unref(event);
       return FALSE;
     }
-  } else if (take_waiting(self, triggers_of(event), state.triggers) ||
-             take_waiting(self, imu_samples_of(event), state.imu_samples)) {
+  } else if (take_waiting(triggers_of(event), state.triggers) ||
+             take_waiting(imu_samples_of(event), state.imu_samples)) {
     gst_event_unref(event);
     return TRUE;
   } else if (GST_EVENT_TYPE(event) == GST_EVENT_TAG) {
@@ -567,6 +570,7 @@ static GstFlowReturn flush(GstAggregator* aggregator) {
   state.encoder.reset();
   state.triggers.reset();
   state.imu_samples.reset();
+  state.segment.reset();
   state.flushed = 0;
   state.warn.reset();
   return GST_FLOW_OK;
