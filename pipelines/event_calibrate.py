@@ -38,16 +38,18 @@ USUAL_SLOPE = -1.5
 # Parts of the calibrated time for cross-validation.
 PARTS = 4
 # Values tried for eventsim-dvs: the response to the frames, with the offset of a logarithmic one as a share of white;
-# and stages of the pixel, whose first value turns them off.
+# and stages of the pixel.
 RESPONSE = {
     "log-eps": [0.001, 0.0018, 0.0025, 0.0035, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04, 0.057, 0.08, 0.11, 0.16,
                 0.22, 0.32],
+    "overexposed-light": [1, 1.25, 1.5, 2, 3, 4, 6],
     "response": ["linear", "log", "lin-log"],
     "linear-light": ["false", "true"],
     "exposure-compensation": ["false", "true"],
 }
 # Compensation of an exposure that does not change makes no difference, and the exposure may change later.
-FIRST_RESPONSE = {"log-eps": 0.02, "response": "log", "linear-light": "false", "exposure-compensation": "true"}
+FIRST_RESPONSE = {"log-eps": 0.02, "overexposed-light": 1, "response": "log", "linear-light": "false",
+                  "exposure-compensation": "true"}
 UPSAMPLING = ["linear", "motion"]
 STAGES = {
     "denoise": [0, 2, 4, 8, 12],
@@ -59,7 +61,8 @@ RELATIVE_STAGES = {
     "threshold-jitter": [0, 0.1, 0.2, 0.3, 0.4],
     "exposure-pulse": [0, 0.04, 0.08, 0.12, 0.16, 0.24],
 }
-# A stage of the pixel that gains less is turned off.
+# Those whose first value turns them off, as it does if they gain less.
+OPTIONAL = {"overexposed-light", *STAGES, *RELATIVE_STAGES}
 MIN_GAIN = 0.002
 # Numbers of events differ from the recording's by no more than this factor if their deviation is off.
 MAX_BALANCE = 1.1
@@ -220,8 +223,8 @@ class Choices:
         chosen = dict(chosen)
         if chosen.get("response", "log") != "log":
             chosen.pop("log-eps", None)
-        for name in ("linear-light", "exposure-compensation"):
-            if chosen.get(name) == "false":
+        for name, default in (("overexposed-light", 1), ("linear-light", "false"), ("exposure-compensation", "false")):
+            if chosen.get(name) == default:
                 del chosen[name]
         if chosen.get("refractory-period") == 0:
             del chosen["refractory-period"]
@@ -276,6 +279,8 @@ class Choices:
         axes = {name: values for name, values in RESPONSE.items() if self.is_free(name)}
         if "response" not in axes and "response=log" not in self.element.split():
             axes.pop("log-eps", None)
+        if not any(self.video.overexposed(frame).any() for frame in self.video.frames):
+            axes.pop("overexposed-light", None)
         start = {"upsampling": "motion"} if self.is_free("upsampling") else {}
         start |= {name: FIRST_RESPONSE[name] for name in axes}
         starts = [start | {"linear-light": light} for light in axes.get("linear-light", [])] or [start]
@@ -300,10 +305,10 @@ class Choices:
                         chosen, improved = other, True
         return chosen
 
-    def pruned(self, chosen, stages):
-        """Without the stages that gain nothing."""
-        for name, values in stages.items():
-            without = chosen | {name: values[0]}
+    def pruned(self, chosen, axes):
+        """Without those of OPTIONAL that gain nothing."""
+        for name in filter(OPTIONAL.__contains__, axes):
+            without = chosen | {name: axes[name][0]}
             if self.rating(without) > self.rating(chosen) - MIN_GAIN:
                 chosen = without
         return chosen
@@ -342,7 +347,7 @@ def calibrate(video, recorded, span, element, progress):
     # From a pixel without these stages and from one with all of them, since they depend on each other.
     starts = [chosen | {name: values[i] for name, values in stages.items()} for i in (0, 2)]
     climbed = (choices.climb(start, axes | stages, choices.rating) for start in starts)
-    best = choices.pruned(max(climbed, key=choices.rating), stages)
+    best = choices.pruned(max(climbed, key=choices.rating), axes | stages)
     if best.get("exposure-pulse") == 0:
         best.pop("exposure-lead", None)
     return choices.balanced(best)

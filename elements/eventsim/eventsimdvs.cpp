@@ -174,6 +174,10 @@ const Setting table[] = {
      "Light that response=log adds before the logarithm, which limits the response to dark pixels "
      "(white is 1)",
      &DvsSettings::log_eps, 1e-6, 1},
+    {"overexposed-light", "Overexposed light",
+     "Light of pixels that are white in the frame, which does not show how bright they are (white "
+     "is 1). Light rises to it over the 20 of 255 grey levels below white",
+     &DvsSettings::overexposed_light, 1, 1000},
     {"upsampling", "Upsampling", "Model of light between two frames", &DvsSettings::upsampling, 0,
      0, fixed, upsampling_type},
     {"max-interpolated-frames", "Maximum interpolated frames",

@@ -40,8 +40,8 @@ bool has_rgb_words(const GstVideoInfo& video) {
 }
 
 template <class Pixel>
-LumaView view_of(const Image<Pixel>& luma, const LumaFormat& format) {
-  return {format, luma.view().data, luma.stride()};
+LumaView view_of(const Image<Pixel>& luma, const LumaFormat& format, bool is_narrow) {
+  return {format, luma.view().data, luma.stride(), is_narrow};
 }
 
 }  // namespace
@@ -67,6 +67,8 @@ FrameLuma::FrameLuma(const GstVideoInfo& video)
     : video_(video),
       layout_(layout_of(video)),
       format_(format_of(video)),
+      is_narrow_(!GST_VIDEO_INFO_IS_RGB(&video) &&
+                 video.colorimetry.range == GST_VIDEO_COLOR_RANGE_16_235),
       weights_(luma_weights_of(video)) {
   if (layout_ == Layout::plane) return;
   if (format_.bits == 8)
@@ -101,20 +103,20 @@ LumaView FrameLuma::of(const VideoFrame& frame, ThreadPool& threads) {
     case Layout::interleaved:
       eventcamera::gather_luma(reinterpret_cast<const guint8*>(frame.first_component()),
                                frame.stride(), GST_VIDEO_INFO_COMP_PSTRIDE(&video_, 0), bytes_);
-      return view_of(bytes_, format_);
+      return view_of(bytes_, format_, is_narrow_);
     case Layout::swapped:
       eventcamera::swap_luma(frame.first_component(), frame.stride(), words_);
-      return view_of(words_, format_);
+      return view_of(words_, format_, is_narrow_);
     case Layout::rgb_words:
       luma_of_rgb(rgb_words_of(frame), weights_, threads, bytes_);
-      return view_of(bytes_, format_);
+      return view_of(bytes_, format_, is_narrow_);
     case Layout::rgb:
       if (format_.bits == 8) {
         luma_of_rgb(rgb_of(frame), weights_, threads, bytes_);
-        return view_of(bytes_, format_);
+        return view_of(bytes_, format_, is_narrow_);
       }
       luma_of_rgb(rgb_of(frame), weights_, threads, words_);
-      return view_of(words_, format_);
+      return view_of(words_, format_, is_narrow_);
   }
-  return {format_, frame.first_component(), frame.stride()};
+  return {format_, frame.first_component(), frame.stride(), is_narrow_};
 }

@@ -34,6 +34,7 @@ class FrameLuma {
   GstVideoInfo video_;
   Layout layout_;
   eventcamera::LumaFormat format_;
+  bool is_narrow_;
   eventcamera::LumaWeights weights_;
   eventcamera::Image<guint8> bytes_;
   eventcamera::Image<guint16> words_;

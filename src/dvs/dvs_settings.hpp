@@ -38,7 +38,8 @@ struct DvsSettings {
   bool linear_light = false;           ///< undo the sRGB transfer function first
   bool exposure_compensation = false;  ///< divide out the gain of the frame camera's exposure
   Response response = Response::lin_log;
-  double log_eps = 1e-3;  ///< of Response::log; white is 1
+  double log_eps = 1e-3;         ///< of Response::log; white is 1
+  double overexposed_light = 1;  ///< of pixels that are white in the frame; white is 1
 
   Upsampling upsampling = Upsampling::linear;
   int max_interpolated_frames = 31;  ///< between two frames, for Upsampling::motion

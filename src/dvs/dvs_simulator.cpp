@@ -40,7 +40,8 @@ bool have_same_traits(const DvsSettings& a, const DvsSettings& b) {
 
 bool have_same_response(const DvsSettings& a, const DvsSettings& b) {
   return a.linear_light == b.linear_light && a.exposure_compensation == b.exposure_compensation &&
-         a.response == b.response && a.log_eps == b.log_eps;
+         a.response == b.response && a.log_eps == b.log_eps &&
+         a.overexposed_light == b.overexposed_light;
 }
 
 /// A state begins with this; the last one is the version of its format.
@@ -48,19 +49,20 @@ constexpr std::array<char, 8> state_magic{'D', 'V', 'S', 'S', 'T', 'A', 'T', '2'
 
 /// Hash of all settings, whose number the compiler checks.
 std::uint64_t hash_of(const DvsSettings& settings) {
-  const auto& [denoise, linear_light, exposure_compensation, response, log_eps, upsampling,
-               max_interpolated_frames, cutoff_frequency, dark_light, positive_threshold,
-               negative_threshold, threshold_sigma, threshold_jitter, leak_rate, leak_spread,
-               shot_noise_rate, hot_pixels, dead_pixels, adaptation, adaptation_time,
+  const auto& [denoise, linear_light, exposure_compensation, response, log_eps, overexposed_light,
+               upsampling, max_interpolated_frames, cutoff_frequency, dark_light,
+               positive_threshold, negative_threshold, threshold_sigma, threshold_jitter, leak_rate,
+               leak_spread, shot_noise_rate, hot_pixels, dead_pixels, adaptation, adaptation_time,
                refractory_period, refractory_reset, exposure_pulse, exposure_lead, pixel_latency,
                pixel_latency_jitter, max_rate, seed] = settings;
   StateWriter writer;
   const auto add = [&](const auto&... values) { (writer.value(values, is_anything), ...); };
-  add(denoise, linear_light, exposure_compensation, response, log_eps, upsampling,
-      max_interpolated_frames, cutoff_frequency, dark_light, positive_threshold, negative_threshold,
-      threshold_sigma, threshold_jitter, leak_rate, leak_spread, shot_noise_rate, hot_pixels,
-      dead_pixels, adaptation, adaptation_time, refractory_period, refractory_reset, exposure_pulse,
-      exposure_lead, pixel_latency, pixel_latency_jitter, max_rate, seed);
+  add(denoise, linear_light, exposure_compensation, response, log_eps, overexposed_light,
+      upsampling, max_interpolated_frames, cutoff_frequency, dark_light, positive_threshold,
+      negative_threshold, threshold_sigma, threshold_jitter, leak_rate, leak_spread,
+      shot_noise_rate, hot_pixels, dead_pixels, adaptation, adaptation_time, refractory_period,
+      refractory_reset, exposure_pulse, exposure_lead, pixel_latency, pixel_latency_jitter,
+      max_rate, seed);
   return checksum_of(writer.finish());
 }
 
@@ -110,7 +112,7 @@ class PixelSimulator final : public DvsSimulator {
     adopt(settings_, true);
     pass(reader);
     reader.finish();
-    responses_ = responses(current_, luma_bits(current_), gain_);
+    responses_ = responses_to_luma(current_);
     frame_flow_.forget();
   }
 
@@ -191,6 +193,10 @@ class PixelSimulator final : public DvsSimulator {
   void label(const LabelledEvents& events) override { separate_causes(events); }
 
   void keep(const LumaView& frame, Image<Pixel>& kept) {
+    if (frame.is_narrow != is_narrow_) {
+      is_narrow_ = frame.is_narrow;
+      if (!responses_.empty()) responses_ = responses_to_luma(current_);
+    }
     const int white = (1 << format().bits) - 1;
     const int limit = static_cast<int>(std::lround(settings_.denoise / 255 * white));
     if (limit > 0)
@@ -207,7 +213,7 @@ class PixelSimulator final : public DvsSimulator {
     if (gain == 1 || std::max(total, 1 / total) > max_total_gain) return;
     gain_ = total;
     tables_.clear();
-    responses_ = responses(current_, luma_bits(current_), gain_);
+    responses_ = responses_to_luma(current_);
     if (current_.upsampling == Upsampling::linear) return;
     expose(last_, format().bits, current_.linear_light, gain, threads());
     frame_flow_.forget();  // knows it as it was
@@ -424,6 +430,10 @@ class PixelSimulator final : public DvsSimulator {
     return is_widened ? 16 : format().bits;
   }
 
+  std::vector<float> responses_to_luma(const DvsSettings& settings) const {
+    return responses(settings, luma_bits(settings), is_narrow_, gain_);
+  }
+
   /// Factor from the luma of frames to that.
   int widening(const DvsSettings& settings) const {
     return luma_bits(settings) == format().bits ? 1 : 257;
@@ -437,7 +447,7 @@ class PixelSimulator final : public DvsSimulator {
       exposure_gain_.reset();
     }
     if (starts_over || settings.upsampling != current_.upsampling)
-      responses_ = responses(settings, luma_bits(settings), gain_);
+      responses_ = responses_to_luma(settings);
     tables_.clear();
     random_ = Random(settings.seed);
     // Thresholds that events have drawn stay until time or the jitter ends.
@@ -505,6 +515,7 @@ class PixelSimulator final : public DvsSimulator {
   Random random_{0};
   std::optional<ExposureGain> exposure_gain_;
   double gain_ = 1;               ///< of the exposure since the first frame
+  bool is_narrow_ = false;        ///< range of luma
   std::vector<float> responses_;  ///< by luma value
   ExposurePulse pulse_;
   std::vector<PulseEdge> edges_;  ///< of pulses within the current interval

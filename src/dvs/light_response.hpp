@@ -26,6 +26,14 @@ inline double luma_of(double light, bool linear_light) {
   return light <= 0.04045 / 12.92 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
 }
 
+/// Factor of the light of bright luma, which is `overexposed_light` at white and falls to 1 over 20
+/// of 255 grey levels below.
+inline double overexposure_of(double luma, bool is_narrow, double overexposed_light) {
+  constexpr double width = 20.0 / 255;
+  const double white = is_narrow ? 235.0 / 255 : 1;
+  return 1 + (overexposed_light - 1) * std::clamp((luma - white) / width + 1, 0.0, 1.0);
+}
+
 /// Response of the photoreceptor to light, white is 1.
 inline double response_of(double light, Response response, double log_eps) {
   constexpr double linear_up_to = 20;  // 8-bit grey levels, as in v2e
@@ -37,12 +45,15 @@ inline double response_of(double light, Response response, double log_eps) {
 
 /// Responses to all luma values of a bit depth, 8 to 16, in a frame with `gain` times the exposure
 /// of the first one.
-inline std::vector<float> responses(const DvsSettings& settings, int bits, double gain) {
+inline std::vector<float> responses(const DvsSettings& settings, int bits, bool is_narrow,
+                                    double gain) {
   std::vector<float> values(std::size_t{1} << bits);
-  const auto white = static_cast<double>(values.size() - 1);
-  for (std::size_t luma = 0; luma < values.size(); ++luma) {
-    const double light = light_of(static_cast<double>(luma) / white, settings.linear_light) / gain;
-    values[luma] = static_cast<float>(response_of(light, settings.response, settings.log_eps));
+  const auto max_luma = static_cast<double>(values.size() - 1);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double luma = static_cast<double>(i) / max_luma;
+    const double light = light_of(luma, settings.linear_light) *
+                         overexposure_of(luma, is_narrow, settings.overexposed_light) / gain;
+    values[i] = static_cast<float>(response_of(light, settings.response, settings.log_eps));
   }
   return values;
 }

@@ -534,6 +534,30 @@ TEST(Dvs, GivesRampsTheirExactTimes) {
   }
 }
 
+TEST(Dvs, TakesOverexposedPixelsForBrighter) {
+  const DvsSettings settings{.response = Response::log,
+                             .log_eps = 1e-6,
+                             .overexposed_light = 8,
+                             .positive_threshold = 0.1};
+  for (const bool is_narrow : {false, true}) {
+    const int white = is_narrow ? 235 : 255;
+    for (const int below : {0, 5, 20, 60}) {
+      const int luma = white - below;
+      const double light = luma / 100.0 * (below < 20 ? 8 - 7 * below / 20.0 : 1);
+      auto simulator = make_dvs_simulator({3, 2, 8});
+      simulator->set(settings);
+      const auto push = [&](int grey, Nanoseconds time) {
+        const auto frame = scene::flat<std::uint8_t>(3, 2, static_cast<std::uint8_t>(grey));
+        return simulator->push({{3, 2, 8}, frame.row(0), frame.stride(), is_narrow}, time, {});
+      };
+      push(100, 0);
+      const auto* events = push(luma, 40'000'000);
+      EXPECT_EQ(events->size(), 6 * static_cast<std::size_t>(std::log(light) / 0.1))
+          << luma << " of " << white;
+    }
+  }
+}
+
 /// All events of a short video whose rows have `padding` bytes past their end.
 template <class Pixel>
 std::vector<std::vector<Event>> film(int width, int height, int bits, const DvsSettings& settings,
@@ -838,6 +862,7 @@ INSTANTIATE_TEST_SUITE_P(
     , AlongMotion,
     testing::Values(DvsSettings{}, DvsSettings{.response = Response::log, .log_eps = 0.05},
                     DvsSettings{.response = Response::linear, .leak_rate = 7, .adaptation = 0.3},
+                    DvsSettings{.overexposed_light = 3},
                     DvsSettings{.cutoff_frequency = 100, .leak_rate = 9},
                     DvsSettings{.positive_threshold = 0.5,
                                 .negative_threshold = 0.7,

@@ -76,6 +76,7 @@ inline void stand(Playback& playback, const Image<std::uint8_t>& picture, int fr
 inline DvsSettings everything() {
   return {.denoise = 4,
           .response = Response::log,
+          .overexposed_light = 2,
           .cutoff_frequency = 60,
           .threshold_sigma = 0.03,
           .threshold_jitter = 0.02,

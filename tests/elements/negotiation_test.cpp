@@ -140,6 +140,20 @@ TEST_P(EveryRgbFormat, HasEachColourWeighed) {
   }
 }
 
+TEST(Negotiation, TakesTheRangeOfLumaFromTheColorimetry) {
+  // The first number of a colorimetry is 1 if white is 255, and 2 if it is 235.
+  for (const auto& [colorimetry, light] : {std::pair("1:4:7:1", 1), std::pair("2:4:7:1", 4)}) {
+    Harness h("eventsim-dvs response=log log-eps=1e-6 overexposed-light=4 positive-threshold=0.1");
+    h.caps("video/x-raw, framerate=25/1, width=7, height=5, format=GRAY8, colorimetry=" +
+           std::string(colorimetry));
+    h.push(h.flat(0, 60));
+    h.push(h.flat(40 * GST_MSECOND, 235));
+    EXPECT_EQ(events_of(h.pull().get()).size(),
+              35 * static_cast<std::size_t>(std::log(light * 235.0 / 60) / 0.1))
+        << colorimetry;
+  }
+}
+
 TEST(Negotiation, TakesTheWeightsOfColoursFromTheColorimetry) {
   // range 0-255, RGB, sRGB; the last number is that of the primaries
   const std::pair<const char*, double> red_by_primaries[] = {

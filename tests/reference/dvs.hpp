@@ -223,7 +223,7 @@ class DvsPixel {
         random_(settings.seed),
         traits_(Mismatch(settings, random_).of(number)),
         leak_cause_(Mismatch(settings, random_).is_hot(number) ? Cause::hot_pixel : Cause::leak),
-        input_(response(light(luma))),
+        input_(response(true_light(luma))),
         signal_(input_),
         reference_(
             input_ -
@@ -236,7 +236,7 @@ class DvsPixel {
     std::vector<TimedEvent> events;
     std::uint64_t draw = interval_++ << 16;
     const double last = input_;
-    double next = response(light(luma) / gain);
+    double next = response(true_light(luma) / gain);
     if (gain != 1 && 255 * luma >= 235) next = std::max(next, last);
     const double dark = settings_.dark_light;
     const double shade = std::min(std::floor(luma * 65535 / 256), 255.0) / 255;
@@ -312,6 +312,12 @@ class DvsPixel {
   double light(double luma) const {
     if (!settings_.linear_light) return luma;
     return luma <= 0.04045 ? luma / 12.92 : std::pow((luma + 0.055) / 1.055, 2.4);
+  }
+
+  /// Light of a pixel that may be overexposed.
+  double true_light(double luma) const {
+    const double over = std::clamp((255 * luma - 235) / 20, 0.0, 1.0);
+    return light(luma) * (1 + over * (settings_.overexposed_light - 1));
   }
 
   double response(double light) const {
