@@ -18,7 +18,8 @@ class Events(np.ndarray):
     width, height: of the sensor, in pixels; 0 if not known.
     start, end: of the time that the events are from, in seconds. A slice keeps those of the whole.
     cause, object_class: labels of the events, uint8 and uint16 of the same shape, where an element has
-    labelled them (GstEventCameraLabel); else None.
+    labelled them (GstEventCameraLabel); else None. They follow an index, a slice, copy() and sort();
+    functions of NumPy that move rows by themselves, such as np.random.shuffle(), leave them behind.
     """
 
     width: int
