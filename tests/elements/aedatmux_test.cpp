@@ -180,6 +180,43 @@ TEST(AedatMux, WritesAnewAfterAFlush) {
                                       AbsoluteEvent::at(5, 6, 600'007, Polarity::off)}));
 }
 
+TEST(AedatMux, EndsASegmentOnceBothInputsHave) {
+  const TwoInputs mux("aedatmux", "events_0", "video_0");
+  auto* const events = mux.first.get();
+  auto* const video = mux.second.get();
+  gst_harness_set_src_caps_str(
+      events, "application/x-event-camera, format=XYTP, width=346, height=260, framerate=0/1");
+  gst_harness_set_src_caps_str(video,
+                               "video/x-raw, format=GRAY8, width=4, height=4, framerate=0/1");
+  for (const GstClockTime base : {0 * GST_SECOND, 1 * GST_SECOND}) {
+    for (auto* h : {events, video}) push_segment(h, base, base);
+    gst_harness_push(events, buffer_of(base, {{7, 1, 2}}, 10 * GST_MSECOND));
+    end_segment(events);
+    GstBuffer* const frame = gst_buffer_new_memdup("0123456789abcdef", 16);
+    GST_BUFFER_PTS(frame) = base + 20 * GST_MSECOND;
+    gst_harness_push(video, frame);
+    end_segment(video);
+    ASSERT_TRUE(next_event(events, GST_EVENT_SEGMENT_DONE));
+  }
+  for (auto* h : {events, video}) gst_harness_push_event(h, gst_event_new_eos());
+  auto last = GST_EVENT_SEGMENT;
+  while (last != GST_EVENT_EOS) {
+    const Owned<GstEvent> event{gst_harness_pull_event(events)};
+    ASSERT_TRUE(event);
+    last = GST_EVENT_TYPE(event.get());
+    EXPECT_NE(last, GST_EVENT_SEGMENT_DONE);
+  }
+  Bytes bytes;
+  while (const Buffer buffer{gst_harness_try_pull(events)}) {
+    const auto piece = bytes_of(buffer.get());
+    bytes.insert(bytes.end(), piece.begin(), piece.end());
+  }
+  const Content content(bytes);
+  EXPECT_EQ(content.events, (Events{AbsoluteEvent::at(1, 2, 7, Polarity::off),
+                                    AbsoluteEvent::at(1, 2, 1'000'007, Polarity::off)}));
+  EXPECT_EQ(content.pictures.size(), 2U);
+}
+
 TEST(AedatMux, EndsInAnErrorOnAFullDisk) {
   Pipeline pipeline(
       "videotestsrc pattern=snow num-buffers=20 ! video/x-raw,format=GRAY8,width=64,height=48 ! "

@@ -39,6 +39,7 @@
 #include <utility>
 #include <vector>
 
+#include "gst/aggregator/segment_end.hpp"
 #include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
@@ -196,7 +197,7 @@ static GstClockTime due_time(GstAggregatorPad* pad, GstBuffer* buffer) {
 static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
   Pad earliest;
   for (Pad& pad : sink_pads(self)) {
-    const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(pad.get()));
+    const auto buffer = next_buffer(pad.get());
     if (!buffer) continue;
     const GstClockTime from = due_time(pad.get(), buffer.get());
     if (earliest && from > *time) continue;
@@ -389,7 +390,7 @@ static GstFlowReturn write_next(GstAedatMux* self) {
 }
 
 static bool is_at_end(const Pad& pad) {
-  return gst_aggregator_pad_is_eos(pad.get());
+  return has_ended(pad.get());
 }
 
 /// True if enough is known to write the header: the caps, and the announcements before the first
@@ -398,15 +399,28 @@ static bool is_known(GstAedatMux* self) {
   const State& state = self->priv->state;
   if (state.size != SensorSize{})
     return std::ranges::all_of(sink_pads(self), [](const Pad& pad) {
-      return kind_of(pad.get()) != Kind::events || is_at_end(pad) ||
-             OwnedBuffer(gst_aggregator_pad_peek_buffer(pad.get()));
+      return kind_of(pad.get()) != Kind::events || is_at_end(pad) || next_buffer(pad.get());
     });
   return state.video && std::ranges::all_of(sink_pads(self), [](const Pad& pad) {
            return kind_of(pad.get()) == Kind::video || is_at_end(pad);
          });
 }
 
-/// Writes the header, the earliest buffer, or the end of the file. May throw.
+/// Forgets the ends of segments that all inputs have reached, and returns one of them. Null if all
+/// have reached EOS.
+static OwnedEvent take_segment_ends(GstAedatMux* self) {
+  OwnedEvent done;
+  for (const Pad& pad : sink_pads(self)) {
+    auto end = segment_end_of(pad.get());
+    if (!end) continue;
+    done = std::move(end);
+    forget_segment_end(pad.get());
+    gst_aggregator_pad_drop_buffer(pad.get());
+  }
+  return done;
+}
+
+/// Writes the header, the earliest buffer, the end of a segment, or that of the file. May throw.
 static GstFlowReturn write_some(GstAedatMux* self) {
   auto& encoder = self->priv->state.encoder;
   const bool ended = std::ranges::all_of(sink_pads(self), is_at_end);
@@ -422,6 +436,13 @@ static GstFlowReturn write_some(GstAedatMux* self) {
     if (result != GST_FLOW_OK) return result;
   }
   if (!ended) return write_next(self);
+  if (OwnedEvent done = take_segment_ends(self)) {
+    Bytes out = waiting_items(self);
+    encoder->flush(out);
+    const GstFlowReturn result = push_bytes(self, std::move(out));
+    gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self), done.release());
+    return result;
+  }
   const GstFlowReturn result = end_file(self);
   return result == GST_FLOW_OK ? GST_FLOW_EOS : result;
 }
@@ -484,6 +505,12 @@ static bool take_waiting(std::optional<std::vector<Sample>>&& samples,
   return true;
 }
 
+static GstFlowReturn sink_event_pre_queue(GstAggregator* aggregator, GstAggregatorPad* pad,
+                                          GstEvent* event) {
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT_DONE) event = gap_at_segment_end(pad, event);
+  return PARENT_AGGREGATOR_CLASS->sink_event_pre_queue(aggregator, pad, event);
+}
+
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
   auto* self = GST_AEDAT_MUX(aggregator);
   State& state = self->priv->state;
@@ -507,6 +534,10 @@ static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, Gst
     gst_event_parse_tag(event, &tags);
     if (gst_tag_list_get_string(tags, GST_TAG_DEVICE_MODEL, &source)) state.source = source;
     g_free(source);
+  } else if (GST_EVENT_TYPE(event) == GST_EVENT_GAP) {
+    take_segment_end(pad, event);
+  } else if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP) {
+    forget_segment_end(pad);
   }
   return PARENT_AGGREGATOR_CLASS->sink_event(aggregator, pad, event);
 }
@@ -560,6 +591,7 @@ static gboolean stop(GstAggregator* aggregator) {
   auto* priv = GST_AEDAT_MUX(aggregator)->priv;
   if (priv->state.encoder) priv->writable.end_file();
   priv->state = State();
+  take_segment_ends(GST_AEDAT_MUX(aggregator));
   return TRUE;
 }
 
@@ -620,6 +652,7 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
   GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
   aggregator_class->aggregate = aggregate;
   aggregator_class->get_next_time = get_next_time;
+  aggregator_class->sink_event_pre_queue = sink_event_pre_queue;
   aggregator_class->sink_event = sink_event;
   aggregator_class->src_event = src_event;
   aggregator_class->src_query = src_query;
