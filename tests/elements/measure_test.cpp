@@ -194,6 +194,22 @@ TEST_F(StatsTest, ForgetsWhatLiesBeforeAFlush) {
   EXPECT_EQ(number_in(structure_of(message), "on-share"), 0);
 }
 
+TEST_F(StatsTest, MeasuresEachSegment) {
+  Harness h("eventstats location=" + in_quotes(path("f.json")));
+  h.caps(small_sensor);
+  for (const GstClockTime base : {0 * ms, 10 * ms}) {
+    play_on(h.get(), base);
+    h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
+    end_segment(h.get());
+    const auto message = h.message(GST_MESSAGE_ELEMENT);
+    ASSERT_TRUE(message);
+    EXPECT_EQ(count_in(structure_of(message)), 1U);
+    EXPECT_TRUE(std::filesystem::remove(path("f.json")));
+  }
+  gst_harness_push_event(h.get(), gst_event_new_eos());  // of nothing more
+  EXPECT_FALSE(h.message(GST_MESSAGE_ELEMENT));
+}
+
 TEST_F(StatsTest, MeasuresEachSensorOnItsOwn) {
   Harness h("eventstats");
   h.caps(small_sensor);

@@ -5,10 +5,11 @@
  * @short_description: measures an event stream
  *
  * Passes events through and posts element messages `eventstats`: after every
- * #GstEventStats:interval of stream time with the statistics since the last one, and at EOS or on
- * stop with those of the whole stream. Intervals end at buffer boundaries.
+ * #GstEventStats:interval of stream time with the statistics since the last one, and at EOS, at the
+ * end of the segment in a segment seek, or on stop with those of the whole stream or segment.
+ * Intervals end at buffer boundaries.
  *
- * - `cumulative` (#gboolean): %TRUE for the statistics of the whole stream;
+ * - `cumulative` (#gboolean): %TRUE for the statistics of the whole stream or segment;
  * - `start`, `end` (#gint64): the time covered, in stream time (ns);
  * - `events` (#guint64), `rate` (#gdouble, events per second);
  * - `on-share` (#gdouble): the fraction of ON events;
@@ -23,8 +24,8 @@
  *   (#guint64), by cause. After a denoiser, light events are its true positives, and those of other
  *   known causes its false positives.
  *
- * At EOS or on stop (Ctrl-C), the statistics of the whole stream are written to
- * #GstEventStats:location as JSON, and an image of the events per pixel to #GstEventStats:map.
+ * Those of the whole, also on Ctrl-C, are written to #GstEventStats:location as JSON, and an image
+ * of the events per pixel to #GstEventStats:map.
  *
  * ## Example launch line
  * |[
@@ -108,6 +109,7 @@ struct Private {
 
   // Accessed by the streaming thread only, or while there is none.
   std::optional<Measurement> measurement;
+  bool segment_reported = false;  ///< a segment has ended, and so has its measurement
   EventFaults faults{"count", GST_CAT_DEFAULT};
 };
 
@@ -166,10 +168,21 @@ static void conclude(GstEventStats* self, const ReportFiles& files) {
          [&] { return eventcamera::draw_map(measurement.cumulative.statistics.map()); });
 }
 
+/// True if there were events since the last report.
+static bool has_news(const Private& priv) {
+  return priv.measurement && !priv.measurement->concluded;
+}
+
 /// Starts measuring a sensor of this size. May throw.
 static void measure(GstEventStats* self, int width, int height) {
   GST_DEBUG_OBJECT(self, "counting the events of %dx%d pixels", width, height);
   self->priv->measurement.emplace(width, height);
+}
+
+/// Starts over with the same sensor, if it is known. May throw.
+static void start_over(GstEventStats* self) {
+  if (const auto& measurement = self->priv->measurement)
+    measure(self, measurement->width, measurement->height);
 }
 
 /* events */
@@ -260,6 +273,7 @@ static void take_gap(GstEventStats* self, GstEvent* event) {
 
 static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   auto* self = GST_EVENT_STATS(transform);
+  auto& priv = *self->priv;
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_GAP:
       reported(self, [&] { take_gap(self, event); });
@@ -267,12 +281,19 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
     case GST_EVENT_SEGMENT:
       if (!plays_events(self, event, "measure")) return FALSE;
       break;
+    case GST_EVENT_SEGMENT_DONE:
+      priv.segment_reported = true;
+      reported(self, [&] {
+        conclude(self, priv.settings.copy());
+        start_over(self);
+      });
+      break;
     case GST_EVENT_EOS:
-      reported(self, [&] { conclude(self, self->priv->settings.copy()); });
+      if (!priv.segment_reported || has_news(priv))
+        reported(self, [&] { conclude(self, priv.settings.copy()); });
       break;
     case GST_EVENT_FLUSH_STOP:
-      if (const auto& measurement = self->priv->measurement)
-        reported(self, [&] { measure(self, measurement->width, measurement->height); });
+      reported(self, [&] { start_over(self); });
       break;
     default:
       break;
@@ -306,9 +327,9 @@ static gboolean start(GstBaseTransform* transform) {
 static gboolean stop(GstBaseTransform* transform) {
   auto* self = GST_EVENT_STATS(transform);
   auto& priv = *self->priv;
-  if (priv.measurement && !priv.measurement->concluded)
-    reported(self, [&] { conclude(self, priv.settings.copy()); });
+  if (has_news(priv)) reported(self, [&] { conclude(self, priv.settings.copy()); });
   priv.measurement.reset();
+  priv.segment_reported = false;
   priv.faults.reset();
   return TRUE;
 }
@@ -333,11 +354,13 @@ static void gst_event_stats_class_init(GstEventStatsClass* klass) {
   Properties<settings_of> properties(object_class);
   properties.add(
       &Settings::interval,
-      g_param_spec_uint64("interval", "Interval",
-                          "Time between statistics messages, in stream time (ns; 0 = at EOS only)",
-                          0, std::numeric_limits<gint64>::max(), Settings().interval,
-                          mutable_playing_flags));
-  add_report_properties(properties, "PNG file of the events per pixel, written at EOS or on stop");
+      g_param_spec_uint64(
+          "interval", "Interval",
+          "Time between statistics messages, in stream time (ns; 0 = at the end only)", 0,
+          std::numeric_limits<gint64>::max(), Settings().interval, mutable_playing_flags));
+  add_report_properties(properties,
+                        "PNG file of the events per pixel, written at EOS, at the end of a segment "
+                        "or on stop");
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_templates(element_class, EVENT_CAPS, EVENT_CAPS);

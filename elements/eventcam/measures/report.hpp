@@ -23,8 +23,9 @@ template <class Properties>
 void add_report_properties(Properties& properties, const char* map_blurb) {
   properties.add(&ReportFiles::location,
                  g_param_spec_string("location", "Location",
-                                     "JSON file of the statistics, written at EOS or on stop", "",
-                                     mutable_ready_flags));
+                                     "JSON file of the statistics, written at EOS, at the end of a "
+                                     "segment or on stop",
+                                     "", mutable_ready_flags));
   properties.add(&ReportFiles::map,
                  g_param_spec_string("map", "Map", map_blurb, "", mutable_ready_flags));
 }
