@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Seeks in event files of every format.
+#include <chrono>
+#include <future>
+
 #include "tests/elements/event_files.hpp"
 
 namespace {
@@ -104,6 +107,41 @@ TEST_P(EveryFormat, EndsASegmentTogetherWithAnother) {
     const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
     EXPECT_FALSE(Owned<GstMessage>(
         gst_bus_timed_pop_filtered(bus.get(), 200 * GST_MSECOND, GST_MESSAGE_SEGMENT_DONE)));
+  }
+}
+
+/// Also a segment of no length.
+TEST_P(EveryFormat, SendsASegmentBeforeItsEnd) {
+  const TemporaryFile file(file_of(format(), some_events()));
+  for (const std::string way : {"", "queue ! "}) {
+    Player player(file.source() + way + format().reader);
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+    struct Segments {
+      GstClockTime last = GST_CLOCK_TIME_NONE;
+      std::promise<GstClockTime> ended{};
+    } segments;
+    GstPad* const sink = gst_element_get_static_pad(player["sink"], "sink");
+    gst_pad_add_probe(
+        sink, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+        +[](GstPad*, GstPadProbeInfo* info, gpointer data) {
+          auto& seen = *static_cast<Segments*>(data);
+          auto* const event = GST_PAD_PROBE_INFO_EVENT(info);
+          const GstSegment* segment = nullptr;
+          if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT) {
+            gst_event_parse_segment(event, &segment);
+            seen.last = segment->time;
+          }
+          if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT_DONE) seen.ended.set_value(seen.last);
+          return GST_PAD_PROBE_OK;
+        },
+        &segments, nullptr);
+    gst_object_unref(sink);
+    ASSERT_TRUE(player.seek(GST_SECOND, GST_SECOND, GST_SEEK_FLAG_SEGMENT));
+    ASSERT_TRUE(player.play()) << player.error;
+    EXPECT_EQ(player.end, GST_MESSAGE_SEGMENT_DONE);
+    auto ended = segments.ended.get_future();
+    ASSERT_EQ(ended.wait_for(std::chrono::seconds(60)), std::future_status::ready);
+    EXPECT_EQ(ended.get(), GST_SECOND);
   }
 }
 

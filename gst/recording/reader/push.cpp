@@ -66,7 +66,9 @@ GstFlowReturn EventReader::hand_out() {
   GstFlowReturn result = GST_FLOW_OK;
   while (result == GST_FLOW_OK) result = step();
   if (result != nothing_ready) return result;
-  return recording_->is_past_stop() ? GST_FLOW_EOS : GST_FLOW_OK;
+  if (!recording_->is_past_stop()) return GST_FLOW_OK;
+  result = output_due_ ? begin_output() : GST_FLOW_OK;
+  return result == GST_FLOW_OK ? GST_FLOW_EOS : result;
 }
 
 gboolean EventReader::sink_event(GstEvent* event) {
