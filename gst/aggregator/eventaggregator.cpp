@@ -44,13 +44,22 @@ GstSegment segment_of(GstAggregatorPad* pad) {
   return segment;
 }
 
+void EventAggregator::set_segment(const GstSegment& segment) {
+  gst_aggregator_update_segment(element_, &segment);
+  segment_sent_ = false;
+}
+
+GstFlowReturn EventAggregator::push(OwnedBuffer buffer) {
+  segment_sent_ = true;
+  return gst_aggregator_finish_buffer(element_, buffer.release());
+}
+
 GstFlowReturn EventAggregator::pass(OwnedBuffer buffer) {
-  if (!is_gap(buffer.get())) return gst_aggregator_finish_buffer(element_, buffer.release());
-  // Without a segment, which GstAggregator sends with the first buffer, a gap has no meaning.
-  GstPad* const src = GST_AGGREGATOR_SRC_PAD(element_);
-  if (has_segment(src))
+  if (!is_gap(buffer.get())) return push(std::move(buffer));
+  if (segment_sent_)
     gst_pad_push_event(
-        src, gst_event_new_gap(GST_BUFFER_PTS(buffer.get()), GST_BUFFER_DURATION(buffer.get())));
+        GST_AGGREGATOR_SRC_PAD(element_),
+        gst_event_new_gap(GST_BUFFER_PTS(buffer.get()), GST_BUFFER_DURATION(buffer.get())));
   return GST_FLOW_OK;
 }
 
@@ -131,8 +140,15 @@ struct EventAggregatorFunctions {
     if (!all_have_ended()) return GST_AGGREGATOR_FLOW_NEED_DATA;
     GST_DEBUG_OBJECT(self.element_, "the segment of all inputs has ended");
     for (const auto& pad : pads) gst_aggregator_pad_drop_buffer(pad.get());
+    auto* const src = GST_AGGREGATOR_PAD(GST_AGGREGATOR_SRC_PAD(self.element_));
+    if (!self.segment_sent_) {  // since no buffer was
+      const GstSegment segment = segment_of(src);
+      GstEvent* const event = gst_event_new_segment(&segment);
+      gst_event_set_seqnum(event, gst_event_get_seqnum(done.get()));
+      gst_pad_push_event(GST_PAD(src), event);
+    }
     flush(self.element_);
-    gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self.element_), done.release());
+    gst_pad_push_event(GST_PAD(src), done.release());
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
 
@@ -181,7 +197,7 @@ struct EventAggregatorFunctions {
     GST_DEBUG_OBJECT(pad, "%" GST_SEGMENT_FORMAT, &segment);
     if (pad != self.main_pad_) return;
     self.take_segment(segment);
-    gst_aggregator_update_segment(self.element_, &segment);
+    self.set_segment(segment);
   }
 
   static GstFlowReturn sink_event_pre_queue(GstAggregator* element, GstAggregatorPad* pad,
@@ -272,6 +288,7 @@ struct EventAggregatorFunctions {
     auto& self = of(element);
     GST_DEBUG_OBJECT(element, "flushed: dropping events that wait");
     forget_segment_ends(self);
+    self.segment_sent_ = false;
     return guard(self, [&] {
       self.flush();
       return GST_FLOW_OK;
@@ -287,6 +304,7 @@ struct EventAggregatorFunctions {
     auto& self = of(element);
     guard(self, [&] { self.stop(); });
     forget_segment_ends(self);
+    self.segment_sent_ = false;
     self.main_caps_.reset();
     self.tags_.clear();
     self.faults_.reset();

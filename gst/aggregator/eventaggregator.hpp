@@ -64,6 +64,13 @@ class EventAggregator {
   /// The main pad; null if pads are requested.
   GstAggregatorPad* main_pad() const { return main_pad_; }
 
+  /// Sets the segment of the output. GstAggregator sends it with the next buffer.
+  void set_segment(const GstSegment& segment);
+  /// True once the segment of the output was sent. Without it, a gap has no meaning.
+  bool is_segment_sent() const { return segment_sent_; }
+
+  /// Pushes a buffer of the output.
+  GstFlowReturn push(OwnedBuffer buffer);
   /// Pushes a buffer, or the GAP event for which GstAggregator has queued it.
   GstFlowReturn pass(OwnedBuffer buffer);
 
@@ -81,6 +88,7 @@ class EventAggregator {
   GstAggregatorPad* main_pad_;
   OwnedCaps main_caps_;
   std::vector<OwnedEvent> tags_;  ///< of the main pad, to be sent
+  bool segment_sent_ = false;     ///< that of the output
   bool segment_ended_ = false;    ///< that of the output; other pads may still be in theirs
   EventFaults faults_;
 };

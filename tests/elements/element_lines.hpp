@@ -151,6 +151,17 @@ class Kind {
   GstElementFactory* factory_;
 };
 
+/// The elements whose inputs are events or frames, which tests can push.
+inline std::vector<std::string> consumers() {
+  auto names = element_names();
+  std::erase_if(names, [](const auto& name) {
+    return !std::ranges::all_of(Kind(name).pads(GST_PAD_SINK), [](const auto& pad) {
+      return pad.takes_frames() || pad.takes_events();
+    });
+  });
+  return names;
+}
+
 inline Owned<GstElement> launched(const std::string& line) {
   GError* error = nullptr;
   Owned<GstElement> pipeline(gst_parse_launch(("pipeline.( " + line + " )").c_str(), &error));

@@ -169,16 +169,6 @@ class Consumer {
   std::vector<Input> inputs_;
 };
 
-std::vector<std::string> consumers() {
-  auto names = element_names();
-  std::erase_if(names, [](const auto& name) {
-    return !std::ranges::all_of(Kind(name).pads(GST_PAD_SINK), [](const auto& pad) {
-      return pad.takes_frames() || pad.takes_events();
-    });
-  });
-  return names;
-}
-
 class EveryConsumer : public testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(, EveryConsumer, testing::ValuesIn(consumers()), element_lines::test_name);
 

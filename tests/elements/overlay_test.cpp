@@ -187,6 +187,23 @@ TEST_F(OverlayTest, PassesGapsInTheVideoOn) {
   EXPECT_EQ(start, 80 * ms);
 }
 
+TEST_F(OverlayTest, SendsNoGapBeforeItsSegment) {
+  begin("width=8, height=4");
+  push_frame(0);
+  push_events(0, {});
+  EXPECT_EQ(drawn(), Places{});
+  while (const Owned<GstEvent> event{gst_harness_try_pull_event(video.get())}) continue;
+  for (auto* h : {video.get(), events.get()}) play_on(h, 40 * ms);
+  gst_harness_push_event(video.get(), gst_event_new_gap(0, 40 * ms));
+  push_events(0, {});
+  push_frame(40 * ms);
+  push_events(40 * ms, {});
+  EXPECT_EQ(drawn(), Places{});
+  const Owned<GstEvent> event(gst_harness_pull_event(video.get()));
+  ASSERT_TRUE(event);
+  EXPECT_EQ(GST_EVENT_TYPE(event.get()), GST_EVENT_SEGMENT);
+}
+
 TEST_F(OverlayTest, GoesOnThroughGapsWithoutCaps) {
   gst_harness_set_src_caps_str(video.get(),
                                "video/x-raw, format=GRAY8, width=8, height=4, framerate=25/1");

@@ -337,7 +337,7 @@ GstFlowReturn EventRender::push_picture(const EventInterval& events, const Event
                  " to %" GST_TIME_FORMAT,
                  GST_TIME_ARGS(picture.start), GST_TIME_ARGS(events.start),
                  GST_TIME_ARGS(events.end));
-  return gst_aggregator_finish_buffer(element(), buffer.release());
+  return push(std::move(buffer));
 }
 
 /// Draws the next picture and pushes it. May throw.

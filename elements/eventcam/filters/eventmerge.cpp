@@ -116,7 +116,7 @@ class EventMerge final : public EventAggregator {
   void raise_latency(GstClockTime needed);
   void count(const MergedInterval& interval);
   void choose_segment(std::span<const OwnedAggregatorPad> pads);
-  GstFlowReturn push(const MergedInterval& interval, EventMerger::Inputs inputs);
+  GstFlowReturn push_interval(const MergedInterval& interval, EventMerger::Inputs inputs);
   GstFlowReturn push_gap(GstClockTime start, GstClockTime duration);
 
   Guarded<Counts> counts_;
@@ -126,7 +126,6 @@ class EventMerge final : public EventAggregator {
   EventBuffers buffers_;
   GstClockTime latency_ = 0;
   bool segment_chosen_ = false;
-  bool segment_sent_ = false;
   bool discontinuous_ = true;  // the next buffer is
   gint64 waiting_since_ = 0;   // for streams, monotonic time in microseconds; 0 = it does not
   WarnOnce warn_of_late_{GST_CAT_DEFAULT};
@@ -211,9 +210,10 @@ bool EventMerge::load(const OwnedAggregatorPad& pad) {
 
 /* output */
 
-/// Chooses the segment of the stream that starts first, up to the end of the one that ends last.
-/// There must be a stream.
+/// Chooses, once, the segment of the stream that starts first, up to the end of the one that ends
+/// last.
 void EventMerge::choose_segment(std::span<const OwnedAggregatorPad> pads) {
+  if (pads.empty() || std::exchange(segment_chosen_, true)) return;
   GstSegment chosen = segment_of(pads.front().get());
   GstClockTime stop = chosen.stop;
   for (const auto& pad : pads.subspan(1)) {
@@ -222,7 +222,7 @@ void EventMerge::choose_segment(std::span<const OwnedAggregatorPad> pads) {
     if (segment.start < chosen.start) chosen = segment;
   }
   chosen.stop = stop;
-  gst_aggregator_update_segment(element(), &chosen);
+  set_segment(chosen);
 }
 
 void EventMerge::count(const MergedInterval& interval) {
@@ -243,20 +243,20 @@ GstFlowReturn EventMerge::push_gap(GstClockTime start, GstClockTime duration) {
   if (duration == 0) return GST_FLOW_OK;
   GST_LOG_OBJECT(element(), "no events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
                  GST_TIME_ARGS(start), GST_TIME_ARGS(duration));
-  if (segment_sent_)
+  if (is_segment_sent())
     return push_event(GST_AGGREGATOR_SRC_PAD(element()), gst_event_new_gap(start, duration));
   // GstAggregator sends the segment with a buffer only.
   OwnedBuffer empty(gst_buffer_new());
   GST_BUFFER_PTS(empty.get()) = start;
   GST_BUFFER_DURATION(empty.get()) = duration;
   GST_BUFFER_FLAG_SET(empty.get(), GST_BUFFER_FLAG_GAP | GST_BUFFER_FLAG_DISCONT);
-  segment_sent_ = true;
   discontinuous_ = false;
-  return gst_aggregator_finish_buffer(element(), empty.release());
+  return push(std::move(empty));
 }
 
 /// Pushes the events of an interval. May throw.
-GstFlowReturn EventMerge::push(const MergedInterval& interval, EventMerger::Inputs inputs) {
+GstFlowReturn EventMerge::push_interval(const MergedInterval& interval,
+                                        EventMerger::Inputs inputs) {
   if (!gst_pad_has_current_caps(GST_AGGREGATOR_SRC_PAD(element()))) return GST_FLOW_OK;
   const auto start = static_cast<GstClockTime>(interval.start) * GST_USECOND;
   const auto duration = static_cast<GstClockTime>(interval.end - interval.start) * GST_USECOND;
@@ -274,12 +274,11 @@ GstFlowReturn EventMerge::push(const MergedInterval& interval, EventMerger::Inpu
   gst_buffer_unmap(buffer.get(), &map);
   GST_BUFFER_PTS(buffer.get()) = start;
   GST_BUFFER_DURATION(buffer.get()) = duration;
-  segment_sent_ = true;
   if (std::exchange(discontinuous_, false))
     GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
   GST_LOG_OBJECT(element(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, interval.events,
                  GST_TIME_ARGS(start));
-  return gst_aggregator_finish_buffer(element(), buffer.release());
+  return push(std::move(buffer));
 }
 
 GstFlowReturn EventMerge::aggregate(bool timed_out) {
@@ -297,13 +296,16 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
     else if (!has_ended(pad.get()))
       waiting = true;
   }
-  if (inputs.empty() && !waiting) return GST_FLOW_EOS;
+  if (inputs.empty() && !waiting) {
+    choose_segment(pads);
+    return GST_FLOW_EOS;
+  }
   if (!segment_chosen_ && pads.size() < settings.copy().min_streams) {
     waiting = true;
     if (!inputs.empty()) timed_out = timed_out || wait_for_streams(pads.size());
   }
   if (inputs.empty() || (waiting && !timed_out)) return GST_AGGREGATOR_FLOW_NEED_DATA;
-  if (!std::exchange(segment_chosen_, true)) choose_segment(pads);
+  choose_segment(pads);
   const auto interval = merger_.next(inputs);
   count(interval);
   for (const auto& pad : pads) {
@@ -311,7 +313,7 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
     if (stream.input.is_loaded() && stream.input.start() < interval.end)
       discontinuous_ |= std::exchange(stream.discontinuous, false);
   }
-  const GstFlowReturn result = push(interval, inputs);
+  const GstFlowReturn result = push_interval(interval, inputs);
   for (const auto& pad : pads) {
     auto& stream = stream_of(pad);
     if (!stream.input.is_loaded() || !stream.input.is_merged(interval.end)) continue;
@@ -402,7 +404,6 @@ void EventMerge::flush() {
   }
   merger_.restart();
   segment_chosen_ = false;
-  segment_sent_ = false;
   discontinuous_ = true;
   waiting_since_ = 0;
 }
