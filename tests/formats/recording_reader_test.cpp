@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <ctime>
+#include <iterator>
 #include <map>
 #include <string>
 #include <tuple>
@@ -99,6 +101,31 @@ File aedat_file_with_a_table_of_zeros() {
   file.bytes.erase(file.bytes.begin() + table_at, file.bytes.end());
   Aedat4Compressor(decoder.compression()).compress(aedat4_table_content(*table), file.bytes);
   return file;
+}
+
+/// Less than a second of events, in a packet each, and a table of packets of another stream, which
+/// are not there.
+File aedat_file_with_a_false_table(int stream) {
+  constexpr int packets = 30'000;
+  constexpr int entries = 100'000;
+  Aedat4Encoder encoder({sensor, "", Aedat4Compression::none, true, true});
+  Bytes bytes;
+  for (int i = 0; i < packets; ++i) {
+    const auto event = AbsoluteEvent::at(i % sensor.width, 0, 30 * i, Polarity::on);
+    encoder.encode(std::span(&event, 1), bytes);
+    encoder.flush(bytes);
+  }
+  const auto table_at = bytes.size();
+  encoder.finish(bytes);
+  const auto patch = encoder.patch().value();
+  std::ranges::copy(patch.bytes, bytes.begin() + static_cast<std::ptrdiff_t>(patch.position));
+  bytes.resize(table_at);
+  std::vector<Aedat4TableEntry> table;
+  for (int i = 0; i < entries; ++i)
+    table.push_back({table_at, stream, 100, 1, 2'000'000, 2'000'000});
+  std::ranges::copy(aedat4_table_content(table), std::back_inserter(bytes));
+  return {"aedat_with_a_false_table", std::move(bytes),
+          [] { return std::make_unique<AedatDecoder>(); }};
 }
 
 std::vector<File> all_files() {
@@ -379,6 +406,20 @@ TEST(RecordingReader, DoesNotReadOnWhileAStreamIsSilent) {
     EXPECT_EQ(outcome.pictures.size(),
               static_cast<std::size_t>(std::min<Microseconds>(frames, stop / 10'000)));
     EXPECT_LT(source.end, bytes.size() / 2);
+  }
+}
+
+TEST(RecordingReader, AStreamThatNeverComesTakesNoTimeToSpeakOf) {
+  for (const int stream : {Aedat4Encoder::frame_stream, 7}) {
+    const auto file = aedat_file_with_a_false_table(stream);
+    MemoryBytes bytes(file.bytes);
+    RecordingReader reader(file.make_decoder, chunk_length);
+    reader.open(bytes);
+    const std::clock_t before = std::clock();
+    Outcome outcome;
+    outcome.take_all(reader);
+    EXPECT_EQ(reader.counts().events, 30'000U);
+    EXPECT_LT(std::clock() - before, 5 * CLOCKS_PER_SEC);
   }
 }
 

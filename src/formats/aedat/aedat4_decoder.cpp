@@ -134,6 +134,16 @@ void Aedat4Decoder::read_table() {
   auto table = read_aedat4_table(bytes, compression_, packets_at_);
   table_missing_ = !table;
   if (table && !std::ranges::all_of(*table, is_blank)) table_ = std::move(*table);
+  for (const auto& entry : table_) {
+    if (!may_have_stream(entry.stream)) continue;
+    auto& extent = extents_[entry.stream];
+    if (entry.start < Chunker::max_time) {
+      extent.end = std::max(extent.end, entry.position + 1);
+      extent.latest_start = std::max(extent.latest_start, entry.start);
+    }
+    if (entry.end < Chunker::max_time)
+      extent.last = std::max(extent.last.value_or(entry.end), entry.end);
+  }
 }
 
 /// A missing table is reported after all other corruption, which may be its cause.
@@ -158,18 +168,20 @@ std::optional<SeekPoint> Aedat4Decoder::seek_point_before(Microseconds t) const 
 
 std::optional<Microseconds> Aedat4Decoder::last_time() {
   std::optional<Microseconds> last;
-  for (const auto& entry : table_) {
-    const auto stream = stream_of(entry.stream);
-    if (!stream || entry.end >= Chunker::max_time) continue;
-    const auto kind = streams_[*stream].kind;
-    if (kind == StreamKind::events || kind == StreamKind::frames)
-      last = std::max(last.value_or(entry.end), entry.end);
+  for (const auto& stream : streams_) {
+    const auto extent = extents_.find(stream.id);
+    if (extent == extents_.end()) continue;
+    if (stream.kind == StreamKind::events || stream.kind == StreamKind::frames)
+      last = std::max(last, extent->second.last);  // none is the minimum
   }
   return last;
 }
 
 std::optional<std::uint64_t> Aedat4Decoder::end_of(std::size_t stream, Microseconds t) const {
   if (table_.empty()) return std::nullopt;
+  const auto extent = extents_.find(streams_[stream].id);
+  if (extent == extents_.end()) return 0;
+  if (extent->second.latest_start < t) return extent->second.end;
   std::uint64_t end = 0;
   for (const auto& entry : table_)
     if (entry.stream == streams_[stream].id && entry.start < t)
@@ -196,7 +208,7 @@ bool Aedat4Decoder::begins_packet(std::span<const std::uint8_t> bytes) const {
   const auto id = little_endian<std::int32_t>(bytes.data());
   const auto size = little_endian<std::uint32_t>(bytes.data() + 4);
   if (size < payload_head || size > aedat4_max_packet) return false;
-  if (listed_ ? !stream_of(id) : id < 0 || id >= max_unlisted_streams) return false;
+  if (!may_have_stream(id)) return false;
   const auto payload = bytes.subspan(aedat4_packet_header);
   if (is_compressed()) return begins_frame(codec_of(compression_), payload);
   if (little_endian<std::uint32_t>(payload.data()) > size - size_prefix) return false;
@@ -204,6 +216,10 @@ bool Aedat4Decoder::begins_packet(std::span<const std::uint8_t> bytes) const {
   return std::all_of(identifier.begin(), identifier.end(), [](std::uint8_t c) {
     return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
   });
+}
+
+bool Aedat4Decoder::may_have_stream(int id) const {
+  return listed_ ? stream_of(id).has_value() : id >= 0 && id < max_unlisted_streams;
 }
 
 /// Goes on to the next packet. False if more bytes are needed.

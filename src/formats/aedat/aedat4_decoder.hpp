@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -66,12 +68,20 @@ class Aedat4Decoder final : public RecordingDecoder {
     std::size_t used = 0;  ///< bytes of the payload that hold it; 0 if it does not decompress
   };
 
+  /// What the packet table says of a stream, without impossible times.
+  struct Extent {
+    std::uint64_t end = 0;  ///< past the start of its last packet
+    Microseconds latest_start = std::numeric_limits<Microseconds>::min();  ///< of its packets
+    std::optional<Microseconds> last = {};  ///< time of its last element
+  };
+
   bool read_header();
   void take_header(std::span<const std::uint8_t> content);
   bool find_packet();
   bool read_packet();
   Place place_at(std::size_t offset);
   bool begins_packet(std::span<const std::uint8_t> bytes) const;
+  bool may_have_stream(int id) const;
   bool is_compressed() const { return compression_ != Aedat4Compression::none; }
   Payload unpacked(std::span<const std::uint8_t> payload);
   const char* read_content(const Payload& payload, int id, Place after);
@@ -91,7 +101,8 @@ class Aedat4Decoder final : public RecordingDecoder {
   std::optional<std::uint64_t> table_found_at_;  ///< while reading
   ByteSource* source_ = nullptr;                 ///< set by open()
   std::vector<Aedat4TableEntry> table_;
-  bool table_missing_ = false;  ///< although the header states one
+  std::map<int, Extent> extents_;  ///< by stream ID
+  bool table_missing_ = false;     ///< although the header states one
   bool table_reported_ = false;
   Aedat4Compression compression_ = Aedat4Compression::none;
   std::vector<StreamInfo> streams_;
