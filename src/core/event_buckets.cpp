@@ -9,8 +9,9 @@ namespace eventcamera {
 namespace {
 
 /// Writes the sorted events of a time slice of 2^slice_bits microseconds, which visit_lists(visit)
-/// passes to visit(std::span<const Event>) in lists. A bin holds the events of a microsecond, or of
-/// more, so that there are at most a few times as many bins as events.
+/// passes to visit(std::span<const Event>, const Event& last) in lists, with the last event of the
+/// array that a list is in. A bin holds the events of a microsecond, or of more, so that there are
+/// at most a few times as many bins as events.
 template <class VisitLists>
 void write_slice(const VisitLists& visit_lists, int slice_bits, std::span<Event> out) {
   constexpr int max_bins_bits = 12;
@@ -21,16 +22,16 @@ void write_slice(const VisitLists& visit_lists, int slice_bits, std::span<Event>
   std::uint32_t starts[(1 << max_bins_bits) + 1];
   std::fill_n(starts, bins + 1, 0);
   std::size_t counted = 0;
-  visit_lists([&](std::span<const Event> list) {
+  visit_lists([&](std::span<const Event> list, const Event& last) {
     for (const auto& event : list) {
       ++starts[bin_of(event) + 1];
       if (counted++ % (64 / sizeof(Event)) > 0) continue;  // once for each cache line
-      __builtin_prefetch(&event + 64);
+      __builtin_prefetch(&event + std::min<std::ptrdiff_t>(64, &last - &event));
       __builtin_prefetch(out.data() + counted, 1, 2);  // to be written in any order
     }
   });
   std::partial_sum(starts, starts + bins, starts);
-  visit_lists([&](std::span<const Event> list) {
+  visit_lists([&](std::span<const Event> list, const Event& /*last*/) {
     for (const auto& event : list) out[starts[bin_of(event)]++] = event;
   });
   sort_within_spans(out, bin_bits);
@@ -92,12 +93,13 @@ void EventBuckets::write_slices(std::size_t first, std::size_t last, Event* out)
     const auto visit_bands = [&](const auto& visit) {
       for (std::size_t band = 0; band < bands_; ++band) {
         const auto& starts = slices_[band];
-        visit(std::span(buckets_[band].events)
-                  .subspan(starts[slice], starts[slice + 1] - starts[slice]));
+        const std::span events(buckets_[band].events);
+        const auto list = events.subspan(starts[slice], starts[slice + 1] - starts[slice]);
+        if (!list.empty()) visit(list, events.back());
       }
     };
     std::size_t size = 0;
-    visit_bands([&](std::span<const Event> events) { size += events.size(); });
+    visit_bands([&](std::span<const Event> list, const Event&) { size += list.size(); });
     if (first <= before && size > 0) write_slice(visit_bands, *slice_bits_, {out + before, size});
     before += size;
   }

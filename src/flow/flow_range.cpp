@@ -18,7 +18,8 @@ FlowRange range_of(const ImageView<Flow>& flow, const Box& box) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
   const int count = 2 * box.width();
-  const int ahead = 2 * count;  // of the box after the next: its rows are far apart
+  // Of the box after the next, or before the last column: its rows are far apart.
+  const int ahead = std::min(2 * count, 2 * (flow.width - box.right));
   auto lowest = hn::Zero(floats);
   auto highest = hn::Zero(floats);
   for (int y = box.top; y < box.bottom; ++y) {

@@ -125,7 +125,7 @@ HWY_INLINE void interpolate(const PolynomialExpansion& to, const Targets& target
     const Lookup<Floats> first(index);
     const Lookup<Floats> second(hn::Add(index, hn::Set(words, 1)));
     const Columns between{first, second, left, targets.right};
-    const float* next = to.at(column + strip, row + 1);
+    const float* next = to.at(std::min(column + strip, to.width()), row + 1);
     for (int k = 0; k < coefficients; ++k) hwy::Prefetch(next + k * group);
     if (hn::AllFalse(floats, lower))
       add_weighted<2>(to, column, row, between, weights, sums);
@@ -180,7 +180,7 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
     Vector there[coefficients];
     interpolate(to, targets, there);
     const float* polynomials = from.at(x, y);
-    const float* next = from.at(x + strip, y);
+    const float* next = from.at(std::min(x + strip, from.width()), y);
     for (int k = 0; k < coefficients; ++k) hwy::Prefetch(next + k * group);
     const auto here = [&](int k) { return hn::Load(floats, polynomials + k * group); };
     const auto weight = hn::Mul(hn::Set(floats, row_weight), hn::LoadU(floats, column_weights + x));
