@@ -70,14 +70,6 @@ std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime tim
   return running;
 }
 
-/// True if the element upstream of a pad would accept a seek. GstAggregator flushes before it
-/// forwards a seek, and never resumes if that fails.
-static bool would_seek(GstAggregatorPad* pad, const SeekRequest& request) {
-  GstSegment segment = segment_of(pad);
-  return request.plays_on_from_time() && peer_can_seek(GST_PAD(pad), GST_FORMAT_TIME) &&
-         request.apply(segment);
-}
-
 /// Sends an event to all sink pads. Returns true if each upstream takes it.
 static gboolean forward(GstAggregator* element, GstEvent* event) {
   bool taken = true;
@@ -235,8 +227,9 @@ struct EventAggregatorFunctions {
         gst_event_unref(event);
         return FALSE;
       }
+      // GstAggregator flushes before it forwards a seek, and never resumes if that fails.
       for (const auto& pad : sink_pads(element)) {
-        if (would_seek(pad.get(), request)) continue;
+        if (would_seek(GST_PAD(pad.get()), request)) continue;
         GST_WARNING_OBJECT(pad.get(), "upstream would refuse: refused %" GST_PTR_FORMAT, event);
         gst_event_unref(event);
         return FALSE;

@@ -3,6 +3,10 @@
 
 #include <algorithm>
 
+#include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
+
 SeekRequest::SeekRequest(GstEvent* event) : seqnum_(gst_event_get_seqnum(event)) {
   gst_event_parse_seek(event, &rate_, &format_, &flags_, &start_type_, &start_, &stop_type_,
                        &stop_);
@@ -42,4 +46,19 @@ bool SeekRequest::apply(GstSegment& segment) const {
   if (start.position > stop.position) return false;
   return gst_segment_do_seek(&segment, rate_, format_, flags_, start.type, start.position,
                              stop.type, stop.position, nullptr) != FALSE;
+}
+
+/// Segment of a sink pad; that of a stream which starts at 0 if none of times was received.
+static GstSegment segment_of(GstPad* sink) {
+  const OwnedEvent event(gst_pad_get_sticky_event(sink, GST_EVENT_SEGMENT, 0));
+  if (event && segment_of(event.get()).format == GST_FORMAT_TIME) return segment_of(event.get());
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  return segment;
+}
+
+bool would_seek(GstPad* sink, const SeekRequest& request) {
+  GstSegment segment = segment_of(sink);
+  return request.plays_on_from_time() && peer_can_seek(sink, GST_FORMAT_TIME) &&
+         request.apply(segment);
 }

@@ -32,3 +32,7 @@ class SeekRequest {
   gint64 stop_ = 0;
   guint32 seqnum_;
 };
+
+/// True if the element upstream of a sink pad would accept a seek. For elements with several
+/// inputs, which must ask all of them before they forward a seek to one.
+bool would_seek(GstPad* sink, const SeekRequest& request);

@@ -16,6 +16,7 @@
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
+#include "gst/base/seek_request.hpp"
 #include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/drawing/drawn_video.hpp"
@@ -647,6 +648,20 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
 }
 
+/// True if a seek can be forwarded. Class images and flow must stay with the video, so none of
+/// their upstreams may refuse.
+static bool can_seek(GstEventSimulator* self, const SeekRequest& request) {
+  bool is_alone = true;
+  bool all_would = would_seek(GST_BASE_TRANSFORM_SINK_PAD(self), request);
+  for (auto* companion : companions_of(self)) {
+    const OwnedPad pad = companion->pad();
+    if (!pad || !gst_pad_is_linked(pad.get())) continue;
+    is_alone = false;
+    all_would = all_would && would_seek(pad.get(), request);
+  }
+  return is_alone || all_would;
+}
+
 static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_QOS) {
     // Not forwarded: only this element skips frames.
@@ -655,13 +670,17 @@ static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
     return TRUE;
   }
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) {
-    gdouble rate = 1;
-    gst_event_parse_seek(event, &rate, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr);
-    if (rate < 0) {
+    const SeekRequest request(event);
+    if (request.rate() < 0) {
       GST_WARNING_OBJECT(transform,
                          "refused to seek at rate %g: events cannot be simulated "
                          "backwards",
-                         rate);
+                         request.rate());
+      gst_event_unref(event);
+      return FALSE;
+    }
+    if (!can_seek(GST_EVENT_SIMULATOR(transform), request)) {
+      GST_WARNING_OBJECT(transform, "an upstream would refuse: refused %" GST_PTR_FORMAT, event);
       gst_event_unref(event);
       return FALSE;
     }

@@ -261,6 +261,17 @@ TEST_F(ClassImages, AreForgottenByAFlush) {
   for (const auto& event : fired) EXPECT_EQ(event.first, event.microsecond < 40'000 ? 5 : 6);
 }
 
+TEST_F(ClassImages, AreNotSeekedIfTheVideoCannotBe) {
+  begin();
+  // A harness would take the seek, but does not answer that it can seek.
+  gst_harness_push_upstream_event(
+      video.get(), gst_event_new_seek(1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH, GST_SEEK_TYPE_SET, 0,
+                                      GST_SEEK_TYPE_NONE, -1));
+  for (auto* h : {video.get(), images.get()})
+    while (const Owned<GstEvent> event{gst_harness_try_pull_upstream_event(h)})
+      EXPECT_NE(GST_EVENT_TYPE(event.get()), GST_EVENT_SEEK);
+}
+
 TEST_F(ClassImages, PadIsOnlyThereOnce) {
   auto* pad_template = gst_element_get_pad_template(dvs.element.get(), "label_sink");
   EXPECT_EQ(gst_element_request_pad(dvs.element.get(), pad_template, nullptr, nullptr), nullptr);
