@@ -2,8 +2,7 @@
  *
  * Counts ON and OFF events; the same in C, Python and JavaScript.
  *
- *   cc on_and_off.c -o on_and_off $(pkg-config --cflags --libs gsteventcamera-1.0
- * gstreamer-app-1.0)
+ *   cc on_and_off.c $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
  */
 #include <gst/app/gstappsink.h>
 #include <gst/eventcamera/eventcamera.h>

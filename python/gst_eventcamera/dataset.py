@@ -24,8 +24,9 @@ from .tensors import TENSOR_CAPS, tensor_of
 @dataclasses.dataclass(frozen=True)
 class DatasetVideo:
     """A video of a data set. Iterating over it simulates it, and yields what the recipe's output holds: an
-    Events array for each two frames, or tensors of shape (channels, height, width). Raises PipelineError if the
-    video cannot be read; at its end, also if it is corrupt or has fewer frames than the recipe asks for.
+    Events array per pair of consecutive frames, or tensors of shape (channels, height, width). Raises
+    PipelineError if the video cannot be read; at its end, also if it is corrupt or has fewer frames than the
+    recipe asks for.
 
     name: its path below the first folder of the pattern that has a wildcard, without extension.
     path: of the file, or of the folder of pictures."""
@@ -57,7 +58,7 @@ class DatasetVideo:
             yield from self.events()
 
     def events(self) -> Iterator[Events]:
-        """An array for each two frames, whatever the recipe's output is."""
+        """Yields an array per pair of consecutive frames, whatever the recipe's output is."""
         with self.playing(SINK) as pipeline:
             pipeline.gaps_as_buffers()
             yield from map(events_of, self._samples(pipeline))

@@ -22,7 +22,7 @@ def _chunks(description: str) -> Iterator[Events]:
 
 
 def simulate(video: str | os.PathLike[str], simulator: str = "eventsim-dvs denoise=8") -> Iterator[Events]:
-    """Yields the events that an event camera would have seen, one array for each two frames of a video.
+    """Yields the events that an event camera would have seen, one array per pair of consecutive frames of a video.
 
     video: a file that GStreamer plays.
     simulator: an element and its properties, such as "eventsim-dvs preset=davis346 seed=7"; further
