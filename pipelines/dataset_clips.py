@@ -71,7 +71,7 @@ def hindrance(video):
     if _simulator(video) not in WARMED_UP | WITH_STATE:
         return f"{_simulator(video)} cannot continue a clip"
     if "-state=" in video.line:
-        return "it sets a state of its own"
+        return "it sets its own state"
     frames = [element.split()[0] for element in video.recipe.frames.split("!") if element.strip()]
     unknown = [element for element in frames if "/" not in element and element not in MEMORYLESS]
     return f"{unknown[0]}, in frames, may remember frames" if unknown else ""

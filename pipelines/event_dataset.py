@@ -402,4 +402,4 @@ if __name__ == "__main__":
     except (RuntimeError, OSError) as failure:
         sys.exit(f"error: {failure}")
     except KeyboardInterrupt:
-        sys.exit("interrupted; the same command goes on from here")
+        sys.exit("interrupted; run the same command to resume")

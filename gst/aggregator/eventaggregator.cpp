@@ -146,7 +146,7 @@ struct EventAggregatorFunctions {
 
   static GstFlowReturn aggregate(GstAggregator* element, gboolean timed_out) {
     auto& self = of(element);
-    if (timed_out) GST_LOG_OBJECT(element, "the latency is over: going on without further input");
+    if (timed_out) GST_LOG_OBJECT(element, "deadline passed; continuing without further input");
     const auto result = self.segment_ended_
                             ? GST_FLOW_EOS
                             : guard(self, [&] { return self.aggregate(timed_out != FALSE); });

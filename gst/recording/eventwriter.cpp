@@ -283,13 +283,14 @@ static void warn_of_pauses(GstEventWriter* self, bool at_end) {
   if (left_out == reported || (reported > 0 && !at_end)) return;
   state.pauses_reported = left_out;
   const auto seconds = std::to_string(left_out / 1'000'000) + " s";
-  post_message(self, GST_MESSAGE_WARNING,
-               {GST_STREAM_ERROR_ENCODE,
-                (reported == 0 ? "Left out a pause of " + seconds + ", which is"
-                               : "Left out pauses of " + seconds + " in total, which are") +
-                    " too long for this format: all later events are earlier by as much. Write "
-                    "AEDAT4, HDF5, NumPy or text to keep their times."},
-               "the clock of the format cannot tell " + std::to_string(left_out) + " us");
+  post_message(
+      self, GST_MESSAGE_WARNING,
+      {GST_STREAM_ERROR_ENCODE,
+       (reported == 0 ? "Left out a pause of " + seconds + ", which is"
+                      : "Left out pauses of " + seconds + " in total, which are") +
+           " too long for this format: later timestamps are shifted back by that much. Write "
+           "AEDAT4, HDF5, NumPy or text to keep them."},
+      "the clock of the format cannot tell " + std::to_string(left_out) + " us");
 }
 
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {

@@ -266,7 +266,7 @@ TEST_F(Tensor, TellsWhatToSetForTheTensorsThatDownstreamWants) {
     gst_harness_set_sink_caps_str(h->get(), (std::string("other/tensors, ") + caps).c_str());
     gst_harness_set_src_caps_str(h->get(), events_caps.c_str());
     EXPECT_EQ(h->push(buffer_of(0, column(0), 10 * ms)), GST_FLOW_NOT_NEGOTIATED);
-    EXPECT_EQ(h->error(), std::string("Downstream wants other tensors: ") + wish);
+    EXPECT_EQ(h->error(), std::string("Downstream does not accept these tensors: ") + wish);
     h->push(buffer_of(10 * ms, column(0), 10 * ms));
     EXPECT_EQ(h->error(), "") << "told again";
   }

@@ -391,7 +391,7 @@ class Clips(unittest.TestCase):
     def test_are_not_made_where_they_could_differ(self):
         for text, reason in {
             "simulator: eventsim-dvs\nframes: videorate": "videorate, in frames, may remember frames",
-            "simulator: eventsim-dvs final-state=/x": "it sets a state of its own",
+            "simulator: eventsim-dvs final-state=/x": "it sets its own state",
             "simulator: identity": "identity cannot continue a clip",
         }.items():
             self.assertEqual(dataset_clips.hindrance(self.video(text)), reason)

@@ -56,7 +56,7 @@ static void gst_event_denoise_class_init(GstEventDenoiseClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
   properties.add(
       &Settings::method,
-      g_param_spec_enum("method", "Method", "How noise is told from signal", method_type(),
+      g_param_spec_enum("method", "Method", "How noise is distinguished from signal", method_type(),
                         static_cast<int>(Settings().method), mutable_playing_flags));
   properties.add(&Settings::correlation_time,
                  g_param_spec_uint64("correlation-time", "Correlation time",

@@ -117,7 +117,7 @@ static void gst_event_hot_pixel_class_init(GstEventHotPixelClass* klass) {
   properties.add(
       &Settings::learning_period,
       g_param_spec_uint64("learning-period", "Learning period",
-                          "Time after which hot pixels are found anew (ns)", GST_MSECOND,
+                          "Time after which hot pixels are detected again (ns)", GST_MSECOND,
                           3600 * GST_SECOND, Settings().learning_period, mutable_playing_flags));
   properties.add(&Settings::min_rate,
                  g_param_spec_double("min-rate", "Minimum rate",

@@ -218,7 +218,7 @@ static void reject_second_sender(GstEventDatagramDepay* self, GstClockTime arriv
       self,
       {GST_RESOURCE_ERROR_BUSY,
        "Rejected the datagrams of a second sender, until the first is silent for a second; stats "
-       "counts them. Let each sender use a port of its own."},
+       "counts them. Give each sender its own port."},
       cause);
   g_free(cause);
 }

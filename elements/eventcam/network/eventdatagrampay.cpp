@@ -164,7 +164,7 @@ static GstFlowReturn flush(GstEventDatagramPay* self) {
 
 /// Sends events that have waited for max-latency.
 static void flush_late(GstObject* element) {
-  GST_LOG_OBJECT(element, "max-latency is over: sending an incomplete datagram");
+  GST_LOG_OBJECT(element, "max-latency elapsed: sending an incomplete datagram");
   flush(GST_EVENT_DATAGRAM_PAY(element));
 }
 

@@ -206,7 +206,7 @@ static GstFlowReturn reported(GstRtpEventPay* self, const Work& work) {
 /// Sends events that have waited for max-latency.
 static void send_late(GstObject* element) {
   auto* self = GST_RTP_EVENT_PAY(element);
-  GST_LOG_OBJECT(self, "max-latency is over: sending an incomplete packet");
+  GST_LOG_OBJECT(self, "max-latency elapsed: sending an incomplete packet");
   reported(self, [&] { send(self); });
 }
 

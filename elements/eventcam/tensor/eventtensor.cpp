@@ -34,10 +34,14 @@
  *   TPAMI 2017). Events of earlier windows count, too.
  * - `event-frame`: ON minus OFF events.
  *
- * #GstEventTensor:normalization follows. In tensors of #GstEventTensor:data-type `uint8`, signed
- * representations have their 0 at 128. A step is an event without normalization, 1/127 of the
- * maximum, or 1/255 of it if it has no sign, with `max`, and 1/32 of the standard deviation around
- * 128 with `mean-std`; 255 is 1 in a time surface. Values are rounded and clamped.
+ * #GstEventTensor:normalization follows. In tensors of #GstEventTensor:data-type `uint8`, a value
+ * v is, rounded and clamped:
+ *
+ * |                             | `none`  | `mean-std`   | `max`         |
+ * |-----------------------------|---------|--------------|---------------|
+ * | `voxel-grid`, `event-frame` | 128 + v | 128 + 32 × v | 128 + 127 × v |
+ * | `histogram`                 | v       | 128 + 32 × v | 255 × v       |
+ * | `time-surface`              | 255 × v | 128 + 32 × v | 255 × v       |
  *
  * A tensor, with the numbers from which it is made, takes at most 1 GiB. Windows have at most
  * 16777216 events; further ones are skipped.
@@ -337,7 +341,7 @@ static bool are_wanted(GstEventTensor* self, GstCaps* caps) {
       "downstream takes %" GST_PTR_FORMAT ", not %" GST_PTR_FORMAT, wanted.get(), caps);
   post_message(self, GST_MESSAGE_ERROR,
                {GST_STREAM_ERROR_FORMAT,
-                "Downstream wants other tensors" + wishes_of(wanted.get(), caps) + "."},
+                "Downstream does not accept these tensors" + wishes_of(wanted.get(), caps) + "."},
                cause);
   g_free(cause);
   return false;
