@@ -400,7 +400,7 @@ for region in 100x80 1x1+-1+0 +10x+10+0+0 "10x10+ 1+0" "10x10+0+0 "; do
   refused "needs WIDTHxHEIGHT" --crop="$region" ball.raw out.dat
 done
 refused "region 100x80+250+60 is not within the sensor" --crop=100x80+250+60 ball.raw out.dat
-refused "choose one of EVT2 EVT21 EVT2.1 EVT3 EVT4" ball.raw other.raw --format=EVT5
+refused "choose one of EVT2 EVT21 EVT3 EVT4" ball.raw other.raw --format=EVT5
 refused "does not apply to .dat" ball.raw ball.dat --format=rpg
 refused "can only be read" ball.raw ball.aedat
 refused "choose one of auto seconds" --time-unit=hours ball.csv other.raw

@@ -39,7 +39,6 @@ using eventcamera::SensorSize;
 static const GEnumValue evt_formats[] = {
     {static_cast<int>(EvtFormat::evt2), "32-bit words, one event each", "EVT2"},
     {static_cast<int>(EvtFormat::evt21), "64-bit words, up to 32 events each", "EVT21"},
-    {static_cast<int>(EvtFormat::evt21), "The same as EVT21", "EVT2.1"},
     {static_cast<int>(EvtFormat::evt3), "16-bit words, the most compact", "EVT3"},
     {static_cast<int>(EvtFormat::evt4), "32-bit words, vectors of events", "EVT4"},
     {0, nullptr, nullptr},
