@@ -13,5 +13,5 @@ using ProfileEntries = std::vector<std::pair<std::string, std::string>>;
 /// std::runtime_error, which names the file and the reason.
 ProfileEntries read_camera_profile(const std::string& path, const char* element);
 
-/// Does the same with the text of a profile. The error tells the reason only.
+/// Does the same with the text of a profile. The error gives the reason only.
 ProfileEntries parse_camera_profile(const std::string& text, const char* element);

@@ -17,9 +17,10 @@
 /// GstEventAggregator owns one, which lives as long as the element.
 ///
 /// One sink pad is the main pad: its segment and its tags are those of the output, and its upstream
-/// tells the range of seeks. If pads are requested there is none; the subclass sets the segment,
-/// upstream of the first pad tells the range, and a seek must flush, because pads reach it at
-/// different times. A seek is forwarded to all pads, or to none if one of them would refuse it.
+/// determines the seekable range. If pads are requested there is none; the subclass sets the
+/// segment, upstream of the first pad determines the range, and a seek must flush, because pads
+/// reach it at different times. A seek is forwarded to all pads, or to none if one of them would
+/// refuse it.
 ///
 /// Called from the source pad's thread only, or while there is none.
 class EventAggregator {

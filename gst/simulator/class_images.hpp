@@ -17,9 +17,8 @@ class ClassImages : public CompanionPad {
   explicit ClassImages(GstDebugCategory* category) : CompanionPad("class images", category) {}
 
   /// If a source of images is linked, gives each event of a labelled buffer, which covers an
-  /// interval of `segment`, the class of its pixel in the image in force at its time: the last one
-  /// that is not later. Waits for the images until `end`. Throws VideoSimulatorError if one does
-  /// not fit the video.
+  /// interval of `segment`, the class of its pixel in the most recent image at that time. Waits for
+  /// the images until `end`. Throws VideoSimulatorError if one does not fit the video.
   GstFlowReturn set_classes(GstBuffer* events, const GstSegment& segment, const GstVideoInfo& video,
                             Nanoseconds start, Nanoseconds end);
 };

@@ -11,7 +11,7 @@
 namespace eventcamera {
 
 /// Maps the clock of a camera to the one by which its transfers arrive. Transfers can be late but
-/// never early, so the least delayed one of the last two seconds tells the offset between the
+/// never early, so the least delayed one of the last two seconds gives the offset between the
 /// clocks. The offset stays until it is off by more than max_error, so that events keep their
 /// distances: clocks that drift apart by up to 300 ppm are mapped to within 2 ms of that transfer.
 class ArrivalClock {

@@ -9,7 +9,8 @@
 
 namespace eventcamera {
 
-/// How noise is told from signal. The neighbours of a pixel are those around it, without itself.
+/// How noise is distinguished from signal. The neighbours of a pixel are those around it, without
+/// itself.
 enum class DenoiseMethod {
   /// Background activity filter (Delbruck 2008): one of 8 neighbours fired within the correlation
   /// time.

@@ -136,18 +136,18 @@ std::optional<Microseconds> RecordingSurvey::origin() const {
   return origin;
 }
 
-/// `told` is the time of the last item if the file states it. Otherwise the duration follows from
+/// `stated` is the time of the last item if the file states it. Otherwise the duration follows from
 /// the surveyed part, exactly if that `is_whole`.
-void RecordingSurvey::learn_duration(std::optional<Microseconds> told, bool is_whole,
+void RecordingSurvey::learn_duration(std::optional<Microseconds> stated, bool is_whole,
                                      const RecordingInput& input) {
   const auto start = origin().value_or(0);
   auto last = start - 1;
   for (const auto& surveyed : streams_) last = std::max(last, surveyed.latest.value_or(last));
   const auto length = last + 1 - start;
-  const bool is_told = told && *told >= start && *told < Chunker::max_time;
-  duration_is_exact_ = is_told || is_whole;
-  if (is_told) {
-    duration_ = *told + 1 - start;
+  const bool is_stated = stated && *stated >= start && *stated < Chunker::max_time;
+  duration_is_exact_ = is_stated || is_whole;
+  if (is_stated) {
+    duration_ = *stated + 1 - start;
   } else if (is_whole) {
     duration_ = length;
   } else if (!input.reads_itself()) {

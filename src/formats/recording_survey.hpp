@@ -78,7 +78,8 @@ class RecordingSurvey {
   void note(const TriggerItem& /*item*/) {}
   void note(const ImuItem& /*item*/) {}
   void finish(std::size_t index);
-  void learn_duration(std::optional<Microseconds> told, bool is_whole, const RecordingInput& input);
+  void learn_duration(std::optional<Microseconds> stated, bool is_whole,
+                      const RecordingInput& input);
 
   Microseconds sample_length_;
   std::vector<Stream> streams_;

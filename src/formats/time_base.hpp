@@ -10,8 +10,8 @@ namespace eventcamera {
 /// Unwraps a counter of `bits` bits in units of 2^`shift` microseconds: that of TIME_HIGH words.
 ///
 /// Counts rise in small steps, in which they may wrap. Any other count is a leap, after a pause or
-/// a flipped bit, and does not wrap. If the next count goes on from before the leap, so does the
-/// time.
+/// a flipped bit, and does not wrap. If the next count continues from before the leap, so does
+/// the time.
 template <int bits, int shift>
 class TimeBase {
  public:

@@ -25,7 +25,7 @@ class Batch {
 
   explicit Batch(Corruption& corruption) : corruption_(corruption) {}
 
-  /// Places the batch behind the events of `out`, to which close() adds it. It has room for the
+  /// Places the batch after the events of `out`, to which close() adds it. It has room for the
   /// events of so many bytes at most: to get memory takes longer than to decode a few bytes.
   void open(Decoded& out, std::size_t bytes) {
     constexpr std::size_t max_size = 4096;

@@ -5,10 +5,10 @@
  * @short_description: finds the words of a live event camera
  *
  * Turns what an event camera sends into EVT words for evtdec: the padded GRAY8 buffers of
- * Prophesee's V4L2 drivers, and the bytes of a serial line or a socket. The size of the sensor is
- * #GstEvtParse:width and #GstEvtParse:height, the format of its words #GstEvtParse:format, unless
- * the input's caps tell it: their field `format` may be EVT2, EVT21, EVT3 or EVT4, or one of the
- * drivers' fourccs, PSEE (EVT2), PSE1 (EVT2.1 of the legacy byte order), PSE2 (EVT2.1) or PSE3
+ * Prophesee's V4L2 drivers, and the bytes of a serial line or a socket. The sensor has the
+ * size #GstEvtParse:width x #GstEvtParse:height and words of #GstEvtParse:format, unless the
+ * input's caps state the format: their field `format` may be EVT2, EVT21, EVT3 or EVT4, or one of
+ * the drivers' fourccs, PSEE (EVT2), PSE1 (EVT2.1 of the legacy byte order), PSE2 (EVT2.1) or PSE3
  * (EVT3).
  *
  * In a V4L2 buffer, words end at a marker, and the bytes past it are ignored. Other bytes may begin
@@ -20,7 +20,7 @@
  * maps it to running time: the camera's clock is read off the transfers that are least delayed, and
  * a new segment corrects the mapping when it is off by more than 1 ms. For clocks that drift apart
  * by up to 300 ppm, running times are within 2 ms of those transfers. Sources without timestamps,
- * such as filesrc, begin at running time 0, and the camera's clock alone tells the rest;
+ * such as filesrc, begin at running time 0, and the camera's clock alone gives the rest;
  * `do-timestamp=true` of tcpclientsrc adds them.
  *
  * An event waits in the camera until its transfer is complete. Live sinks wait for the longest of

@@ -8,7 +8,7 @@
 
 #include "gst/base/event_buffer.hpp"
 
-/// Quality of service of drawn pictures: tells which ones sinks would drop anyway, and counts them.
+/// Quality of service of drawn pictures: predicts which ones sinks would drop, and counts them.
 class PictureQos {
  public:
   /// Takes a QoS event from downstream, in any thread.
@@ -17,7 +17,7 @@ class PictureQos {
     GstClockTimeDiff late = 0;
     GstClockTime time = GST_CLOCK_TIME_NONE;
     gst_event_parse_qos(event, &type, nullptr, &late, &time);
-    // Twice as late, to catch up; a throttle tells the time between pictures.
+    // Twice as late, to catch up; a throttle states the time between pictures.
     const GstClockTime factor = type == GST_QOS_TYPE_THROTTLE ? 1 : 2;
     const std::lock_guard lock(mutex_);
     if (GST_CLOCK_TIME_IS_VALID(time))

@@ -367,7 +367,7 @@ GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_re
  * which #GstEventMcapDec:topics selects.
  *
  * PTS are the stamps of the messages' headers. Packets have the clock of the camera: their first
- * stamp tells the time of its start, so that intervals between events are exact. Triggers are sent
+ * stamp gives the time of its start, so that intervals between events are exact. Triggers are sent
  * with the events, for writers that store them.
  *
  * An index makes seeks fast and the duration exact. Files without one, and files that were cut, are
@@ -407,7 +407,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventmcapdec, "eventmcapdec", GST_RANK_PRIMARY, even
  *
  * PTS are the stamps of the messages' headers. Databases need random access, so upstream should
  * support pull mode, as filesrc does; in push mode a database is collected in memory, up to 256
- * MiB, and read at its end. A bag that was not closed has no index, and is read all the same.
+ * MiB, and read at its end. A bag that was not closed has no index, but is read, too.
  *
  * ## Example launch line
  * |[

@@ -27,7 +27,7 @@
  * - `rate-curve` (#GstStructure): event counts in bins of `bin` ns (#guint64), as two arrays,
  *   `reference` and `candidate`;
  * - `classification` (#GstStructure), if the events of both are labelled (#GstEventSimDvs:label):
- *   how well a filter from the reference to the candidate tells light from noise.
+ *   how well a filter from the reference to the candidate separates light from noise.
  *   `true-positives`, `false-positives`, `true-negatives`, `false-negatives` (#guint64): light that
  *   is kept, noise that is kept, noise that is dropped, light that is dropped;
  *   `true-positive-rate` (recall), `false-positive-rate` and `precision` (#gdouble). Events of

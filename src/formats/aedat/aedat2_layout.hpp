@@ -25,7 +25,7 @@ inline constexpr Aedat2Camera aedat2_cameras[] = {
     {"davis346", {346, 260}, davis_layout},    {"davis640", {640, 480}, davis_layout},
     {"davisrgbw640", {640, 480}, davis_layout}};
 
-/// Layout of addresses, told from their magnitude. v2e has no DVS128.
+/// Layout of addresses, inferred from their magnitude. v2e has no DVS128.
 inline AddressLayout aedat2_layout_of(std::span<const std::uint32_t> addresses, bool of_v2e) {
   const auto many_are_past = [&](std::uint32_t max_address) {
     const auto count = std::ranges::count_if(

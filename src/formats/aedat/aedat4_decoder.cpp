@@ -222,11 +222,11 @@ bool Aedat4Decoder::may_have_stream(int id) const {
   return listed_ ? stream_of(id).has_value() : id >= 0 && id < max_unlisted_streams;
 }
 
-/// Goes on to the next packet. False if more bytes are needed.
+/// Moves on to the next packet. False if more bytes are needed.
 bool Aedat4Decoder::find_packet() {
   for (auto place = place_at(0); place != Place::packet; place = place_at(0)) {
     if (place == Place::more || place == Place::end) return false;
-    // The table follows the last packet, but search for further packets all the same.
+    // The table follows the last packet, but search for further packets anyway.
     if (!std::exchange(scanning_, true)) {
       if (place == Place::noise)
         corruption_.note(queue_.position(), "bytes that are not a packet");

@@ -14,7 +14,7 @@ namespace eventcamera {
 /// Formats of the words in a RAW file.
 enum class EvtFormat { evt2, evt21, evt21_legacy, evt3, evt4 };
 
-/// Name of a format, such as "EVT3". It does not tell the order of the halves of EVT21 words.
+/// Name of a format, such as "EVT3". It does not include the order of the halves of EVT21 words.
 const char* evt_format_name(EvtFormat format);
 
 /// Format with this name; EVT21 has little-endian words.

@@ -208,9 +208,9 @@ class Scanner final : public WordScanner {
   enum class Trial : std::uint8_t { valid, invalid, incomplete };
 
   /// Reads the stretches after the TIME_HIGH at committed_at_. In a transfer, one is enough,
-  /// because its words begin where it begins. Among loose bytes, several tell words from what looks
-  /// like some; if one of them continues the clock and the first does not, the first has a wrong
-  /// time.
+  /// because its words begin where it begins. Among loose bytes, several distinguish words from
+  /// what looks like them; if one of them continues the clock and the first does not, the first has
+  /// a wrong time.
   Trial try_stretches(Words& words, std::uint32_t first) const {
     const int needed = is_padded_ ? 1 : 4;
     // Whether an old transfer came again is not known while its time is the last one.

@@ -48,7 +48,7 @@ class WordScanner {
     std::uint64_t bytes = 0;        ///< passed on
     std::uint64_t events = 0;       ///< passed on
     std::uint64_t lost_bytes = 0;   ///< that came, and were not passed on; without padding
-    std::uint64_t lost_events = 0;  ///< in them, if their words can be told
+    std::uint64_t lost_events = 0;  ///< in them, if their words can be decoded
     std::uint64_t gaps = 0;         ///< discontinuous pieces but for the first
   };
 

@@ -15,7 +15,7 @@ void require(bool done);
 
 Hdf5Handle make_group(hid_t file, const char* name);
 
-/// Creates the properties of a dataset, which does not tell when it was written.
+/// Creates the properties of a dataset, without modification times.
 Hdf5Handle make_creation();
 
 /// Dataset with rows appended.

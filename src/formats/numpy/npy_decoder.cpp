@@ -47,8 +47,8 @@ std::optional<std::int64_t> scaled(std::int64_t number, int power) {
   return number / divisor - (number % divisor < 0 ? 1 : 0);
 }
 
-/// Rounds down, except where a number of `digits` binary digits cannot be told from the integer
-/// above: 3e-6 s may be stored as slightly less.
+/// Rounds down, except where a number of `digits` binary digits cannot be distinguished from the
+/// integer above: 3e-6 s may be stored as slightly less.
 double rounded_down(double number, int digits) {
   const double above = std::floor(number) + 1;
   return above - number <= std::min(std::ldexp(std::abs(above), -digits), 0.5) ? above : above - 1;

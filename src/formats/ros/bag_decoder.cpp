@@ -38,11 +38,11 @@ constexpr Format formats[] = {
     {sqlite_magic, "ROS 2 bag with SQLite", make_file<Db3File>},
 };
 
-/// Bytes that tell the format.
+/// Bytes that identify the format.
 constexpr std::size_t magic_bytes = 16;
 
-/// A time and the recording of its message may differ by so much more or less than those of the
-/// first message: by the delay of the recording, and by the drift of the sensor's clock in hours.
+/// Maximum change of the difference between a time and the recording of its message, relative to
+/// the first message: from recording delays, and hours of drift of the sensor's clock.
 constexpr Microseconds max_jitter = 1'000'000;
 
 std::string listed(const std::vector<std::string>& names) {
@@ -61,7 +61,7 @@ BagDecoder::BagDecoder(std::string topics) {
   if (!topics.empty()) wanted_ = "," + topics + ",";
 }
 
-/// Throws UnsupportedFormat if `start` does not tell the format.
+/// Throws UnsupportedFormat if `start` is that of no known format.
 void BagDecoder::choose_format(std::span<const std::uint8_t> start) {
   const auto* const found = std::ranges::find_if(
       formats, [&](const Format& format) { return has_at(0, format.magic, start); });

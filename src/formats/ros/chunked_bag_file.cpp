@@ -91,7 +91,7 @@ bool ChunkedBagFile::next_record() {
     corrupt("the file ends within a record");
     return true;
   }
-  // The messages of a chunk that is not compressed can be read all the same.
+  // The messages of an uncompressed chunk can still be read.
   corruption_.note(queue_.position(), "the file ends within a chunk");
   record_ = queue_.size();
   ended_ = true;

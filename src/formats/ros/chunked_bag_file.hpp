@@ -54,7 +54,7 @@ class ChunkedBagFile : public BagFile {
   ChunkedBagFile(TakeTopic take_topic, std::string_view magic, std::size_t scanned_bytes)
       : BagFile(std::move(take_topic)), magic_(magic), scanned_bytes_(scanned_bytes) {}
 
-  /// Reads topics and the index of chunks. A file without them, or a cut one, is read all the same.
+  /// Reads topics and the index of chunks. A file without them, or a truncated one, is read anyway.
   virtual void read_index(ByteSource& source) = 0;
 
   /// Reads the head of the record that `bytes` begin with; nothing if it takes more bytes.

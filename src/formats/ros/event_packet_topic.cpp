@@ -83,8 +83,8 @@ class EvtPackets {
   }
 
  private:
-  /// Turns times of the sensor into those of ROS. The sensor's clock wraps; the stamp tells how
-  /// often.
+  /// Turns times of the sensor into those of ROS. The sensor's clock wraps; the stamp determines
+  /// how often.
   void shift(Decoded& out, std::optional<std::uint64_t>& offset) {
     if (!shift_) {
       const auto first = out.events.empty() ? out.triggers.front().t

@@ -18,7 +18,7 @@ struct Decimal {
 /// arithmetic. Nothing if it is not entirely a number, or out of range.
 ///
 /// Programs print 3e-6, stored as a double, as 2.999999999999999924e-06. So a number that a double
-/// cannot tell from the integer above it, within 0.0005, is that integer.
+/// cannot distinguish from the integer above it, within 0.0005, is that integer.
 std::optional<Decimal> read_decimal(std::string_view text, int power);
 
 }  // namespace eventcamera
