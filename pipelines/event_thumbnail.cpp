@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
 #include "gst/base/named_file.hpp"
 #include "pipelines/plugin.h"
 #include "src/render/thumbnail.hpp"

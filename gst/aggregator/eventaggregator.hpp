@@ -9,7 +9,7 @@
 
 #include "gst/aggregator/segment_end.hpp"
 #include "gst/aggregator/sink_pads.hpp"
-#include "gst/base/event_buffer.hpp"
+#include "gst/base/event_faults.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 

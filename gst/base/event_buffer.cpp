@@ -11,14 +11,6 @@ static GstClockTime time_of_last_event(GstBuffer* buffer) {
   return last.t * GST_USECOND;
 }
 
-OwnedCaps event_caps(int width, int height) {
-  GstEventCameraInfo info = {};
-  info.width = width;
-  info.height = height;
-  info.fps_d = 1;
-  return OwnedCaps(gst_event_camera_info_to_caps(&info));
-}
-
 std::optional<EventInterval> interval_of(GstBuffer* buffer) {
   const GstClockTime start = GST_BUFFER_PTS(buffer);
   if (!GST_CLOCK_TIME_IS_VALID(start) || start > G_MAXINT64) return std::nullopt;
@@ -47,25 +39,4 @@ void truncate_events(GstBuffer* buffer, gsize count) {
   if (auto* meta = gst_buffer_get_event_camera_label_meta(buffer))
     gst_event_camera_label_meta_truncate(meta, count);
   gst_buffer_set_size(buffer, static_cast<gssize>(count * sizeof(GstEventCameraEvent)));
-}
-
-void EventFaults::warn(gpointer element, EventFault fault, GstBuffer* buffer) {
-  static constexpr std::array reasons = {
-      "a buffer has no PTS", "a buffer's PTS is more than 292 years",
-      "a buffer's size is not a multiple of 8 bytes", "some are outside the sensor",
-      "some are earlier than the previous one, or later than "
-      "the end of their buffer"};
-  const auto index = static_cast<std::size_t>(fault);
-  gchar* cause = gst_info_strdup_printf("%" GST_PTR_FORMAT, buffer);
-  warnings_[index](element,
-                   {GST_STREAM_ERROR_FORMAT, std::string("Cannot ") + verb_ + " all events: " +
-                                                 reasons[index] + "; skipping them."},
-                   cause);
-  g_free(cause);
-}
-
-void EventFaults::warn(gpointer element, const eventcamera::InvalidEvents& invalid,
-                       GstBuffer* buffer) {
-  if (invalid.outside > 0) warn(element, EventFault::beyond_sensor, buffer);
-  if (invalid.unsorted > 0) warn(element, EventFault::unsorted, buffer);
 }

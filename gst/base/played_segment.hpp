@@ -6,7 +6,7 @@
 #include <string>
 
 #include "gst/base/errors.hpp"
-#include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
 
 /// Segment of a SEGMENT event, which owns it.
 inline const GstSegment& segment_of(GstEvent* event) {

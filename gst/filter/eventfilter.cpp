@@ -7,6 +7,8 @@
 
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
+#include "gst/base/event_faults.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
 #include "gst/filter/buffer_events.hpp"

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "gst/base/authors.hpp"
-#include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/types.hpp"
 #include "gst/recording/frame_buffer.hpp"

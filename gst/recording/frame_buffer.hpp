@@ -3,7 +3,7 @@
 
 #include <gst/video/video.h>
 
-#include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
 #include "src/formats/recording_decoder.hpp"
 
 /// Caps of the video frames of recordings.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
 #include "gst/base/pads.hpp"
 
 using eventcamera::SensorSize;

@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-#include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
 #include "gst/base/event_pool.hpp"
 #include "gst/base/owned.hpp"
 #include "src/formats/recording_reader.hpp"

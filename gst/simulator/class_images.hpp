@@ -3,7 +3,7 @@
 
 #include <gst/video/video.h>
 
-#include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
 #include "gst/simulator/companion_pad.hpp"
 
 /// Caps of class images.

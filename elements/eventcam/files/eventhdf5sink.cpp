@@ -29,6 +29,7 @@
 
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
+#include "gst/base/event_caps.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"

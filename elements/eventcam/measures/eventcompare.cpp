@@ -55,6 +55,8 @@
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
+#include "gst/base/event_faults.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/sensor_size.hpp"
 #include "src/measure/stream_comparison.hpp"

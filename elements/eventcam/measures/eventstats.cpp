@@ -46,6 +46,8 @@
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
+#include "gst/base/event_faults.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
 #include "gst/eventcamera/eventcamera.h"

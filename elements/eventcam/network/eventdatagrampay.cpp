@@ -40,6 +40,8 @@
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/latency.hpp"
+#include "gst/base/event_caps.hpp"
+#include "gst/base/event_faults.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"

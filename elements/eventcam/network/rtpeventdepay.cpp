@@ -53,7 +53,7 @@
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
-#include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"

@@ -65,6 +65,8 @@
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
+#include "gst/base/event_faults.hpp"
 #include "gst/base/event_pool.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "gst/base/event_buffer.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/reader/event_reader.hpp"
 #include "gst/recording/sensor_events.hpp"

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/gst.h>
+
+#include <array>
+
+#include "gst/base/errors.hpp"
+#include "src/core/invalid_events.hpp"
+
+/// Reason for skipping events of a buffer.
+enum class EventFault { no_pts, pts_too_large, partial_event, beyond_sensor, unsorted };
+
+/// Why a buffer has no interval, or one that is too late for its use.
+inline EventFault interval_fault(GstBuffer* buffer) {
+  return GST_BUFFER_PTS_IS_VALID(buffer) ? EventFault::pts_too_large : EventFault::no_pts;
+}
+
+/// Posts warnings about events that an element skips, once per fault and stream.
+class EventFaults {
+ public:
+  /// `verb` is what the element does with events, such as "draw".
+  EventFaults(const char* verb, GstDebugCategory* category)
+      : verb_(verb),
+        warnings_{WarnOnce(category), WarnOnce(category), WarnOnce(category), WarnOnce(category),
+                  WarnOnce(category)} {}
+
+  void warn(gpointer element, EventFault fault, GstBuffer* buffer);
+  void warn(gpointer element, const eventcamera::InvalidEvents& invalid, GstBuffer* buffer);
+
+  /// For a new stream: warnings are posted again.
+  void reset() {
+    for (auto& warning : warnings_) warning.reset();
+  }
+
+ private:
+  const char* verb_;
+  std::array<WarnOnce, 5> warnings_;  ///< one per EventFault
+};
