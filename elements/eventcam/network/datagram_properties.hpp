@@ -9,11 +9,6 @@
 #include "gst/base/types.hpp"
 #include "src/wire/datagram_settings.hpp"
 
-/// Caps of datagrams of other tools.
-#define DATAGRAM_CAPS                                                         \
-  "application/x-event-datagram, format = (string) { spif, spif-timestamps, " \
-  "t64-x16-y16-on8, t32-x16-y15-on1, es, jaer }"
-
 inline GType datagram_format_type() {
   using eventcamera::DatagramFormat;
   static const GEnumValue values[] = {
@@ -68,13 +63,3 @@ void add_datagram_properties(Properties<settings_of>& properties) {
                            "Datagrams of jAER start with a sequence number, which reveals losses",
                            defaults.has_sequence_number, mutable_ready_flags));
 }
-
-/// Counts of datagrams. Losses are known only if datagrams have a sequence number.
-struct DatagramCounts {
-  guint64 packets = 0;
-  guint64 events = 0;
-  guint64 bytes = 0;
-  guint64 lost = 0;
-  guint64 late = 0;
-  guint64 rejected = 0;
-};

@@ -44,6 +44,7 @@
 #include <vector>
 
 #include "elements/eventcam/network/current_sender.hpp"
+#include "elements/eventcam/network/datagram_counts.hpp"
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"

@@ -32,6 +32,7 @@
 #include <tuple>
 #include <vector>
 
+#include "elements/eventcam/network/datagram_counts.hpp"
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "elements/eventcam/network/flush_timer.hpp"
 #include "elements/eventcam/network/max_latency.hpp"
@@ -39,9 +40,9 @@
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/latency.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/event_faults.hpp"
+#include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
@@ -49,6 +50,11 @@
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_pay_debug);
 #define GST_CAT_DEFAULT event_datagram_pay_debug
+
+/// Caps of datagrams of other tools.
+#define DATAGRAM_CAPS                                                         \
+  "application/x-event-datagram, format = (string) { spif, spif-timestamps, " \
+  "t64-x16-y16-on8, t32-x16-y15-on1, es, jaer }"
 
 using eventcamera::AbsoluteEvent;
 using eventcamera::Datagram;
