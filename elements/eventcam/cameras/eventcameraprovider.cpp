@@ -5,10 +5,10 @@
 #include <string>
 
 #include "elements/eventcam/cameras/video_devices.hpp"
-#include "elements/eventcam/files/evtformat.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/eventcamera/eventcamera.h"
+#include "gst/recording/evt_caps.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_camera_provider_debug);
 #define GST_CAT_DEFAULT event_camera_provider_debug

@@ -51,7 +51,6 @@
 #include <utility>
 #include <vector>
 
-#include "elements/eventcam/files/evtformat.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
@@ -64,6 +63,7 @@
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
+#include "gst/recording/evt_caps.hpp"
 #include "src/camera/arrival_clock.hpp"
 #include "src/camera/event_camera.hpp"
 #include "src/formats/chunker.hpp"

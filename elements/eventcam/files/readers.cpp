@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// The elements that read event files: a table of formats for GstEventReader.
 #include "elements/eventcam/files/es_origin.hpp"
-#include "elements/eventcam/files/evtformat.hpp"
 #include "features.hpp"
 #include "gst/recording/eventreader.hpp"
+#include "gst/recording/evt_caps.hpp"
 #include "src/formats/atis/atis_bin.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/es/es.hpp"

@@ -3,10 +3,10 @@
 #include <vector>
 
 #include "elements/eventcam/files/es_origin.hpp"
-#include "elements/eventcam/files/evtformat.hpp"
 #include "features.hpp"
 #include "gst/base/types.hpp"
 #include "gst/recording/eventwriter.hpp"
+#include "gst/recording/evt_caps.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/es/es.hpp"
 #include "src/formats/evt/raw.hpp"
