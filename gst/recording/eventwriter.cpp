@@ -2,7 +2,6 @@
 #include "gst/recording/eventwriter.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -13,6 +12,7 @@
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
@@ -34,7 +34,13 @@ using eventcamera::WaitingItems;
 
 namespace {
 
-/// Alignment of words, which never straddle multiples of it, bytes.
+/// User-settable values.
+struct Settings {
+  EventFileFormat::Choice choice;
+  guint mtu = G_MAXUINT;
+};
+
+/// Alignment of words in bytes; none crosses a multiple of it.
 constexpr std::size_t word_bytes = 8;
 
 /// Maximum bytes per event, including time words.
@@ -58,9 +64,7 @@ struct GstEventWriterPrivate {
   explicit GstEventWriterPrivate(GstElement* self)
       : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_ENCODE) {}
 
-  std::atomic<int> variant = 0;
-  std::atomic<int> compression = 0;
-  std::atomic<guint> mtu = G_MAXUINT;
+  Guarded<Settings> settings;
   GstPad* sink = nullptr;
   GstPad* src = nullptr;
 
@@ -87,6 +91,10 @@ static GstEventWriterPrivate& priv_of(GstEventWriter* self) {
   return *static_cast<GstEventWriterPrivate*>(gst_event_writer_get_instance_private(self));
 }
 
+static Guarded<Settings>& settings_of(GObject* object) {
+  return priv_of(GST_EVENT_WRITER(object)).settings;
+}
+
 static const EventFileFormat& format_of(GstEventWriter* self) {
   return *GST_EVENT_WRITER_GET_CLASS(self)->format;
 }
@@ -109,8 +117,8 @@ static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, Own
   auto& priv = priv_of(self);
   priv.bytes.clear();
   priv.writable.begin_file({info.width, info.height});
-  auto encoder = format_of(self).create({info.width, info.height}, {priv.variant, priv.compression},
-                                        caps.get());
+  auto encoder =
+      format_of(self).create({info.width, info.height}, priv.settings.copy().choice, caps.get());
   encoder->encode({}, priv.bytes);
   OwnedBuffer header;
   if (!priv.bytes.empty()) {
@@ -131,7 +139,7 @@ static GstFlowReturn negotiate(GstEventWriter* self, const GstEventCameraInfo& i
   if (caps == nullptr) caps = gst_pad_get_pad_template_caps(priv.src);
   if (!gst_caps_is_empty(caps)) {
     caps = gst_caps_truncate(caps);
-    if (fixate != nullptr) caps = fixate(info, priv.variant, caps);
+    if (fixate != nullptr) caps = fixate(info, priv.settings.copy().choice.variant, caps);
   }
   OwnedCaps fixed(caps);
   if (!gst_caps_is_fixed(fixed.get())) return GST_FLOW_NOT_NEGOTIATED;
@@ -174,8 +182,8 @@ static gboolean sink_query(GstPad* pad, GstObject* parent, GstQuery* query) {
 /* data */
 
 /// Maximum bytes per buffer.
-static std::size_t capacity(GstEventWriter* self) {
-  return priv_of(self).mtu / word_bytes * word_bytes;
+static std::size_t capacity(guint mtu) {
+  return mtu / word_bytes * word_bytes;
 }
 
 static GstFlowReturn push_header(GstEventWriter* self, GstClockTime pts) {
@@ -192,10 +200,11 @@ static GstFlowReturn push_header(GstEventWriter* self, GstClockTime pts) {
 /// the last has a duration, because the interval continues after the others. May throw.
 static GstFlowReturn push_bytes(GstEventWriter* self, GstClockTime pts, GstClockTime duration) {
   auto& priv = priv_of(self);
+  const auto room = capacity(priv.settings.copy().mtu);
   std::span<const guint8> bytes = priv.bytes;
   GstFlowReturn result = GST_FLOW_OK;
   while (!bytes.empty() && result == GST_FLOW_OK) {
-    const auto piece = bytes.first(std::min(bytes.size(), capacity(self)));
+    const auto piece = bytes.first(std::min(bytes.size(), room));
     bytes = bytes.subspan(piece.size());
     GstBuffer* const buffer = copied_buffer(std::as_bytes(piece));
     GST_BUFFER_PTS(buffer) = pts;
@@ -224,9 +233,10 @@ static std::size_t count_that_fits(std::span<const AbsoluteEvent> events, std::s
 static GstFlowReturn encode(GstEventWriter* self, std::span<const AbsoluteEvent> events,
                             GstClockTime& start) {
   auto& priv = priv_of(self);
-  const auto room = capacity(self);
+  const auto mtu = priv.settings.copy().mtu;
+  const auto room = capacity(mtu);
   while (!events.empty()) {
-    const auto count = priv.mtu == G_MAXUINT
+    const auto count = mtu == G_MAXUINT
                            ? events.size()
                            : count_that_fits(events, room - std::min(room, priv.bytes.size()));
     if (count == 0) {
@@ -290,7 +300,7 @@ static void warn_of_pauses(GstEventWriter* self, bool at_end) {
                       : "Left out pauses of " + seconds + " in total, which are") +
            " too long for this format: later timestamps are shifted back by that much. Write "
            "AEDAT4, HDF5, NumPy or text to keep them."},
-      "the clock of the format cannot tell " + std::to_string(left_out) + " us");
+      "the clock of the format cannot represent " + std::to_string(left_out) + " us");
 }
 
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
@@ -460,13 +470,19 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 
 /* type */
 
+static EventFileFormat::Choice default_choice(const EventFileFormat& format) {
+  EventFileFormat::Choice choice;
+  if (format.variants != nullptr) choice.variant = format.variants->default_value;
+  if (format.compressions != nullptr) choice.compression = format.compressions->default_value;
+  return choice;
+}
+
 /// Creates the pads here, because the format is not yet known in init.
 static void constructed(GObject* object) {
   auto* element = GST_ELEMENT(object);
   auto& priv = priv_of(GST_EVENT_WRITER(object));
   const auto& format = format_of(GST_EVENT_WRITER(object));
-  if (format.variants != nullptr) priv.variant = format.variants->default_value;
-  if (format.compressions != nullptr) priv.compression = format.compressions->default_value;
+  priv.settings.lock()->choice = default_choice(format);
   priv.sink = add_pad(element, "sink");
   gst_pad_set_chain_function(priv.sink, chain);
   gst_pad_set_event_function(priv.sink, sink_event);
@@ -492,37 +508,26 @@ static void gst_event_writer_class_init(GstEventWriterClass* klass) {
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_WRITER, static_cast<GstPluginAPIFlags>(0));
 }
 
-/// Installs the enum property that is stored in `choice`.
-template <std::atomic<int> GstEventWriterPrivate::*choice>
-static void install_choice(GObjectClass* klass, const EventFileFormat::Variants& variants) {
-  install_property(klass,
-                   {[](GObject* object, const GValue* value) {
-                      priv_of(GST_EVENT_WRITER(object)).*choice = g_value_get_enum(value);
-                    },
-                    [](GObject* object, GValue* value) {
-                      g_value_set_enum(value, priv_of(GST_EVENT_WRITER(object)).*choice);
-                    }},
-                   g_param_spec_enum(variants.property, variants.nick, variants.blurb,
-                                     variants.type(), variants.default_value, mutable_ready_flags));
+/// Specification of the enum property that selects a variant.
+static GParamSpec* spec_of(const EventFileFormat::Variants& variants) {
+  return g_param_spec_enum(variants.property, variants.nick, variants.blurb, variants.type(),
+                           variants.default_value, mutable_ready_flags);
 }
 
 static void format_class_init(gpointer klass, gpointer data) {
   const auto& format = *static_cast<const EventFileFormat*>(data);
   GST_EVENT_WRITER_CLASS(klass)->format = &format;
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  Properties<settings_of> properties(object_class);
   if (format.variants != nullptr)
-    install_choice<&GstEventWriterPrivate::variant>(object_class, *format.variants);
+    properties.add([](Settings& settings) -> int& { return settings.choice.variant; },
+                   spec_of(*format.variants));
   if (format.compressions != nullptr)
-    install_choice<&GstEventWriterPrivate::compression>(object_class, *format.compressions);
+    properties.add([](Settings& settings) -> int& { return settings.choice.compression; },
+                   spec_of(*format.compressions));
   if (format.has_words)
-    install_property(
-        object_class,
-        {[](GObject* object, const GValue* value) {
-           priv_of(GST_EVENT_WRITER(object)).mtu = g_value_get_uint(value);
-         },
-         [](GObject* object, GValue* value) {
-           g_value_set_uint(value, priv_of(GST_EVENT_WRITER(object)).mtu);
-         }},
+    properties.add(
+        &Settings::mtu,
         g_param_spec_uint("mtu", "MTU",
                           "Maximum size of a buffer of words in bytes, such as the payload of a "
                           "network packet; words are never split",

@@ -17,14 +17,12 @@
 #include "gst/base/owned.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/seek_request.hpp"
-#include "gst/recording/eventreader.hpp"
 #include "gst/recording/pad_bytes.hpp"
 #include "gst/recording/reader_pad.hpp"
+#include "gst/recording/recording_format.hpp"
 #include "src/formats/recording_reader.hpp"
 
 GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
-
-inline constexpr GstClockTime default_buffer_duration = 10 * GST_MSECOND;
 
 /// Returned by step() if no output is available.
 inline constexpr GstFlowReturn nothing_ready = GST_FLOW_CUSTOM_SUCCESS;
@@ -41,6 +39,11 @@ inline std::optional<eventcamera::Microseconds> stop_of(const GstSegment& segmen
   if (!GST_CLOCK_TIME_IS_VALID(segment.stop)) return std::nullopt;
   return static_cast<eventcamera::Microseconds>((segment.stop + GST_USECOND - 1) / GST_USECOND);
 }
+
+/// User-settable values of every reader, read at the start of a file.
+struct ReaderSettings {
+  GstClockTime buffer_duration = 10 * GST_MSECOND;
+};
 
 /// A seek that upstream was asked for.
 struct Restart {
@@ -59,8 +62,7 @@ class EventReader {
   EventReader(const EventReader&) = delete;
   EventReader& operator=(const EventReader&) = delete;
 
-  void set_buffer_duration(GstClockTime time) { shared_.lock()->buffer_duration = time; }
-  GstClockTime buffer_duration() { return shared_.lock()->buffer_duration; }
+  Guarded<ReaderSettings>& settings() { return settings_; }
   Guarded<FormatSettings>& format_settings() { return format_settings_; }
   GstStructure* stats();
 
@@ -78,7 +80,6 @@ class EventReader {
   struct Shared {
     Shared() { gst_segment_init(&segment, GST_FORMAT_TIME); }
 
-    GstClockTime buffer_duration = default_buffer_duration;
     GstSegment segment = {};  ///< relative to the origin; its position is that of the output
     GstClockTime duration = GST_CLOCK_TIME_NONE;
     bool is_duration_exact = false;
@@ -155,6 +156,7 @@ class EventReader {
   const RecordingFormat& format_;
 
   Guarded<Shared> shared_;
+  Guarded<ReaderSettings> settings_;
   Guarded<FormatSettings> format_settings_;
 
   // Accessed under the sink pad's stream lock only, or while there is no streaming thread.
@@ -181,10 +183,11 @@ class EventReader {
 };
 
 /// The reader of an element.
-EventReader& event_reader_of(gpointer element);
+EventReader& event_reader_of(GstObject* element);
 
-/// decodebin drops errors of an element that it is still adding, which it shows by a locked state,
-/// and then waits for the element's pads for ever. An application may lock the state for longer.
+/// Waits while decodebin adds the element, which it shows by a locked state: it would drop errors,
+/// and then wait for the element's pads forever. Gives up after a second, since an application may
+/// lock the state for longer.
 void wait_until_added(GstElement* element);
 
 /// Report of source pads that no element is linked to.

@@ -134,7 +134,7 @@ GstClockTime EventReader::duration() {
 gboolean EventReader::src_query(GstPad* pad, GstQuery* query) {
   GstFormat format = GST_FORMAT_UNDEFINED;
   if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(GST_CAT_DEFAULT, sink_, query, buffer_duration()) ||
+    return answer_latency(GST_CAT_DEFAULT, sink_, query, settings_.copy().buffer_duration) ||
            gst_pad_query_default(pad, GST_OBJECT(element_), query);
   if (is_timed()) return gst_pad_query_default(pad, GST_OBJECT(element_), query);
   switch (GST_QUERY_TYPE(query)) {
