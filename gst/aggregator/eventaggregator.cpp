@@ -108,12 +108,12 @@ struct EventAggregatorFunctions {
   }
 
   static void forget_segment_ends(EventAggregator& self) {
-    for (const auto& pad : sink_pads(self.element_)) forget_segment_end(pad.get());
+    for_each_sink_pad(self.element_, forget_segment_end);
     self.segment_ended_ = false;
   }
 
   /// At the end of the output: EOS, or SEGMENT_DONE once all pads have reached the end of their
-  /// segments.
+  /// segments. May throw.
   static GstFlowReturn end(EventAggregator& self) {
     const auto pads = sink_pads(self.element_);
     OwnedEvent done;
@@ -147,14 +147,14 @@ struct EventAggregatorFunctions {
   static GstFlowReturn aggregate(GstAggregator* element, gboolean timed_out) {
     auto& self = of(element);
     if (timed_out) GST_LOG_OBJECT(element, "deadline passed; continuing without further input");
-    const auto result = self.segment_ended_
-                            ? GST_FLOW_EOS
-                            : guard(self, [&] { return self.aggregate(timed_out != FALSE); });
-    // GstAggregator sends the segment, which precedes tags, with the first buffer.
-    if (has_segment(GST_AGGREGATOR_SRC_PAD(element)))
-      for (auto& tags : std::exchange(self.tags_, {}))
-        gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(element), tags.release());
-    return result == GST_FLOW_EOS ? end(self) : result;
+    return guard(self, [&] {
+      const auto result = self.segment_ended_ ? GST_FLOW_EOS : self.aggregate(timed_out != FALSE);
+      // GstAggregator sends the segment, which precedes tags, with the first buffer.
+      if (has_segment(GST_AGGREGATOR_SRC_PAD(element)))
+        for (auto& tags : std::exchange(self.tags_, {}))
+          gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(element), tags.release());
+      return result == GST_FLOW_EOS ? end(self) : result;
+    });
   }
 
   static GstClockTime get_next_time(GstAggregator* element) {

@@ -45,7 +45,7 @@ class EventAggregator {
   /// Drops all pending events, because the next input is discontinuous. May throw.
   virtual void flush() = 0;
   /// Frees as much memory as possible, after an allocation failed.
-  virtual void release_memory() { flush(); }
+  virtual void release_memory() noexcept = 0;
 
   /// Returns false to reject `caps`. May throw.
   virtual bool take_caps(GstAggregatorPad* pad, GstCaps* caps) = 0;

@@ -21,3 +21,13 @@ inline std::vector<OwnedAggregatorPad> sink_pads(gpointer element) {
   GST_OBJECT_UNLOCK(element);
   return pads;
 }
+
+/// Calls `work`, which must not throw, with each sink pad of an element.
+template <class Work>
+void for_each_sink_pad(gpointer element, Work work) noexcept {
+  const auto call = [](GstElement*, GstPad* pad, gpointer to) -> gboolean {
+    (*static_cast<Work*>(to))(GST_AGGREGATOR_PAD(pad));
+    return TRUE;
+  };
+  gst_element_foreach_sink_pad(GST_ELEMENT(element), call, &work);
+}

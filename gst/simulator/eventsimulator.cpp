@@ -525,7 +525,7 @@ static void start_timeline(GstEventSimulator* self) {
   auto& state = priv_of(self).state;
   if (state) state->frames->drop();
   priv_of(self).stream.flow = GST_FLOW_OK;
-  start_over(self);
+  reported(self, [&] { start_over(self); });
   priv_of(self).stream.continuation = {};
   for (auto* companion : companions_of(self)) companion->begin();
   priv_of(self).stream.clock.start_over();

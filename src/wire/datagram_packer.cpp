@@ -28,6 +28,10 @@ class PackerOf final : public DatagramPacker {
   void flush(const Send& send) override {
     if (count_ == 0) return;
     send({bytes_.bytes(), count_, first_, last_});
+    drop();
+  }
+
+  void drop() noexcept override {
     bytes_.clear();
     count_ = 0;
   }

@@ -39,6 +39,9 @@ class DatagramPacker {
   /// Sends the incomplete datagram, if any.
   virtual void flush(const Send& send) = 0;
 
+  /// Drops the incomplete datagram, if any.
+  virtual void drop() noexcept = 0;
+
   /// Time of the first event of the incomplete datagram, if any.
   virtual std::optional<Microseconds> waiting_since() const = 0;
 

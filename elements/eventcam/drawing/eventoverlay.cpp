@@ -58,7 +58,8 @@ class EventOverlay final : public EventAggregator {
       : EventAggregator(element, {.verb = "draw", .main_pad = "video_sink"}) {}
 
   void stop() override;
-  void flush() override;
+  void flush() noexcept override;
+  void release_memory() noexcept override { flush(); }
   bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
@@ -253,7 +254,7 @@ bool EventOverlay::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
   return pad == main_pad() ? take_video_caps(caps) : take_event_caps(caps);
 }
 
-void EventOverlay::flush() {
+void EventOverlay::flush() noexcept {
   overlay_.reset();
   taken_ = 0;
   known_ = 0;

@@ -125,7 +125,7 @@ class EventRender final : public EventAggregator {
 
   void stop() override;
   void flush() override;
-  void release_memory() override { state_.reset(); }
+  void release_memory() noexcept override { state_.reset(); }
   bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   void take_segment(const GstSegment& segment) override;
   GstFlowReturn aggregate(bool timed_out) override;

@@ -98,7 +98,8 @@ class EventMerge final : public EventAggregator {
   }
 
   void stop() override;
-  void flush() override;
+  void flush() noexcept override;
+  void release_memory() noexcept override { flush(); }
   bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
@@ -398,12 +399,13 @@ GstFlowReturn EventMerge::choose_caps(GstCaps* downstream, GstCaps** result) {
   return GST_FLOW_NOT_NEGOTIATED;
 }
 
-void EventMerge::flush() {
-  for (const auto& pad : numbered_pads(element())) {
-    stream_of(pad).input.unload();
-    stream_of(pad).loaded.reset();
-    stream_of(pad).discontinuous = false;
-  }
+void EventMerge::flush() noexcept {
+  for_each_sink_pad(element(), [](GstAggregatorPad* pad) {
+    auto& stream = *GST_EVENT_MERGE_PAD(pad)->priv;
+    stream.input.unload();
+    stream.loaded.reset();
+    stream.discontinuous = false;
+  });
   merger_.restart();
   segment_chosen_ = false;
   discontinuous_ = true;

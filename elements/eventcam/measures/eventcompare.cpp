@@ -85,7 +85,8 @@ class EventCompare final : public EventAggregator {
 
   bool start() override { return can_report(element(), settings.copy()); }
   void stop() override;
-  void flush() override { comparison_.reset(); }
+  void flush() noexcept override { comparison_.reset(); }
+  void release_memory() noexcept override { flush(); }
   bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
 

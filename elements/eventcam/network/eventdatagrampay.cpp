@@ -170,6 +170,13 @@ static GstFlowReturn flush(GstEventDatagramPay* self) {
   return pack(self, [](DatagramPacker& packer, const auto& send) { packer.flush(send); });
 }
 
+/// Drops the events that wait.
+static void drop(Private& priv) noexcept {
+  if (priv.packer) priv.packer->drop();
+  priv.timed.reset();
+  priv.timer.cancel();
+}
+
 /// Sends events that have waited for max-latency.
 static void flush_late(GstObject* element) {
   GST_LOG_OBJECT(element, "max-latency elapsed: sending an incomplete datagram");
@@ -283,8 +290,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       break;
     case GST_EVENT_FLUSH_STOP:
       GST_DEBUG_OBJECT(pad, "flushed: dropping events that wait");
-      if (self->priv->packer) self->priv->packer->flush([](const Datagram&) {});
-      set_timer(*self->priv);
+      drop(*self->priv);
       break;
     default:
       break;
