@@ -217,6 +217,24 @@ TEST(AedatMux, EndsASegmentOnceBothInputsHave) {
   EXPECT_EQ(content.pictures.size(), 2U);
 }
 
+/// Pads come and go while another thread writes the header.
+TEST(AedatMux, TakesNoPadOnceTheHeaderIsWritten) {
+  Mux mux;
+  const auto request_pad = [&] {
+    GstPad* const pad = gst_element_request_pad_simple(mux.element(), "video_%u");
+    if (pad == nullptr) return false;
+    gst_element_release_request_pad(mux.element(), pad);
+    gst_object_unref(pad);
+    return true;
+  };
+  EXPECT_EQ(mux.push(GST_SECOND, {{0, 1, 2}}), GST_FLOW_OK);
+  while (request_pad()) continue;
+  EXPECT_TRUE(Buffer(gst_harness_pull(mux.get())));  // the header
+  EXPECT_FALSE(request_pad());
+  flush({mux.get()});
+  EXPECT_TRUE(request_pad());
+}
+
 TEST(AedatMux, EndsInAnErrorOnAFullDisk) {
   Pipeline pipeline(
       "videotestsrc pattern=snow num-buffers=20 ! video/x-raw,format=GRAY8,width=64,height=48 ! "

@@ -30,6 +30,7 @@
 #include <gst/base/gstaggregator.h>
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <span>
@@ -104,6 +105,7 @@ struct GstAedatMuxPrivate {
       : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_MUX) {}
 
   Guarded<Settings> settings;
+  std::atomic<bool> has_header = false;  ///< no pads can be added
 
   // Accessed by the streaming thread only, or while there is none.
   State state;
@@ -244,6 +246,7 @@ static void send_segment(GstAedatMux* self, guint64 position) {
 
 /// Writes the header. May throw.
 static GstFlowReturn begin_file(GstAedatMux* self) {
+  self->priv->has_header = true;
   State& state = self->priv->state;
   eventcamera::Aedat4Settings settings;
   settings.size = state.size;
@@ -565,7 +568,7 @@ static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplat
                                         const gchar* wanted, const GstCaps* caps) {
   auto* self = GST_AEDAT_MUX(aggregator);
   const std::string_view kind = GST_PAD_TEMPLATE_NAME_TEMPLATE(templ);
-  if (GST_STATE(self) > GST_STATE_READY && self->priv->state.encoder) {
+  if (self->priv->has_header) {
     GST_WARNING_OBJECT(self, "the header is already written, without a stream for pad %s",
                        kind.data());
     return nullptr;
@@ -592,6 +595,7 @@ static gboolean stop(GstAggregator* aggregator) {
   auto* priv = GST_AEDAT_MUX(aggregator)->priv;
   if (priv->state.encoder) priv->writable.end_file();
   priv->state = State();
+  priv->has_header = false;
   take_segment_ends(GST_AEDAT_MUX(aggregator));
   return TRUE;
 }
@@ -600,6 +604,7 @@ static gboolean stop(GstAggregator* aggregator) {
 static GstFlowReturn flush(GstAggregator* aggregator) {
   State& state = GST_AEDAT_MUX(aggregator)->priv->state;
   GST_DEBUG_OBJECT(aggregator, "flushed: beginning a new file");
+  GST_AEDAT_MUX(aggregator)->priv->has_header = false;
   state.encoder.reset();
   state.triggers.reset();
   state.imu_samples.reset();
