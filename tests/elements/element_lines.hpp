@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <ctime>
 #include <string>
 #include <vector>
 
@@ -173,10 +174,18 @@ inline Owned<GstElement> launched(const std::string& line) {
   return pipeline;
 }
 
+/// Waits for a message, as long as the process works: gives up once it has hardly run for a minute,
+/// or has run for one. Under load, time passes without it.
 inline Owned<GstMessage> wait_for(GstElement* pipeline, int types) {
+  constexpr std::clock_t hardly = CLOCKS_PER_SEC / 100;
   const Owned<GstBus> bus(gst_element_get_bus(pipeline));
-  return Owned<GstMessage>(
-      gst_bus_timed_pop_filtered(bus.get(), 60 * GST_SECOND, static_cast<GstMessageType>(types)));
+  const std::clock_t end = std::clock() + 60 * CLOCKS_PER_SEC;
+  Owned<GstMessage> message;
+  for (auto before = std::clock() - hardly, now = std::clock();
+       !message && now >= before + hardly && now < end; before = now, now = std::clock())
+    message.reset(
+        gst_bus_timed_pop_filtered(bus.get(), 60 * GST_SECOND, static_cast<GstMessageType>(types)));
+  return message;
 }
 
 }  // namespace element_lines
