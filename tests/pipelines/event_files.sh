@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Event files as users handle them: converted, inspected, and played.
+# Event files as users handle them: converted, inspected, and played. No command takes ten seconds, but a
+# machine under load may take so much longer.
 set -eu
 source "$SOURCE/tests/pipelines/scratch_folder.sh"
 
 convert() {
   echo "event-convert $*"
-  timeout 60 "$BUILD/pipelines/event-convert" "$@"
+  timeout 600 "$BUILD/pipelines/event-convert" "$@"
 }
 
 declare -A types=([raw]=application/x-prophesee-raw [dat]=application/x-prophesee-dat
@@ -14,7 +15,7 @@ declare -A types=([raw]=application/x-prophesee-raw [dat]=application/x-prophese
   [npz]=application/x-npz [aedat4]=application/x-aedat [h5]=application/x-hdf5 [hdf5]=application/x-hdf5
   [mcap]=application/x-mcap)
 
-timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc format=EVT3 ! filesink location=ball.raw
+timeout 600 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc format=EVT3 ! filesink location=ball.raw
 
 # To each format and from there to text without a sensor size: the same events.
 convert ball.raw ball.csv
@@ -76,7 +77,7 @@ grep -aq "geometry 500x400" sized.raw || fail "the size is not the one that was 
 # The size of the sensor comes back from a NumPy archive, which a pipe can hold.
 convert ball.npz npz.raw
 grep -aq "geometry 320x240" npz.raw || fail "the size is not that of the sensor: $(grep -a geometry npz.raw)"
-timeout 60 "$GST_LAUNCH" -q filesrc location=ball.raw ! evtdec ! eventnpzenc ! fdsink | cmp ball.npz - || fail "a pipe has another archive"
+timeout 600 "$GST_LAUNCH" -q filesrc location=ball.raw ! evtdec ! eventnpzenc ! fdsink | cmp ball.npz - || fail "a pipe has another archive"
 
 # Text and NumPy of other tools.
 convert --format=esim ball.raw esim.csv
@@ -99,7 +100,7 @@ for file in columns.npz rows.npz rows.npy; do
   cmp ball.csv numpy.csv || fail "$file has other events"
   gst-typefind-1.0 $file | grep -q " - application/x-${file##*.}" || fail "$file is not recognised"
 done
-timeout 60 "$GST_LAUNCH" -q filesrc location=rows.npz ! queue ! decodebin caps="application/x-event-camera,format=XYTP" ! eventcsvenc ! filesink location=pushed.csv
+timeout 600 "$GST_LAUNCH" -q filesrc location=rows.npz ! queue ! decodebin caps="application/x-event-camera,format=XYTP" ! eventcsvenc ! filesink location=pushed.csv
 cmp ball.csv pushed.csv || fail "rows.npz has other events in push mode"
 
 # Options of the formats.
@@ -110,13 +111,16 @@ convert --compression=none ball.raw plain.aedat4
 convert --format=rpg ball.raw rpg.csv
 cmp ball.txt rpg.csv || fail "the format is not that of .txt"
 
-# h5py and eventhdf5dec read what eventhdf5sink wrote before it was killed, up to the last second.
-# The 20 s that the events may take to get there bear any load.
+# h5py and eventhdf5dec read what eventhdf5sink wrote before it was killed, up to the last second. It is
+# killed after a copy has events, however long a machine under load takes for them.
 for layout in dsec metavision; do
+  rm -f killed.h5
   "$GST_LAUNCH" -q videotestsrc pattern=ball is-live=true ! eventsim-diff ! eventhdf5sink format=$layout location=killed.h5 &
-  for _ in {1..200}; do
-    [ "$(stat -c %s killed.h5 2>/dev/null || echo 0)" -gt 20000 ] && break
+  for _ in {1..600}; do
     sleep 0.1
+    cp killed.h5 copy.h5 2>/dev/null || continue
+    "$BUILD/pipelines/event-convert" copy.h5 copy.csv >/dev/null 2>&1 || continue
+    [ "$(wc -l <copy.csv)" -gt 1000 ] && break
   done
   sleep 2
   kill -KILL $!
@@ -174,7 +178,7 @@ PYTHON
 gst-typefind-1.0 v2e.h5 | grep -q " - application/x-hdf5" || fail "v2e.h5 is not recognised"
 convert v2e.h5 v2e.csv
 cmp ball.csv v2e.csv || fail "v2e.h5 has other events"
-timeout 60 "$GST_LAUNCH" -q filesrc location=v2e.h5 ! queue ! eventhdf5dec ! eventcsvenc ! filesink location=pushed.csv
+timeout 600 "$GST_LAUNCH" -q filesrc location=v2e.h5 ! queue ! eventhdf5dec ! eventcsvenc ! filesink location=pushed.csv
 cmp ball.csv pushed.csv || fail "v2e.h5 has other events in push mode"
 
 # TUM-VIE's HDF5, whose times count from 0: whole, and a part, which its index finds.
@@ -202,14 +206,14 @@ cmp part.lines part.csv || fail "a part of tum-vie.h5 has other events"
 # Players and discoverer.
 for ending in "${!types[@]}"; do
   echo "ball.$ending is played"
-  timeout 60 "$GST_LAUNCH" -q filesrc location="ball.$ending" ! decodebin caps=application/x-event-camera ! fakesink sync=true
-  timeout 60 gst-discoverer-1.0 -v "ball.$ending" >discovered || fail "gst-discoverer-1.0 ball.$ending"
+  timeout 600 "$GST_LAUNCH" -q filesrc location="ball.$ending" ! decodebin caps=application/x-event-camera ! fakesink sync=true
+  timeout 600 gst-discoverer-1.0 -v "ball.$ending" >discovered || fail "gst-discoverer-1.0 ball.$ending"
   for found in application/x-event-camera "Duration: 0:00:01.9" "Seekable: yes"; do
     grep -q "$found" discovered || fail "gst-discoverer-1.0 ball.$ending: $found"
   done
   for player in gst-play-1.0 "gst-play-1.0 --use-playbin3"; do
     echo "$player ball.$ending"
-    timeout 60 $player -q --no-interactive --videosink=fakesink "ball.$ending" >played 2>&1 || fail "$player: $(cat played)"
+    timeout 600 $player -q --no-interactive --videosink=fakesink "ball.$ending" >played 2>&1 || fail "$player: $(cat played)"
     if grep ERROR played; then fail "$player ball.$ending"; fi
   done
 done
@@ -241,7 +245,7 @@ for bag in evt3.mcap:x-mcap evt3.bag:x-rosbag evt3.db3:x-rosbag2-db3; do
   grep -q "$file: note: The file also has topics /second/events" left-out || fail "nobody tells of /second/events in $file"
   convert "$file.aedat4" "$file.csv"
   cmp evt3.mcap.csv "$file.csv" || fail "$file has other events"
-  timeout 60 gst-play-1.0 -q --no-interactive --videosink=fakesink "$file" >played 2>&1 || fail "gst-play-1.0: $(cat played)"
+  timeout 600 gst-play-1.0 -q --no-interactive --videosink=fakesink "$file" >played 2>&1 || fail "gst-play-1.0: $(cat played)"
   if grep ERROR played; then fail "gst-play-1.0 $file"; fi
 done
 [ "$(wc -l <evt3.mcap.csv)" = 6001 ] || fail "evt3.mcap has $(wc -l <evt3.mcap.csv) lines"
@@ -266,23 +270,23 @@ for bag in late-*.bag late-*.mcap late-*.db3; do
 done
 
 # Frames come along where they can; what is left out is said.
-timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=framed.aedat4
+timeout 600 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=framed.aedat4
 convert framed.aedat4 framed.csv 2>left-out
 grep -q ": left out: 40 frames$" left-out || fail "frames are left out: $(cat left-out)"
-timeout 60 "$GST_LAUNCH" -m filesrc location=framed.aedat4 ! decodebin caps="application/x-event-camera,format=XYTP" expose-all-streams=false ! eventstats ! fakesink >messages
+timeout 600 "$GST_LAUNCH" -m filesrc location=framed.aedat4 ! decodebin caps="application/x-event-camera,format=XYTP" expose-all-streams=false ! eventstats ! fakesink >messages
 grep -q "cumulative=(boolean)true" messages || fail "the events of framed.aedat4 were not counted"
 if grep missing-plugin messages; then fail "decoders for frames are missing"; fi
 convert framed.aedat4 again.aedat4 2>left-out
 if grep "left out" left-out; then fail "frames are left out of an AEDAT 4 file"; fi
 for file in framed.aedat4 again.aedat4; do
-  timeout 60 "$GST_LAUNCH" -q filesrc location=$file ! aedatdemux name=d  d.video_0 ! queue ! filesink location=$file.frames
+  timeout 600 "$GST_LAUNCH" -q filesrc location=$file ! aedatdemux name=d  d.video_0 ! queue ! filesink location=$file.frames
 done
 cmp framed.aedat4.frames again.aedat4.frames || fail "again.aedat4 has other frames"
 convert again.aedat4 again.csv
 cmp framed.csv again.csv || fail "again.aedat4 has other events"
 
 # Of several streams of events, one is converted; the user is told.
-timeout 60 "$GST_LAUNCH" -q filesrc location=framed.aedat4 ! aedatdemux name=d  d.events_0 ! queue ! mux.  d.video_0 ! queue ! mux.  aedatmux name=mux compression=none ! fdsink >plain-framed.aedat4
+timeout 600 "$GST_LAUNCH" -q filesrc location=framed.aedat4 ! aedatdemux name=d  d.events_0 ! queue ! mux.  d.video_0 ! queue ! mux.  aedatmux name=mux compression=none ! fdsink >plain-framed.aedat4
 /usr/bin/python3 - plain-framed.aedat4 two.aedat4 <<'PYTHON'
 import struct
 import sys
@@ -308,7 +312,7 @@ grep -q "two.aedat4: warning: Only the first of 2 streams of events is converted
 cmp framed.csv two.csv || fail "two.csv has other events"
 
 # Labels come along where they can.
-timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=20 ! eventsim-dvs label=true ! eventnpzenc ! filesink location=labelled.npz
+timeout 600 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=20 ! eventsim-dvs label=true ! eventnpzenc ! filesink location=labelled.npz
 for ending in npz h5 csv; do
   format=()
   [ $ending = csv ] && format=(--format=labels)
@@ -331,7 +335,7 @@ for ending in "${!types[@]}"; do
 done
 convert --from=0.5 --to=1 framed.aedat4 part-framed.aedat4 2>left-out
 if grep "left out" left-out; then fail "frames of a part are left out"; fi
-timeout 60 "$GST_LAUNCH" -q filesrc location=part-framed.aedat4 ! aedatdemux name=d  d.video_0 ! queue ! filesink location=part.frames
+timeout 600 "$GST_LAUNCH" -q filesrc location=part-framed.aedat4 ! aedatdemux name=d  d.video_0 ! queue ! filesink location=part.frames
 [ "$(stat -c %s part.frames)" -eq $((12 * 320 * 240)) ] || fail "$(stat -c %s part.frames) bytes of 12 frames"
 
 # A region of the sensor, which becomes the sensor.
@@ -460,7 +464,7 @@ has_begun() { # PROCESS FILE: it has written 10 kB to the file, or keeps them in
   mapfile -t files < <(find "/proc/$1/fd" -lname "*/events-?????? (deleted)" 2>/dev/null)
   stat -L -c %s "$2" "${files[@]}" 2>/dev/null | awk '$1 >= 10000 { begun = 1 } END { exit !begun }'
 }
-timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=snow num-buffers=150 ! eventsim-frame ! evtenc ! filesink location=long.raw
+timeout 600 "$GST_LAUNCH" -q videotestsrc pattern=snow num-buffers=150 ! eventsim-frame ! evtenc ! filesink location=long.raw
 for ending in raw npy npz aedat4 h5 hdf5 mcap; do
   echo "event-convert long.raw interrupted.$ending"
   "$BUILD/pipelines/event-convert" long.raw "interrupted.$ending" 2>interruption &
@@ -477,8 +481,8 @@ done
 cp ball.aedat4 kept.aedat4
 "$BUILD/pipelines/event-convert" --compression=zstd-high long.raw kept.aedat4 2>interruption &
 converting=$!
-while [ "$(stat -c %s kept.aedat4.part 2>/dev/null || echo 0)" -lt 10000 ]; do sleep 0.01; done
-kill -INT $converting
+while kill -0 $converting && [ "$(stat -c %s kept.aedat4.part 2>/dev/null || echo 0)" -lt 10000 ]; do sleep 0.01; done
+kill -INT $converting || true
 if wait $converting; then fail "it was already done"; fi
 grep -q "interrupted: kept.aedat4 is unchanged; the events so far are in kept.aedat4.part" interruption ||
   fail "the user is told: $(cat interruption)"
