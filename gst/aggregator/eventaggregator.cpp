@@ -14,7 +14,7 @@ GST_DEBUG_CATEGORY_STATIC(event_aggregator_debug);
 #define GST_CAT_DEFAULT event_aggregator_debug
 
 struct GstEventAggregatorPrivate {
-  std::unique_ptr<EventAggregator> inside;
+  std::unique_ptr<EventAggregator> impl;
 };
 
 G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventAggregator, gst_event_aggregator, GST_TYPE_AGGREGATOR,
@@ -95,7 +95,7 @@ static void answer_caps_of_passed(GstAggregator* aggregator, GstAggregatorPad* p
 /// Virtual functions of GstAggregator.
 struct EventAggregatorFunctions {
   static EventAggregator& of(GstAggregator* element) {
-    return gst_event_aggregator_inside(GST_EVENT_AGGREGATOR(element));
+    return gst_event_aggregator_impl(GST_EVENT_AGGREGATOR(element));
   }
 
   template <class Work>
@@ -310,13 +310,13 @@ static GstEventAggregatorPrivate& priv_of(gpointer self) {
       gst_event_aggregator_get_instance_private(GST_EVENT_AGGREGATOR(self)));
 }
 
-void gst_event_aggregator_set_inside(GstEventAggregator* self,
-                                     std::unique_ptr<EventAggregator> inside) {
-  priv_of(self).inside = std::move(inside);
+void gst_event_aggregator_set_impl(GstEventAggregator* self,
+                                   std::unique_ptr<EventAggregator> impl) {
+  priv_of(self).impl = std::move(impl);
 }
 
-EventAggregator& gst_event_aggregator_inside(GstEventAggregator* self) {
-  return *priv_of(self).inside;
+EventAggregator& gst_event_aggregator_impl(GstEventAggregator* self) {
+  return *priv_of(self).impl;
 }
 
 void gst_event_aggregator_add_pads(GstEventAggregator* self) {

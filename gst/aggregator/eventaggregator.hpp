@@ -118,21 +118,20 @@ struct _GstEventAggregatorClass {
 /// Adds a sink pad per template of an always pad.
 void gst_event_aggregator_add_pads(GstEventAggregator* self);
 
-void gst_event_aggregator_set_inside(GstEventAggregator* self,
-                                     std::unique_ptr<EventAggregator> inside);
-EventAggregator& gst_event_aggregator_inside(GstEventAggregator* self);
+void gst_event_aggregator_set_impl(GstEventAggregator* self, std::unique_ptr<EventAggregator> impl);
+EventAggregator& gst_event_aggregator_impl(GstEventAggregator* self);
 
 /// For the init function of a subclass: creates its pads, then its EventAggregator.
-template <class Inside>
+template <class Impl>
 void gst_event_aggregator_make(GstEventAggregator* self) {
   gst_event_aggregator_add_pads(self);
-  gst_event_aggregator_set_inside(self, std::make_unique<Inside>(GST_AGGREGATOR(self)));
+  gst_event_aggregator_set_impl(self, std::make_unique<Impl>(GST_AGGREGATOR(self)));
 }
 
-/// Returns the EventAggregator of an element, of class `Inside`.
-template <class Inside>
-Inside& inside_of(gpointer element) {
-  return static_cast<Inside&>(gst_event_aggregator_inside(GST_EVENT_AGGREGATOR(element)));
+/// Returns the EventAggregator of an element, of class `Impl`.
+template <class Impl>
+Impl& aggregator_impl(gpointer element) {
+  return static_cast<Impl&>(gst_event_aggregator_impl(GST_EVENT_AGGREGATOR(element)));
 }
 
 /// For class_init: adds the template of an always pad.
@@ -142,9 +141,9 @@ inline void add_aggregator_pad_template(GstEventAggregatorClass* klass, const ch
                    GST_TYPE_AGGREGATOR_PAD);
 }
 
-/// Defines and registers the type of an element with an EventAggregator of class `Inside`, which
+/// Defines and registers the type of an element with an EventAggregator of class `Impl`, which
 /// must have a member `settings`. The type's class_init must follow.
-#define DEFINE_EVENT_AGGREGATOR(Type, type, OBJECT, Inside, element, rank, description)       \
+#define DEFINE_EVENT_AGGREGATOR(Type, type, OBJECT, Impl, element, rank, description)         \
   G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventAggregator)                           \
   struct _##Type {                                                                            \
     GstEventAggregator parent;                                                                \
@@ -154,8 +153,8 @@ inline void add_aggregator_pad_template(GstEventAggregatorClass* klass, const ch
   GST_ELEMENT_REGISTER_DEFINE(element, #element, rank, type##_get_type())                     \
   /* A type takes no parentheses: NOLINTNEXTLINE(bugprone-macro-parentheses) */               \
   static void type##_init(Type* self) {                                                       \
-    gst_event_aggregator_make<Inside>(GST_EVENT_AGGREGATOR(self));                            \
+    gst_event_aggregator_make<Impl>(GST_EVENT_AGGREGATOR(self));                              \
   }                                                                                           \
   static auto& settings_of(GObject* object) {                                                 \
-    return inside_of<Inside>(object).settings;                                                \
+    return aggregator_impl<Impl>(object).settings;                                            \
   }

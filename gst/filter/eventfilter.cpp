@@ -41,7 +41,7 @@ struct State {
 }  // namespace
 
 struct GstEventFilterPrivate {
-  std::unique_ptr<EventFilter> inside;
+  std::unique_ptr<EventFilter> impl;
   Guarded<Counters> counters;
 
   // Accessed by the streaming thread only, or while there is none.
@@ -60,12 +60,12 @@ static GstEventFilterPrivate& priv_of(gpointer self) {
       gst_event_filter_get_instance_private(GST_EVENT_FILTER(self)));
 }
 
-void gst_event_filter_set_inside(GstEventFilter* self, std::unique_ptr<EventFilter> inside) {
-  priv_of(self).inside = std::move(inside);
+void gst_event_filter_set_impl(GstEventFilter* self, std::unique_ptr<EventFilter> impl) {
+  priv_of(self).impl = std::move(impl);
 }
 
-EventFilter& gst_event_filter_inside(GstEventFilter* self) {
-  return *priv_of(self).inside;
+EventFilter& gst_event_filter_impl(GstEventFilter* self) {
+  return *priv_of(self).impl;
 }
 
 /// Runs `work`; reports any exception.
@@ -105,7 +105,7 @@ static Microseconds continued(gpointer self, LabelledEvents events, Microseconds
   if (overlap > 1) {
     GST_DEBUG_OBJECT(self, "time goes back by %" G_GINT64_FORMAT " us: forgetting the past",
                      gint64{overlap});
-    priv.inside->forget();
+    priv.impl->forget();
   } else if (overlap == 1) {
     ++start;
   }
@@ -132,7 +132,7 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
         all, priv.state->sensor, static_cast<guint32>(std::min(max_t, GstClockTime{G_MAXUINT32})),
         invalid);
     const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
-    const auto kept = priv.inside->filter(valid, continued(transform, valid, start));
+    const auto kept = priv.impl->filter(valid, continued(transform, valid, start));
     mapped.keep(kept.events.size());
 
     const auto received = all.events.size();
@@ -172,7 +172,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_events(transform, event, "filter"))
     return FALSE;
   if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && priv.state) {
-    reported(transform, [&] { priv.inside->forget(); });
+    reported(transform, [&] { priv.impl->forget(); });
     priv.state->passed = State{}.passed;
   }
   return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
@@ -194,7 +194,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
   priv.state.reset();
   return reported(transform,
                   [&] {
-                    priv.inside->start(sensor, output);
+                    priv.impl->start(sensor, output);
                     priv.state = State{.sensor = sensor, .output = output};
                   })
              ? TRUE
@@ -208,7 +208,7 @@ static gboolean start(GstBaseTransform* transform) {
 
 static gboolean stop(GstBaseTransform* transform) {
   auto& priv = priv_of(transform);
-  reported(transform, [&] { priv.inside->stop(); });
+  reported(transform, [&] { priv.impl->stop(); });
   priv.state.reset();
   priv.faults.reset();
   return TRUE;

@@ -77,28 +77,28 @@ struct _GstEventFilterClass {
   GstBaseTransformClass parent_class;
 };
 
-void gst_event_filter_set_inside(GstEventFilter* self, std::unique_ptr<EventFilter> inside);
-EventFilter& gst_event_filter_inside(GstEventFilter* self);
+void gst_event_filter_set_impl(GstEventFilter* self, std::unique_ptr<EventFilter> impl);
+EventFilter& gst_event_filter_impl(GstEventFilter* self);
 
-/// Returns the EventFilter of an element, of class `Inside`.
-template <class Inside>
-Inside& filter_inside(gpointer element) {
-  return static_cast<Inside&>(gst_event_filter_inside(GST_EVENT_FILTER(element)));
+/// Returns the EventFilter of an element, of class `Impl`.
+template <class Impl>
+Impl& filter_impl(gpointer element) {
+  return static_cast<Impl&>(gst_event_filter_impl(GST_EVENT_FILTER(element)));
 }
 
-/// Defines and registers the type of an element with an EventFilter of class `Inside`, which must
+/// Defines and registers the type of an element with an EventFilter of class `Impl`, which must
 /// have a member `settings`. The type's class_init must follow.
-#define DEFINE_EVENT_FILTER(Type, type, OBJECT, Inside, element)                     \
-  G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventFilter)                      \
-  struct _##Type {                                                                   \
-    GstEventFilter parent;                                                           \
-  };                                                                                 \
-  G_DEFINE_TYPE(Type, type, GST_TYPE_EVENT_FILTER)                                   \
-  GST_ELEMENT_REGISTER_DEFINE(element, #element, GST_RANK_NONE, type##_get_type())   \
-  /* A type takes no parentheses: NOLINTNEXTLINE(bugprone-macro-parentheses) */      \
-  static void type##_init(Type* self) {                                              \
-    gst_event_filter_set_inside(GST_EVENT_FILTER(self), std::make_unique<Inside>()); \
-  }                                                                                  \
-  static auto& settings_of(GObject* object) {                                        \
-    return filter_inside<Inside>(object).settings;                                   \
+#define DEFINE_EVENT_FILTER(Type, type, OBJECT, Impl, element)                     \
+  G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventFilter)                    \
+  struct _##Type {                                                                 \
+    GstEventFilter parent;                                                         \
+  };                                                                               \
+  G_DEFINE_TYPE(Type, type, GST_TYPE_EVENT_FILTER)                                 \
+  GST_ELEMENT_REGISTER_DEFINE(element, #element, GST_RANK_NONE, type##_get_type()) \
+  /* A type takes no parentheses: NOLINTNEXTLINE(bugprone-macro-parentheses) */    \
+  static void type##_init(Type* self) {                                            \
+    gst_event_filter_set_impl(GST_EVENT_FILTER(self), std::make_unique<Impl>());   \
+  }                                                                                \
+  static auto& settings_of(GObject* object) {                                      \
+    return filter_impl<Impl>(object).settings;                                     \
   }

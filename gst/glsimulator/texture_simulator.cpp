@@ -12,7 +12,7 @@
 
 #include "gst/base/owned.hpp"
 #include "gst/base/video_frame.hpp"
-#include "gst/glsimulator/later_look.hpp"
+#include "gst/glsimulator/finish_poll.hpp"
 #include "gst/glsimulator/mapped_texture.hpp"
 #include "gst/simulator/frame_luma.hpp"
 
@@ -71,7 +71,7 @@ class TextureVideoSimulator final : public VideoSimulator {
                         const GstVideoInfo& video, MakeGlSimulator make)
       : element_(element),
         shared_(shared),
-        later_look_(element),
+        finish_poll_(element),
         context_(static_cast<GstGLContext*>(gst_object_ref(context))),
         frame_{FrameLuma::format_of(video), 0, {}} {
     set_video(video);
@@ -139,12 +139,12 @@ class TextureVideoSimulator final : public VideoSimulator {
     if (is_ready)
       finish();
     else
-      later_look_.schedule();
+      finish_poll_.schedule();
   }
 
   void finish() override {
     if (!awaited_) return;
-    later_look_.cancel();
+    finish_poll_.cancel();
     auto [interval, is_drawn] = *std::exchange(awaited_, std::nullopt);
     const EventBuckets* events = nullptr;
     run([&] { events = simulator_->read(); });
@@ -152,7 +152,7 @@ class TextureVideoSimulator final : public VideoSimulator {
   }
 
   void drop() override {
-    later_look_.cancel();
+    finish_poll_.cancel();
     awaited_.reset();
     simulator_->drop();
   }
@@ -245,7 +245,7 @@ class TextureVideoSimulator final : public VideoSimulator {
 
   GstElement* element_;
   SharedContext& shared_;
-  LaterLook later_look_;
+  FinishPoll finish_poll_;
   std::optional<Awaited> awaited_;
   GstGLContext* context_;
   GstVideoInfo video_;

@@ -57,7 +57,7 @@ void Chunker::place(const AbsoluteEvent& event) {
     if (event.t >= ahead_.front().t - settled) {
       ahead_.push_back(event);
       // The clock continues from where it jumped to.
-      if (event.t - ahead_.front().t >= settled || ahead_.size() >= max_ahead) believe_ahead();
+      if (event.t - ahead_.front().t >= settled || ahead_.size() >= max_ahead) keep_ahead();
       return;
     }
     dropped_.stray += ahead_.size();
@@ -88,7 +88,7 @@ void Chunker::keep(const AbsoluteEvent& event) {
   latest_ = std::max(latest_, event.t);
 }
 
-void Chunker::believe_ahead() {
+void Chunker::keep_ahead() {
   if (!first_) {
     first_ = std::ranges::min_element(ahead_, {}, &AbsoluteEvent::t)->t;
     start_ = *first_;
@@ -99,16 +99,16 @@ void Chunker::believe_ahead() {
 
 void Chunker::reach(Microseconds t) {
   reached_ = std::max(reached_, std::clamp(t, -max_time, max_time));
-  if (!ahead_.empty() && ahead_.front().t < reached_ + settled) believe_ahead();
+  if (!ahead_.empty() && ahead_.front().t < reached_ + settled) keep_ahead();
 }
 
 void Chunker::pause(Microseconds t) {
-  if (!ahead_.empty() && ahead_.front().t < t) believe_ahead();
+  if (!ahead_.empty() && ahead_.front().t < t) keep_ahead();
   paused_ = true;
 }
 
 void Chunker::finish() {
-  if (!ahead_.empty()) believe_ahead();
+  if (!ahead_.empty()) keep_ahead();
   finished_ = true;
 }
 

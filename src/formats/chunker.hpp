@@ -92,7 +92,7 @@ class Chunker {
   void place(const AbsoluteEvent& event);
   void drop_early(const AbsoluteEvent& event);
   void keep(const AbsoluteEvent& event);
-  void believe_ahead();
+  void keep_ahead();
   Cell& cell_of(Microseconds t);
   Microseconds middle();
   static void sort(Cell& cell);
@@ -115,7 +115,7 @@ class Chunker {
   std::vector<Event> returned_;  ///< by the last next()
   std::vector<Label> returned_labels_;
   std::vector<std::vector<Event>> spare_;  ///< memory for further cells
-  std::vector<AbsoluteEvent> ahead_;       ///< far ahead of latest_: not yet trusted
+  std::vector<AbsoluteEvent> ahead_;       ///< far ahead of latest_: not kept yet
   Dropped dropped_;
 };
 

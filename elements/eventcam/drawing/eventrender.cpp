@@ -506,7 +506,7 @@ static void install_properties(GObjectClass* object_class) {
 static gboolean src_event(GstAggregator* element, GstEvent* event) {
   if (GST_EVENT_TYPE(event) != GST_EVENT_QOS)
     return GST_AGGREGATOR_CLASS(gst_event_render_parent_class)->src_event(element, event);
-  inside_of<EventRender>(element).qos.take_event(event);
+  aggregator_impl<EventRender>(element).qos.take_event(event);
   gst_event_unref(event);
   return TRUE;
 }
@@ -547,9 +547,9 @@ static void gst_event_render_class_init(GstEventRenderClass* klass) {
   aggregator_class->fixate_src_caps = fixate_src_caps;
   aggregator_class->decide_allocation = decide_allocation;
   aggregator_class->update_src_caps = [](GstAggregator* element, GstCaps* caps, GstCaps** result) {
-    return inside_of<EventRender>(element).choose_caps(caps, result);
+    return aggregator_impl<EventRender>(element).choose_caps(caps, result);
   };
   aggregator_class->negotiated_src_caps = [](GstAggregator* element, GstCaps* caps) -> gboolean {
-    return inside_of<EventRender>(element).set_video(caps);
+    return aggregator_impl<EventRender>(element).set_video(caps);
   };
 }

@@ -93,7 +93,7 @@ G_DEFINE_TYPE_WITH_CODE(GstEventFlip, gst_event_flip, GST_TYPE_EVENT_FILTER,
 GST_ELEMENT_REGISTER_DEFINE(eventflip, "eventflip", GST_RANK_NONE, gst_event_flip_get_type())
 
 static Guarded<Settings>& settings_of(GObject* object) {
-  return filter_inside<Flip>(object).settings;
+  return filter_impl<Flip>(object).settings;
 }
 
 static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection, GstCaps* caps,
@@ -114,7 +114,7 @@ static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection, Gst
 }
 
 static void gst_event_flip_init(GstEventFlip* self) {
-  gst_event_filter_set_inside(GST_EVENT_FILTER(self), std::make_unique<Flip>());
+  gst_event_filter_set_impl(GST_EVENT_FILTER(self), std::make_unique<Flip>());
 }
 
 static void gst_event_flip_class_init(GstEventFlipClass* klass) {

@@ -469,14 +469,14 @@ static GstPad* request_new_pad(GstElement* element, GstPadTemplate* pad_template
   GstPad* const pad = PARENT_ELEMENT_CLASS->request_new_pad(element, pad_template, name, caps);
   if (pad == nullptr) return nullptr;
   const auto position =
-      inside_of<EventMerge>(element).released.lock()->extract(GST_OBJECT_NAME(pad));
+      aggregator_impl<EventMerge>(element).released.lock()->extract(GST_OBJECT_NAME(pad));
   if (position) *GST_EVENT_MERGE_PAD(pad)->priv->position.lock() = position.mapped();
   gst_child_proxy_child_added(GST_CHILD_PROXY(element), G_OBJECT(pad), GST_OBJECT_NAME(pad));
   return pad;
 }
 
 static void release_pad(GstElement* element, GstPad* pad) {
-  (*inside_of<EventMerge>(element).released.lock())[GST_OBJECT_NAME(pad)] =
+  (*aggregator_impl<EventMerge>(element).released.lock())[GST_OBJECT_NAME(pad)] =
       GST_EVENT_MERGE_PAD(pad)->priv->position.copy();
   gst_child_proxy_child_removed(GST_CHILD_PROXY(element), G_OBJECT(pad), GST_OBJECT_NAME(pad));
   PARENT_ELEMENT_CLASS->release_pad(element, pad);
@@ -516,7 +516,7 @@ static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
 }
 
 static Guarded<Settings>& settings_of(GObject* object) {
-  return inside_of<EventMerge>(object).settings;
+  return aggregator_impl<EventMerge>(object).settings;
 }
 
 static void gst_event_merge_init(GstEventMerge* self) {
@@ -532,7 +532,8 @@ static void gst_event_merge_class_init(GstEventMergeClass* klass) {
                         "sources are waited for no longer than the latency",
                         1, G_MAXUINT, Settings().min_streams, mutable_ready_flags));
   install_stats(
-      G_OBJECT_CLASS(klass), [](GObject* object) { return inside_of<EventMerge>(object).stats(); },
+      G_OBJECT_CLASS(klass),
+      [](GObject* object) { return aggregator_impl<EventMerge>(object).stats(); },
       "Counts: events (merged), late-events (dropped, because they arrived too late) and "
       "rejected-events (dropped, because they are outside of their sensor, or not sorted)");
 
@@ -548,7 +549,7 @@ static void gst_event_merge_class_init(GstEventMergeClass* klass) {
 
   GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
   aggregator_class->update_src_caps = [](GstAggregator* element, GstCaps* caps, GstCaps** result) {
-    return inside_of<EventMerge>(element).choose_caps(caps, result);
+    return aggregator_impl<EventMerge>(element).choose_caps(caps, result);
   };
   aggregator_class->src_query = src_query;
 }

@@ -56,7 +56,7 @@ void EventReader::reset() {
   flow_ = GST_FLOW_OK;
   warn_of_corruption_.reset();
   warn_of_assumption_.reset();
-  told_left_out_.clear();
+  posted_left_out_.clear();
   dropped_level_.reset();
   for (auto& pad : pads_) {
     pad->reset();

@@ -141,7 +141,7 @@ class EventReader {
   void log_dropped(guint64 outside, guint64 late, guint64 stray, GstClockTime position);
   void learn_duration();
   GstClockTime duration();
-  void tell_left_out();
+  void post_left_out();
   void warn_of_nothing();
   void warn_of_dropped();
 
@@ -168,7 +168,7 @@ class EventReader {
   guint64 corrupt_places_ = 0;        ///< already signalled by DISCONT and a warning
   WarnOnce warn_of_corruption_{event_reader_debug};
   WarnOnce warn_of_assumption_{event_reader_debug};
-  std::string told_left_out_;  ///< the last note on it that was posted
+  std::string posted_left_out_;  ///< that of the last message
   RepeatLevel dropped_level_;
 
   std::vector<std::unique_ptr<ReaderPad>> pads_;

@@ -30,7 +30,7 @@ GstFlowReturn EventReader::push(const RecordingReader::Start& /*start*/) {
                    ", duration %" GST_TIME_FORMAT,
                    recording_->streams().size(), GST_TIME_ARGS(nanoseconds(recording_->origin())),
                    GST_TIME_ARGS(duration()));
-  tell_left_out();
+  post_left_out();
   return begin_output();
 }
 

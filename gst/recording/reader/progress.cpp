@@ -62,10 +62,10 @@ GstStructure* EventReader::stats() {
 }
 
 /// Posts what another setting would read.
-void EventReader::tell_left_out() {
+void EventReader::post_left_out() {
   const auto left_out = recording_->left_out();
-  if (left_out.empty() || left_out == told_left_out_) return;
-  told_left_out_ = left_out;
+  if (left_out.empty() || left_out == posted_left_out_) return;
+  posted_left_out_ = left_out;
   post_message(element_, GST_MESSAGE_INFO,
                {GST_STREAM_ERROR_DEMUX,
                 "The file also has " + left_out + ", which are not read. Set topics to read them."},

@@ -8,22 +8,22 @@
 #include "gst/simulator/eventsimulator.hpp"
 
 /// Makes the simulator of an element push finished intervals, a little later.
-class LaterLook {
+class FinishPoll {
  public:
-  explicit LaterLook(GstElement* element) : element_(element) {}
-  ~LaterLook() { cancel(); }
-  LaterLook(const LaterLook&) = delete;
-  LaterLook& operator=(const LaterLook&) = delete;
+  explicit FinishPoll(GstElement* element) : element_(element) {}
+  ~FinishPoll() { cancel(); }
+  FinishPoll(const FinishPoll&) = delete;
+  FinishPoll& operator=(const FinishPoll&) = delete;
 
   /// Schedules a check, and cancels the pending one, if any.
   void schedule() {
     cancel();
     GstClock* clock = gst_system_clock_obtain();
-    id_ = gst_clock_new_single_shot_id(clock, gst_clock_get_time(clock) + look_interval);
+    id_ = gst_clock_new_single_shot_id(clock, gst_clock_get_time(clock) + poll_interval);
     gst_object_unref(clock);
     auto* element = g_new0(GWeakRef, 1);
     g_weak_ref_init(element, element_);
-    gst_clock_id_wait_async(id_, look, element, [](gpointer data) {
+    gst_clock_id_wait_async(id_, poll, element, [](gpointer data) {
       g_weak_ref_clear(static_cast<GWeakRef*>(data));
       g_free(data);
     });
@@ -37,10 +37,10 @@ class LaterLook {
 
  private:
   /// Interval at which to check whether the GPU has finished.
-  static constexpr GstClockTime look_interval = GST_MSECOND;
+  static constexpr GstClockTime poll_interval = GST_MSECOND;
 
   /// Called in the thread of the clock, which must not wait for the stream lock or the GPU.
-  static gboolean look(GstClock*, GstClockTime, GstClockID, gpointer data) {
+  static gboolean poll(GstClock*, GstClockTime, GstClockID, gpointer data) {
     auto* element = static_cast<GstElement*>(g_weak_ref_get(static_cast<GWeakRef*>(data)));
     if (element == nullptr) return TRUE;
     gst_element_call_async(
