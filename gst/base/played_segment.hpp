@@ -15,6 +15,12 @@ inline const GstSegment& segment_of(GstEvent* event) {
   return *segment;
 }
 
+/// True if times of `next` go on from those of `current`.
+inline bool continues(const GstSegment& current, const GstSegment& next) {
+  return next.format == current.format && next.rate == current.rate && next.base == current.base &&
+         next.start == current.start && next.time == current.time;
+}
+
 /// Posts an error message about a SEGMENT event, which it unrefs. Returns false.
 inline bool refuse_segment(gpointer element, GstEvent* event, const Report& report) {
   gchar* const cause = gst_info_strdup_printf("segment %" GST_SEGMENT_FORMAT, &segment_of(event));
