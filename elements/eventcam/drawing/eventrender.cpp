@@ -31,19 +31,18 @@
 #include <gst/video/video.h>
 
 #include <algorithm>
-#include <limits>
 #include <optional>
 #include <utility>
 
 #include "elements/eventcam/drawing/frame_times.hpp"
 #include "elements/eventcam/drawing/picture_qos.hpp"
+#include "elements/eventcam/drawing/render_properties.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/event_faults.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/drawing/drawn_video.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -53,10 +52,7 @@ GST_DEBUG_CATEGORY_STATIC(event_render_debug);
 #define GST_CAT_DEFAULT event_render_debug
 
 using eventcamera::Microseconds;
-using eventcamera::PaletteName;
 using eventcamera::Renderer;
-using eventcamera::RenderMode;
-using eventcamera::RenderSettings;
 
 namespace {
 
@@ -65,48 +61,6 @@ constexpr GstClockTime max_gap = GstClockTime{G_MAXUINT32} * GST_USECOND;
 
 /// Maximum time to wait for the first input of a live source.
 constexpr GstClockTime max_wait = 200 * GST_MSECOND;
-
-/// Default time constant of decay and maximum age of time-surface.
-constexpr GstClockTime default_memory = 100 * GST_MSECOND;
-
-/// User-settable values, copied once per picture.
-struct Settings {
-  RenderMode mode = RenderMode::accumulate;
-  PaletteName palette = PaletteName::dark;
-  GstClockTime accumulation_time = 0;
-  guint event_count = 0;
-  guint area_event_count = 0;
-  guint area_size = 16;
-  gdouble full_scale = 2;
-};
-
-/// Converts to the core's settings. Settings that a mode does not use keep their defaults, so that
-/// changing them does not reset the picture.
-RenderSettings core_settings(const Settings& settings) {
-  RenderSettings core;
-  core.mode = settings.mode;
-  core.palette = settings.palette;
-  const auto time = settings.accumulation_time > 0 ? settings.accumulation_time : default_memory;
-  const auto microseconds = static_cast<Microseconds>(std::max(time / 1000, GstClockTime{1}));
-  if (settings.mode == RenderMode::decay || settings.mode == RenderMode::time_surface)
-    core.time_constant = microseconds;
-  else
-    core.limits = {settings.event_count, settings.area_event_count,
-                   static_cast<int>(settings.area_size)};
-  if (settings.mode == RenderMode::decay || settings.mode == RenderMode::count)
-    core.full_scale = static_cast<float>(settings.full_scale);
-  return core;
-}
-
-/// Start of the window for the picture of an interval.
-Microseconds window_start(const Settings& settings, const EventInterval& interval) {
-  if (settings.accumulation_time > 0)
-    return interval.end > settings.accumulation_time
-               ? static_cast<Microseconds>((interval.end - settings.accumulation_time) / 1000)
-               : -1;
-  if (settings.event_count > 0 || settings.area_event_count > 0) return -1;
-  return static_cast<Microseconds>(interval.start / 1000);
-}
 
 /// State from caps to stop.
 struct State {
@@ -134,7 +88,7 @@ class EventRender final : public EventAggregator {
   GstFlowReturn choose_caps(GstCaps* downstream, GstCaps** result) const;
   bool set_video(const GstCaps* caps);
 
-  Guarded<Settings> settings;
+  Guarded<RenderProperties> settings;
   PictureQos qos;
 
  private:
@@ -176,7 +130,7 @@ bool EventRender::take_events(const MappedEvents& mapped, const EventInterval& i
                        ? events_until(rest, mapped.start(), static_cast<Microseconds>(*end / 1000))
                        : rest;
   *taken_ += due.size();
-  state_->renderer.configure(core_settings(settings.copy()));
+  state_->renderer.configure(settings.copy().of_renderer());
   warn(state_->renderer.add(due, mapped.start(), length_of(interval)), buffer);
   return due.size() == rest.size();
 }
@@ -292,8 +246,8 @@ bool EventRender::skip(const EventInterval& picture) {
 }
 
 GstFlowReturn EventRender::draw(const EventInterval& events, GstBuffer* buffer) {
-  const Settings current = settings.copy();
-  state_->renderer.configure(core_settings(current));
+  const RenderProperties current = settings.copy();
+  state_->renderer.configure(current.of_renderer());
   const VideoFrame frame(*state_->video, buffer, GST_MAP_WRITE);
   if (!frame) {
     GST_ELEMENT_ERROR(element(), RESOURCE, FAILED,
@@ -302,7 +256,7 @@ GstFlowReturn EventRender::draw(const EventInterval& events, GstBuffer* buffer) 
                       ("%" GST_PTR_FORMAT, buffer));
     return GST_FLOW_ERROR;
   }
-  state_->renderer.draw(window_start(current, events), static_cast<Microseconds>(events.end / 1000),
+  state_->renderer.draw(current.window_start(events), static_cast<Microseconds>(events.end / 1000),
                         pixel_layout_of(*state_->video), frame.data(), frame.stride());
   return GST_FLOW_OK;
 }
@@ -398,7 +352,7 @@ bool EventRender::take_caps(GstAggregatorPad*, GstCaps* caps) {
   drain();
   state_.reset();  // before allocating the next: pictures can be large
   state_.emplace(State{info.width, info.height,
-                       Renderer(info.width, info.height, core_settings(settings.copy()))});
+                       Renderer(info.width, info.height, settings.copy().of_renderer())});
   gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
   return true;
 }
@@ -406,10 +360,7 @@ bool EventRender::take_caps(GstAggregatorPad*, GstCaps* caps) {
 /* segments, states */
 
 void EventRender::take_segment(const GstSegment& segment) {
-  const GstSegment current = segment_of(main_pad());
-  if (current.rate == segment.rate && current.base == segment.base &&
-      current.start == segment.start && current.time == segment.time)
-    return;
+  if (continues(segment_of(main_pad()), segment)) return;
   drain();
   start_over();
 }
@@ -441,67 +392,6 @@ void EventRender::stop() {
 DEFINE_EVENT_AGGREGATOR(GstEventRender, gst_event_render, EVENT_RENDER, EventRender, eventrender,
                         GST_RANK_PRIMARY, "events drawn as video")
 
-static GType event_render_mode_type() {
-  static const GEnumValue values[] = {
-      {static_cast<gint>(RenderMode::accumulate), "Polarities that fired within a window",
-       "accumulate"},
-      {static_cast<gint>(RenderMode::decay), "Exponentially decaying sum of ON minus OFF", "decay"},
-      {static_cast<gint>(RenderMode::time_surface), "Age and polarity of the last event",
-       "time-surface"},
-      {static_cast<gint>(RenderMode::count), "ON minus OFF within a window", "count"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventRenderMode", values);
-}
-
-static void install_properties(GObjectClass* object_class) {
-  const Settings defaults;
-  Properties<settings_of> properties(object_class);
-  properties.add(&Settings::mode,
-                 g_param_spec_enum("mode", "Mode", "What a picture shows", event_render_mode_type(),
-                                   static_cast<gint>(defaults.mode), mutable_playing_flags));
-  properties.add(
-      &Settings::palette,
-      g_param_spec_enum("palette", "Palette",
-                        "Colours of the picture; viridis and magma show magnitude, not polarity",
-                        palette_type(), static_cast<int>(defaults.palette), mutable_playing_flags));
-  properties.add(
-      &Settings::accumulation_time,
-      g_param_spec_uint64(
-          "accumulation-time", "Accumulation time",
-          "Length of the window of accumulate and count, time constant of decay, maximum age of "
-          "time-surface (ns; 0 = for accumulate and count, one frame, or as long as event-count "
-          "and "
-          "area-event-count allow; for the others, 100 ms)",
-          0, std::numeric_limits<gint64>::max(), defaults.accumulation_time,
-          mutable_playing_flags));
-  properties.add(
-      &Settings::event_count,
-      g_param_spec_uint("event-count", "Event count",
-                        "Maximum number of events in the window of accumulate and count (events; "
-                        "0 = no limit)",
-                        0, eventcamera::RecentEvents::max_size, defaults.event_count,
-                        mutable_playing_flags));
-  properties.add(
-      &Settings::area_event_count,
-      g_param_spec_uint("area-event-count", "Area event count",
-                        "Maximum number of events per area in the window of accumulate and count: "
-                        "the busiest area determines its length (events; 0 = no limit)",
-                        0, eventcamera::RecentEvents::max_size, defaults.area_event_count,
-                        mutable_playing_flags));
-  properties.add(
-      &Settings::area_size,
-      g_param_spec_uint("area-size", "Area size",
-                        "Side of the squares that area-event-count counts in (pixels)", 1,
-                        eventcamera::max_side, defaults.area_size, mutable_playing_flags));
-  properties.add(
-      &Settings::full_scale,
-      g_param_spec_double("full-scale", "Full scale",
-                          "Number of events of a pixel shown in full colour by decay and count "
-                          "(events)",
-                          0.1, 1e6, defaults.full_scale, mutable_playing_flags));
-}
-
 /// Consumes QoS events, because upstream would skip events.
 static gboolean src_event(GstAggregator* element, GstEvent* event) {
   if (GST_EVENT_TYPE(event) != GST_EVENT_QOS)
@@ -529,7 +419,8 @@ static gboolean decide_allocation(GstAggregator*, GstQuery* query) {
 }
 
 static void gst_event_render_class_init(GstEventRenderClass* klass) {
-  install_properties(G_OBJECT_CLASS(klass));
+  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  add_render_properties(properties);
 
   auto* const aggregator = GST_EVENT_AGGREGATOR_CLASS(klass);
   add_aggregator_pad_template(aggregator, "sink", GST_PAD_SINK, EVENT_CAPS);
