@@ -60,6 +60,7 @@
 #include <tuple>
 #include <utility>
 
+#include "elements/eventcam/tensor/tensor_format.hpp"
 #include "elements/eventcam/tensor/tensor_meta.hpp"
 #include "elements/eventcam/tensor/tensor_properties.hpp"
 #include "gst/base/authors.hpp"
@@ -82,9 +83,7 @@ GST_DEBUG_CATEGORY_STATIC(event_tensor_debug);
 using eventcamera::EventTensor;
 using eventcamera::Microseconds;
 using eventcamera::Nanoseconds;
-using eventcamera::TensorSettings;
 using eventcamera::WindowQueue;
-using eventcamera::WindowSettings;
 
 namespace {
 
@@ -93,16 +92,18 @@ constexpr gsize max_tensor_bytes = gsize{1} << 30;
 
 /// State from caps to stop.
 struct State {
-  State(const GstEventCameraInfo& input, const TensorProperties& settings)
-      : info(input),
-        tensor_settings(settings.of_tensors()),
-        window_settings(settings.of_windows()),
-        tensor(input.width, input.height, tensor_settings),
-        windows(input.width, input.height, window_settings) {}
+  explicit State(const TensorFormat& of)
+      : format(of),
+        tensor(of.sensor.width, of.sensor.height, of.tensors),
+        windows(of.sensor.width, of.sensor.height, of.windows) {}
 
-  GstEventCameraInfo info;
-  TensorSettings tensor_settings;
-  WindowSettings window_settings;
+  /// Forgets all events.
+  void start_over() {
+    windows.reset();
+    tensor.reset();
+  }
+
+  TensorFormat format;
   EventTensor tensor;
   WindowQueue windows;
 };
@@ -165,7 +166,7 @@ static GstFlowReturn push_tensor(GstEventTensor* self, const WindowQueue::Window
   GST_BUFFER_FLAG_UNSET(acquired, GST_BUFFER_FLAG_DISCONT);
   if (std::exchange(priv.discontinuous, false))
     GST_BUFFER_FLAG_SET(acquired, GST_BUFFER_FLAG_DISCONT);
-  add_tensor_meta(acquired, tensor.shape(), priv.state->tensor_settings);
+  add_tensor_meta(acquired, tensor.shape(), priv.state->format.tensors);
   GST_LOG_OBJECT(
       self, "tensor of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
       window.events.size(), GST_TIME_ARGS(static_cast<GstClockTime>(window.start)),
@@ -181,8 +182,7 @@ static GstFlowReturn drain(GstEventTensor* self) {
     const auto window = priv.state->windows.finish();
     return window ? push_tensor(self, *window) : GST_FLOW_OK;
   });
-  priv.state->windows.reset();
-  priv.state->tensor.reset();
+  priv.state->start_over();
   priv.discontinuous = true;
   return result;
 }
@@ -260,7 +260,7 @@ static bool take_gap(GstEventTensor* self, GstEvent* event) {
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
   if (!priv.state) return false;
-  if (priv.state->window_settings.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
+  if (priv.state->format.windows.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
       start > max_tensor_time || duration > max_tensor_time - start)
     return priv.state->windows.is_open();
   priv.gap_result = guarded(self, no_memory, [&] {
@@ -270,70 +270,6 @@ static bool take_gap(GstEventTensor* self, GstEvent* event) {
 }
 
 /* negotiation */
-
-/// Framerate of the tensors: 0/1 if it varies or is not a fraction of integers.
-static std::pair<gint, gint> framerate_of(const State& state) {
-  const auto& windows = state.window_settings;
-  gint n = 0;
-  gint d = 1;
-  if (windows.events > 0) return {n, d};
-  const auto hop = windows.duration > 0 ? windows.hop(windows.duration)
-                                        : static_cast<Nanoseconds>(windows.hop(windows.intervals));
-  if (hop > G_MAXINT) return {n, d};
-  const gboolean fits = windows.duration > 0
-                            ? gst_util_fraction_multiply(static_cast<gint>(GST_SECOND), 1, 1,
-                                                         static_cast<gint>(hop), &n, &d)
-                            : gst_util_fraction_multiply(state.info.fps_n, state.info.fps_d, 1,
-                                                         static_cast<gint>(hop), &n, &d);
-  return fits ? std::pair(n, d) : std::pair(0, 1);
-}
-
-/// Time from the start of a window to its end, as far as it is known.
-static GstClockTime latency_of(const State& state) {
-  const auto& windows = state.window_settings;
-  if (windows.events > 0) return 0;
-  if (windows.duration > 0) return static_cast<GstClockTime>(windows.duration);
-  if (state.info.fps_n <= 0) return 0;
-  return gst_util_uint64_scale((windows.intervals - 1) * GST_SECOND,
-                               static_cast<guint64>(state.info.fps_d),
-                               static_cast<guint64>(state.info.fps_n));
-}
-
-static OwnedCaps caps_of(const State& state) {
-  const auto& shape = state.tensor.shape();
-  const auto dimensions = std::to_string(shape.width) + ":" + std::to_string(shape.height) + ":" +
-                          std::to_string(shape.channels) + ":1";
-  const auto [fps_n, fps_d] = framerate_of(state);
-  return OwnedCaps(gst_caps_new_simple(
-      "other/tensors", "format", G_TYPE_STRING, "static", "num_tensors", G_TYPE_INT, 1,
-      "dimensions", G_TYPE_STRING, dimensions.c_str(), "types", G_TYPE_STRING,
-      tensor_data_types()[static_cast<int>(state.tensor_settings.type)].value_nick, "framerate",
-      GST_TYPE_FRACTION, fps_n, fps_d, nullptr));
-}
-
-/// Fields of the caps, and what determines them.
-constexpr std::pair<const char*, const char*> advice[] = {
-    {"types", "set data-type"},
-    {"dimensions", "set representation or bins, or scale the events"},
-    {"framerate", "set accumulation-time, frame-count or overlap"}};
-
-/// The fields in which `wanted` differs from fixed caps, and what to do about it.
-static std::string wishes_of(GstCaps* wanted, GstCaps* made) {
-  std::string wishes;
-  if (gst_caps_get_size(wanted) == 0) return wishes;
-  for (const auto& [field, remedy] : advice) {
-    const auto* value = gst_structure_get_value(gst_caps_get_structure(wanted, 0), field);
-    if (value == nullptr ||
-        gst_value_intersect(nullptr, value,
-                            gst_structure_get_value(gst_caps_get_structure(made, 0), field)))
-      continue;
-    gchar* const text = gst_value_serialize(value);
-    wishes +=
-        (wishes.empty() ? ": " : ", ") + (std::string(field) + "=") + text + " (" + remedy + ")";
-    g_free(text);
-  }
-  return wishes;
-}
 
 /// False, after an error message, if downstream takes only other tensors.
 static bool are_wanted(GstEventTensor* self, GstCaps* caps) {
@@ -352,21 +288,19 @@ static bool are_wanted(GstEventTensor* self, GstCaps* caps) {
 /// Starts over for a sensor. May throw.
 static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
   auto& priv = *self->priv;
-  const TensorProperties settings = priv.settings.copy();
   priv.state.reset();
-  const auto tensor_settings = settings.of_tensors();
-  const auto bytes =
-      EventTensor::memory({info.width, info.height, tensor_settings}, tensor_settings);
+  const TensorFormat format(info, priv.settings.copy());
+  const auto bytes = EventTensor::memory(format.shape(), format.tensors);
   if (bytes > max_tensor_bytes) {
     post_message(self, GST_MESSAGE_ERROR,
                  {GST_STREAM_ERROR_FORMAT,
                   "Cannot make tensors that take more than 1 GiB; lower bins or the resolution."},
                  eventcamera::in_pixels({info.width, info.height}) + " and " +
-                     std::to_string(settings.bins) + " bins make " + std::to_string(bytes) +
+                     std::to_string(format.tensors.bins) + " bins make " + std::to_string(bytes) +
                      " bytes");
     return false;
   }
-  priv.state.emplace(info, settings);
+  priv.state.emplace(format);
   return true;
 }
 
@@ -376,30 +310,21 @@ static gboolean take_caps(GstEventTensor* self, GstEvent* event) {
   gst_event_parse_caps(event, &caps);
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
-  if (priv.state && priv.state->info.width == info.width &&
-      priv.state->info.height == info.height) {
-    priv.state->info = info;
+  if (priv.state && priv.state->format.sensor.width == info.width &&
+      priv.state->format.sensor.height == info.height) {
+    priv.state->format.sensor = info;
   } else {
     drain(self);
     if (!guarded(self, no_memory, [&] { return make_state(self, info); })) return FALSE;
   }
-  *priv.latency.lock() = latency_of(*priv.state);
-  const OwnedCaps out = caps_of(*priv.state);
+  *priv.latency.lock() = priv.state->format.latency();
+  const OwnedCaps out = priv.state->format.caps();
   GST_DEBUG_OBJECT(self, "events of %dx%d pixels become %" GST_PTR_FORMAT, info.width, info.height,
                    out.get());
   if (!are_wanted(self, out.get())) return FALSE;
   const gboolean taken = gst_pad_push_event(priv.src, gst_event_new_caps(out.get()));
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
   return taken;
-}
-
-static void take_segment(GstEventTensor* self, const GstSegment& next) {
-  auto& segment = self->priv->segment;
-  const bool continues = next.format == segment.format && next.rate == segment.rate &&
-                         next.base == segment.base && next.start == segment.start &&
-                         next.time == segment.time;
-  if (!continues) drain(self);
-  segment = next;
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
@@ -419,7 +344,8 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       break;
     case GST_EVENT_SEGMENT:
       if (!plays_events(self, event, "make tensors of")) return FALSE;
-      take_segment(self, segment_of(event));
+      if (!continues(priv.segment, segment_of(event))) drain(self);
+      priv.segment = segment_of(event);
       break;
     case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_EOS:
@@ -428,10 +354,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
     case GST_EVENT_FLUSH_STOP:
       gst_segment_init(&priv.segment, GST_FORMAT_UNDEFINED);
       priv.gap_result = GST_FLOW_OK;
-      if (priv.state) {
-        priv.state->windows.reset();
-        priv.state->tensor.reset();
-      }
+      if (priv.state) priv.state->start_over();
       priv.discontinuous = true;
       break;
     default:

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "elements/eventcam/tensor/tensor_format.hpp"
+
+using eventcamera::Nanoseconds;
+
+/// Framerate of the tensors: 0/1 if it varies or is not a fraction of integers.
+std::pair<gint, gint> TensorFormat::framerate() const {
+  gint n = 0;
+  gint d = 1;
+  if (windows.events > 0) return {n, d};
+  const auto hop = windows.duration > 0 ? windows.hop(windows.duration)
+                                        : static_cast<Nanoseconds>(windows.hop(windows.intervals));
+  if (hop > G_MAXINT) return {n, d};
+  const gboolean fits = windows.duration > 0
+                            ? gst_util_fraction_multiply(static_cast<gint>(GST_SECOND), 1, 1,
+                                                         static_cast<gint>(hop), &n, &d)
+                            : gst_util_fraction_multiply(sensor.fps_n, sensor.fps_d, 1,
+                                                         static_cast<gint>(hop), &n, &d);
+  return fits ? std::pair(n, d) : std::pair(0, 1);
+}
+
+GstClockTime TensorFormat::latency() const {
+  if (windows.events > 0) return 0;
+  if (windows.duration > 0) return static_cast<GstClockTime>(windows.duration);
+  if (sensor.fps_n <= 0) return 0;
+  return gst_util_uint64_scale((windows.intervals - 1) * GST_SECOND,
+                               static_cast<guint64>(sensor.fps_d),
+                               static_cast<guint64>(sensor.fps_n));
+}
+
+OwnedCaps TensorFormat::caps() const {
+  const auto of = shape();
+  const auto dimensions = std::to_string(of.width) + ":" + std::to_string(of.height) + ":" +
+                          std::to_string(of.channels) + ":1";
+  const auto [fps_n, fps_d] = framerate();
+  return OwnedCaps(gst_caps_new_simple(
+      "other/tensors", "format", G_TYPE_STRING, "static", "num_tensors", G_TYPE_INT, 1,
+      "dimensions", G_TYPE_STRING, dimensions.c_str(), "types", G_TYPE_STRING,
+      tensor_data_types()[static_cast<int>(tensors.type)].value_nick, "framerate",
+      GST_TYPE_FRACTION, fps_n, fps_d, nullptr));
+}
+
+/// Fields of the caps, and what determines them.
+static constexpr std::pair<const char*, const char*> advice[] = {
+    {"types", "set data-type"},
+    {"dimensions", "set representation or bins, or scale the events"},
+    {"framerate", "set accumulation-time, frame-count or overlap"}};
+
+std::string wishes_of(GstCaps* wanted, GstCaps* made) {
+  std::string wishes;
+  if (gst_caps_get_size(wanted) == 0) return wishes;
+  for (const auto& [field, remedy] : advice) {
+    const auto* value = gst_structure_get_value(gst_caps_get_structure(wanted, 0), field);
+    if (value == nullptr ||
+        gst_value_intersect(nullptr, value,
+                            gst_structure_get_value(gst_caps_get_structure(made, 0), field)))
+      continue;
+    gchar* const text = gst_value_serialize(value);
+    wishes +=
+        (wishes.empty() ? ": " : ", ") + (std::string(field) + "=") + text + " (" + remedy + ")";
+    g_free(text);
+  }
+  return wishes;
+}
