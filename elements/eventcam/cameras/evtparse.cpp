@@ -40,7 +40,6 @@
  * ]|
  */
 #include <gst/gst.h>
-#include <gst/video/video.h>
 
 #include <algorithm>
 #include <memory>
@@ -51,7 +50,8 @@
 #include <utility>
 #include <vector>
 
-#include "gst/base/arrival_segment.hpp"
+#include "elements/eventcam/cameras/camera_buffers.hpp"
+#include "elements/eventcam/cameras/camera_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
@@ -64,7 +64,6 @@
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/evt_caps.hpp"
-#include "src/camera/arrival_clock.hpp"
 #include "src/camera/event_camera.hpp"
 #include "src/formats/chunker.hpp"
 #include "src/formats/evt/word_scanner.hpp"
@@ -72,7 +71,6 @@
 GST_DEBUG_CATEGORY_STATIC(evt_parse_debug);
 #define GST_CAT_DEFAULT evt_parse_debug
 
-using eventcamera::ArrivalClock;
 using eventcamera::Chunker;
 using eventcamera::EvtFormat;
 using eventcamera::Framing;
@@ -85,9 +83,6 @@ constexpr int max_side = 2048;
 
 /// Value of `format`: that of the caps.
 constexpr int format_of_caps = -1;
-
-/// A camera that was silent for longer may have started over.
-constexpr GstClockTime max_gap = GST_SECOND * 3600 * 24;
 
 const GEnumValue word_formats[] = {
     {format_of_caps, "That of the caps", "auto"},
@@ -135,15 +130,10 @@ void add(WordScanner::Counts& sum, const WordScanner::Counts& before,
 
 /// State of the stream, from its first buffer to stop.
 struct State {
+  CameraBuffers buffers;
   std::unique_ptr<WordScanner> scanner;
-  Framing framing = Framing::loose;
   std::vector<WordScanner::Piece> pieces{};
-  std::vector<guint8> rows{};  ///< of a buffer with padded rows
-  ArrivalClock clock{};
-  ArrivalSegment segment{0};  ///< of the output
-  bool is_mapping_new = false;
-  GstClockTime last_arrival = GST_CLOCK_TIME_NONE;
-  guint64 last_offset = GST_BUFFER_OFFSET_NONE;
+  CameraSegment segment{};  ///< of the output
 };
 
 struct Private {
@@ -225,8 +215,8 @@ static bool start_stream(GstEvtParse* self) {
     return false;
   }
   return reported(self, [&] {
-    priv.state.emplace(State{.scanner = make_word_scanner(*format, sensor, input.framing),
-                             .framing = input.framing});
+    priv.state.emplace(State{.buffers = CameraBuffers(input.framing),
+                             .scanner = make_word_scanner(*format, sensor, input.framing)});
     const OwnedCaps caps(gst_caps_new_simple(GST_EVENT_CAMERA_MEDIA_TYPE, "format", G_TYPE_STRING,
                                              evt_format_name(*format), "width", G_TYPE_INT,
                                              sensor.width, "height", G_TYPE_INT, sensor.height,
@@ -244,24 +234,17 @@ static GstClockTime nanoseconds(Microseconds t) {
   return static_cast<GstClockTime>(t) * GST_USECOND;
 }
 
-/// Maps the camera's times from `start` on to running time. What happened before running time 0, as
-/// in a first transfer, is late: the next piece corrects the mapping.
-static void push_segment(GstEvtParse* self, GstClockTime start) {
+/// Pushes a segment before data of these times, if they need one.
+static void begin_segment(GstEvtParse* self, GstClockTime start, GstClockTime end) {
   auto& priv = *self->priv;
-  auto& state = *priv.state;
-  GstClockTime arrival = GST_CLOCK_TIME_NONE;
-  state.is_mapping_new = false;
-  if (const auto offset = state.clock.offset()) {
-    const auto running = static_cast<GstClockTimeDiff>(start) + *offset;
-    arrival = static_cast<GstClockTime>(std::max<GstClockTimeDiff>(running, 0));
-    state.is_mapping_new = running < 0;
-  }
-  const bool is_correction = state.segment.has_begun();
-  const auto mapped = state.segment.begin(priv.src, priv.segment_seqnum, start, arrival, start);
+  auto& segment = priv.state->segment;
+  const bool is_correction = segment.has_begun();
+  const auto mapped = segment.begin(priv.src, priv.segment_seqnum, start, end);
+  if (!mapped) return;
   GST_DEBUG_OBJECT(self, "the camera's %" GST_TIME_FORMAT " is running time %" GST_TIME_FORMAT,
-                   GST_TIME_ARGS(start), GST_TIME_ARGS(mapped));
+                   GST_TIME_ARGS(start), GST_TIME_ARGS(*mapped));
   const auto stats = priv.stats.lock();
-  stats->clock_offset = GST_CLOCK_DIFF(start, mapped);
+  stats->clock_offset = GST_CLOCK_DIFF(start, *mapped);
   stats->clock_corrections += is_correction ? 1 : 0;
 }
 
@@ -281,9 +264,7 @@ static GstFlowReturn push_pieces(GstEvtParse* self) {
   for (auto& piece : state.pieces) {
     if (result != GST_FLOW_OK) break;
     const auto start = nanoseconds(piece.start);
-    if (state.is_mapping_new || !state.segment.continues(start, GST_CLOCK_TIME_NONE))
-      push_segment(self, start);
-    state.segment.reach(nanoseconds(piece.end));
+    begin_segment(self, start, nanoseconds(piece.end));
     GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " bytes of events at %" GST_TIME_FORMAT,
                    piece.words.size(), GST_TIME_ARGS(start));
     result = gst_pad_push(priv.src, buffer_of(std::move(piece)));
@@ -293,42 +274,6 @@ static GstFlowReturn push_pieces(GstEvtParse* self) {
 }
 
 /* data */
-
-/// The running time at which a buffer arrived, if it has a time.
-static GstClockTime arrival_of(const Private& priv, GstBuffer* buffer) {
-  const auto pts = GST_BUFFER_PTS(buffer);
-  // Sources of bytes stamp with running time.
-  const auto arrival = priv.upstream.format == GST_FORMAT_TIME
-                           ? gst_segment_to_running_time(&priv.upstream, GST_FORMAT_TIME, pts)
-                           : pts;
-  return arrival <= nanoseconds(Chunker::max_time) ? arrival : GST_CLOCK_TIME_NONE;
-}
-
-/// Number of buffers that the driver dropped before this one.
-static guint64 lost_before(State& state, GstBuffer* buffer) {
-  if (state.framing != Framing::padded) return 0;
-  const auto offset = GST_BUFFER_OFFSET(buffer);
-  const auto last = std::exchange(state.last_offset, offset);
-  if (offset == GST_BUFFER_OFFSET_NONE || last == GST_BUFFER_OFFSET_NONE || offset <= last)
-    return 0;
-  return offset - last - 1;
-}
-
-/// The bytes of a buffer, without the padding of its rows.
-static std::span<const guint8> bytes_of(State& state, GstBuffer* buffer,
-                                        std::span<const guint8> bytes) {
-  const GstVideoMeta* const meta = gst_buffer_get_video_meta(buffer);
-  if (meta == nullptr || meta->n_planes != 1 || meta->stride[0] <= static_cast<gint>(meta->width))
-    return bytes;
-  const auto stride = static_cast<gsize>(meta->stride[0]);
-  state.rows.clear();
-  gsize at = meta->offset[0];
-  for (guint y = 0; y < meta->height && at < bytes.size(); ++y, at += stride) {
-    const auto row = bytes.subspan(at, std::min<gsize>(meta->width, bytes.size() - at));
-    state.rows.insert(state.rows.end(), row.begin(), row.end());
-  }
-  return state.rows;
-}
 
 static void note_losses(GstEvtParse* self, const WordScanner::Counts& before, guint64 buffers) {
   constexpr guint64 max_skipped = 1U << 16;
@@ -353,13 +298,12 @@ static void note_losses(GstEvtParse* self, const WordScanner::Counts& before, gu
 static void note_transfer(GstEvtParse* self, GstClockTime arrival) {
   auto& priv = *self->priv;
   const auto& state = *priv.state;
-  const auto offset = state.clock.offset();
   // The first may hold what the camera kept before the start.
-  if (!offset || !state.segment.has_begun() || state.pieces.empty() ||
-      !GST_CLOCK_TIME_IS_VALID(arrival))
+  if (!state.segment.has_begun() || state.pieces.empty() || !GST_CLOCK_TIME_IS_VALID(arrival))
     return;
-  const auto first = static_cast<gint64>(nanoseconds(state.pieces.front().start)) + *offset;
-  const auto length = std::clamp<gint64>(static_cast<gint64>(arrival) - first, 0, GST_SECOND);
+  const auto first = state.segment.running_time_of(nanoseconds(state.pieces.front().start));
+  if (!first) return;
+  const auto length = std::clamp<gint64>(static_cast<gint64>(arrival) - *first, 0, GST_SECOND);
   const auto min_latency = priv.settings.copy().latency;
   bool has_grown = false;
   {
@@ -380,35 +324,26 @@ static GstFlowReturn take_transfer(GstEvtParse* self, GstBuffer* buffer,
   auto& priv = *self->priv;
   auto& state = *priv.state;
   const auto before = state.scanner->counts();
-  const auto lost = lost_before(state, buffer);
-  const auto arrival = arrival_of(priv, buffer);
-  const auto last_arrival = std::exchange(state.last_arrival, arrival);
-  WordScanner::Transfer transfer{.bytes = bytes_of(state, buffer, bytes),
-                                 .is_discontinuous = GST_BUFFER_IS_DISCONT(buffer) || lost > 0,
-                                 .elapsed = {}};
-  if (GST_CLOCK_TIME_IS_VALID(arrival) && GST_CLOCK_TIME_IS_VALID(last_arrival) &&
-      arrival >= last_arrival && arrival - last_arrival <= max_gap)
-    transfer.elapsed = static_cast<Microseconds>((arrival - last_arrival) / GST_USECOND);
-  state.scanner->scan(transfer, state.pieces);
+  const auto transfer = state.buffers.transfer_of(buffer, bytes, priv.upstream);
+  state.scanner->scan(transfer.words, state.pieces);
   if (!state.pieces.empty() && state.pieces.back().end > Chunker::max_time) {
     GST_ELEMENT_ERROR(self, STREAM, DECODE, ("The clock of the camera has jumped too far."),
                       ("it is at %" G_GINT64_FORMAT " us", state.pieces.back().end));
     return GST_FLOW_ERROR;
   }
-  if (!state.pieces.empty() && GST_CLOCK_TIME_IS_VALID(arrival)) {
+  if (!state.pieces.empty() && GST_CLOCK_TIME_IS_VALID(transfer.arrival)) {
     const bool after_gap = std::ranges::any_of(state.pieces, &WordScanner::Piece::is_discontinuous);
-    state.is_mapping_new |= state.clock.arrive(
-        state.pieces.back().end, static_cast<eventcamera::Nanoseconds>(arrival), after_gap);
+    state.segment.arrive(state.pieces.back().end, transfer.arrival, after_gap);
   }
   {
     const auto stats = priv.stats.lock();
     add(stats->words, before, state.scanner->counts());
-    stats->clock_drift = state.clock.drift();
+    stats->clock_drift = state.segment.drift();
     ++stats->buffers;
-    stats->lost_buffers += lost;
+    stats->lost_buffers += transfer.lost;
   }
-  note_losses(self, before, lost);
-  note_transfer(self, arrival);
+  note_losses(self, before, transfer.lost);
+  note_transfer(self, transfer.arrival);
   return push_pieces(self);
 }
 
