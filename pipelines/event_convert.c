@@ -149,13 +149,11 @@ static gchar* names_of(GObject* element, const char* property) {
 
 static void append_names(GString* text, const char* what, const char* factory,
                          const char* property) {
-  GstElement* element = gst_element_factory_make(factory, NULL);
+  g_autoptr(GstElement) element = gst_element_factory_make(factory, NULL);
   if (element == NULL) return; /* built without it */
   gst_object_ref_sink(element);
-  gchar* names = names_of(G_OBJECT(element), property);
+  g_autofree gchar* names = names_of(G_OBJECT(element), property);
   g_string_append_printf(text, "  --%s, %s:%s\n", property, what, names);
-  g_free(names);
-  gst_object_unref(element);
 }
 
 /* Part of --help after the options. */
@@ -215,23 +213,18 @@ static const Reader* find_reader(const char* path) {
   static guint8 start[1 << 14];
   const Format* format = format_of(path);
   const Reader* reader = NULL;
-  GstCaps* caps;
-  FILE* file;
-  gsize size;
   if (!can_read_twice(path)) return NULL;
-  file = fopen(path, "rb");
-  size = file != NULL ? fread(start, 1, sizeof start, file) : 0;
+  FILE* file = fopen(path, "rb");
+  const gsize size = file != NULL ? fread(start, 1, sizeof start, file) : 0;
   if (file == NULL || ferror(file)) {
     PRINT_ERROR("%s: %s\n", path, g_strerror(errno));
     if (file != NULL) fclose(file);
     return NULL;
   }
   fclose(file);
-  caps = size > 0 ? gst_type_find_helper_for_data(NULL, start, size, NULL) : NULL;
-  if (caps != NULL) {
-    reader = reader_of(gst_structure_get_name(gst_caps_get_structure(caps, 0)));
-    gst_caps_unref(caps);
-  }
+  g_autoptr(GstCaps) caps =
+      size > 0 ? gst_type_find_helper_for_data(NULL, start, size, NULL) : NULL;
+  if (caps != NULL) reader = reader_of(gst_structure_get_name(gst_caps_get_structure(caps, 0)));
   if (reader == NULL && format != NULL) reader = reader_of(format->media_type);
   if (reader == NULL && size > strlen(matlab) && memcmp(start, matlab, strlen(matlab)) == 0)
     PRINT_ERROR("%s: files of MATLAB are not read; docs/formats.md has a line that exports them\n",
@@ -291,20 +284,18 @@ static gboolean set_option(GstElement* element, const Option* option) {
     const GEnumValue* value =
         g_enum_get_value_by_nick(G_PARAM_SPEC_ENUM(spec)->enum_class, option->value);
     if (value == NULL) {
-      gchar* names = names_of(G_OBJECT(element), option->name);
+      g_autofree gchar* names = names_of(G_OBJECT(element), option->name);
       PRINT_ERROR("--%s: no \"%s\"; choose one of%s\n", option->name, option->value, names);
-      g_free(names);
       return FALSE;
     }
     g_object_set(element, option->name, value->value, NULL);
   } else if (G_IS_PARAM_SPEC_UINT(spec)) {
     const GParamSpecUInt* range = G_PARAM_SPEC_UINT(spec);
     guint64 number = 0;
-    GError* error = NULL;
+    g_autoptr(GError) error = NULL;
     if (!g_ascii_string_to_unsigned(option->value, 10, range->minimum, range->maximum, &number,
                                     &error)) {
       PRINT_ERROR("--%s: %s\n", option->name, error->message);
-      g_clear_error(&error);
       return FALSE;
     }
     g_object_set(element, option->name, (guint)number, NULL);
@@ -316,16 +307,14 @@ static gboolean set_option(GstElement* element, const Option* option) {
 
 /* Sets the properties given by options. */
 static gboolean set_options(GstElement* pipeline) {
-  gboolean ok = TRUE;
-  for (gsize i = 0; i < G_N_ELEMENTS(properties) && ok; ++i) {
+  for (gsize i = 0; i < G_N_ELEMENTS(properties); ++i) {
     const Option* option = &properties[i];
-    GstElement* element;
     if (option->value == NULL) continue;
-    element = gst_bin_get_by_name(GST_BIN(pipeline), option->inputs != NULL ? "reader" : "writer");
-    ok = set_option(element, option);
-    gst_object_unref(element);
+    g_autoptr(GstElement) element =
+        gst_bin_get_by_name(GST_BIN(pipeline), option->inputs != NULL ? "reader" : "writer");
+    if (!set_option(element, option)) return FALSE;
   }
-  return ok;
+  return TRUE;
 }
 
 /* Writing starts before reading ends, so it would destroy the input. */
@@ -339,13 +328,13 @@ static gboolean same_file(const char* a, const char* b) {
  * NULL on failure. */
 static gchar* create_part(const char* path) {
   for (int i = 1; i < 1000; ++i) {
-    gchar* part = i == 1 ? g_strconcat(path, ".part", NULL) : g_strdup_printf("%s.part%d", path, i);
+    g_autofree gchar* part =
+        i == 1 ? g_strconcat(path, ".part", NULL) : g_strdup_printf("%s.part%d", path, i);
     const int file = open(part, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (file >= 0) {
       close(file);
-      return part;
+      return g_steal_pointer(&part);
     }
-    g_free(part);
     if (errno != EEXIST) break;
   }
   PRINT_ERROR("%s cannot be written: %s\n", path, g_strerror(errno));
@@ -354,10 +343,9 @@ static gchar* create_part(const char* path) {
 
 /* Sets the location of the element `name`, or of the writer if it is the sink itself. */
 static void set_location(GstElement* pipeline, const char* name, const char* path) {
-  GstElement* element = gst_bin_get_by_name(GST_BIN(pipeline), name);
+  g_autoptr(GstElement) element = gst_bin_get_by_name(GST_BIN(pipeline), name);
   if (element == NULL) element = gst_bin_get_by_name(GST_BIN(pipeline), "writer");
   g_object_set(element, "location", path, NULL);
-  gst_object_unref(element);
 }
 
 /* Limits a queue by time: events and frames may be apart by half a second, and the muxer waits for
@@ -368,29 +356,18 @@ static void limit_by_time(GstElement* queue) {
                2 * GST_SECOND, NULL);
 }
 
-/* Links a pad of the reader to a queue. */
-static void link_queue(GstPad* pad, GstElement* queue) {
-  GstPad* sink = gst_element_get_static_pad(queue, "sink");
-  gst_pad_link(pad, sink);
-  gst_object_unref(sink);
-}
-
 /* Links the first video stream to the muxer. */
 static void link_frames(GstElement* reader, GstElement* muxer, GstElement* events) {
-  GstPad* pad = gst_element_get_static_pad(reader, "video_0");
-  GstObject* pipeline;
-  GstElement* queue;
+  g_autoptr(GstPad) pad = gst_element_get_static_pad(reader, "video_0");
   if (pad == NULL) return;
-  pipeline = gst_element_get_parent(reader);
-  queue = gst_element_factory_make("queue", NULL);
+  g_autoptr(GstObject) pipeline = gst_element_get_parent(reader);
+  GstElement* queue = gst_element_factory_make("queue", NULL);
   limit_by_time(events);
   limit_by_time(queue);
   gst_bin_add(GST_BIN(pipeline), queue);
   gst_element_link_pads(queue, "src", muxer, "video_0");
-  link_queue(pad, queue);
+  gst_element_link_pads(reader, "video_0", queue, "sink");
   gst_element_sync_state_with_parent(queue);
-  gst_object_unref(pipeline);
-  gst_object_unref(pad);
 }
 
 /* Counts the pads of events. */
@@ -403,9 +380,7 @@ static gboolean count_streams(GstElement* reader, GstPad* pad, gpointer count) {
 /* Links the streams of a file once they are known. Runs in the streaming thread, before data
  * flows. `muxer` takes frames, too, unless it is NULL. */
 static void link_streams(GstElement* reader, gpointer muxer) {
-  GstPad* pad = gst_element_get_static_pad(reader, "events_0");
-  GstElement* pipeline;
-  GstElement* queue;
+  g_autoptr(GstPad) pad = gst_element_get_static_pad(reader, "events_0");
   guint streams = 0;
   if (pad == NULL) {
     GST_ELEMENT_ERROR(reader, STREAM, WRONG_TYPE, ("The file has no events to convert."),
@@ -417,31 +392,25 @@ static void link_streams(GstElement* reader, gpointer muxer) {
     GST_ELEMENT_WARNING(reader, STREAM, DEMUX,
                         ("Only the first of %u streams of events is converted.", streams),
                         ("the others are those of the pads events_1 and on"));
-  pipeline = GST_ELEMENT(gst_element_get_parent(reader));
-  queue = gst_bin_get_by_name(GST_BIN(pipeline), "events");
+  g_autoptr(GstObject) pipeline = gst_element_get_parent(reader);
+  g_autoptr(GstElement) queue = gst_bin_get_by_name(GST_BIN(pipeline), "events");
   if (muxer != NULL) link_frames(reader, GST_ELEMENT(muxer), queue);
-  link_queue(pad, queue);
-  gst_object_unref(queue);
-  gst_object_unref(pipeline);
-  gst_object_unref(pad);
+  gst_element_link_pads(reader, "events_0", queue, "sink");
 }
 
 static void link_when_known(GstElement* pipeline, const Format* to) {
-  GstElement* reader = gst_bin_get_by_name(GST_BIN(pipeline), "reader");
-  GstElement* writer = gst_bin_get_by_name(GST_BIN(pipeline), "writer");
+  g_autoptr(GstElement) reader = gst_bin_get_by_name(GST_BIN(pipeline), "reader");
+  g_autoptr(GstElement) writer = gst_bin_get_by_name(GST_BIN(pipeline), "writer");
   /* Frames are not cropped, so they would not match the events. */
   const gboolean takes_frames =
       crop_text == NULL && strcmp(to->media_type, "application/x-aedat") == 0;
   g_signal_connect(reader, "no-more-pads", G_CALLBACK(link_streams), takes_frames ? writer : NULL);
-  gst_object_unref(writer);
-  gst_object_unref(reader);
 }
 
 static GstStructure* stats_of(GstElement* pipeline, const char* name) {
-  GstElement* element = gst_bin_get_by_name(GST_BIN(pipeline), name);
+  g_autoptr(GstElement) element = gst_bin_get_by_name(GST_BIN(pipeline), name);
   GstStructure* stats = NULL;
   g_object_get(element, "stats", &stats, NULL);
-  gst_object_unref(element);
   return stats;
 }
 
@@ -463,9 +432,9 @@ static void print_left_out(const char* in, GstElement* pipeline, gboolean labels
     const char* field;
     const char* name;
   } kinds[] = {{"frames", "frames"}, {"triggers", "triggers"}, {"imu-samples", "IMU samples"}};
-  GstStructure* read = stats_of(pipeline, "reader");
-  GstStructure* written = stats_of(pipeline, "writer");
-  GString* text = g_string_new(NULL);
+  g_autoptr(GstStructure) read = stats_of(pipeline, "reader");
+  g_autoptr(GstStructure) written = stats_of(pipeline, "writer");
+  g_autoptr(GString) text = g_string_new(NULL);
   for (gsize i = 0; i < G_N_ELEMENTS(kinds); ++i) {
     guint64 of_in = 0;
     guint64 of_out = 0;
@@ -477,9 +446,6 @@ static void print_left_out(const char* in, GstElement* pipeline, gboolean labels
   }
   if (labels) g_string_append(text, text->len > 0 ? ", labels" : "labels");
   if (text->len > 0) PRINT_ERROR("%s: left out: %s\n", in, text->str);
-  g_string_free(text, TRUE);
-  gst_structure_free(written);
-  gst_structure_free(read);
 }
 
 /* Warns that the part of `in` had no events. */
@@ -526,12 +492,11 @@ static gboolean is_part(void) {
  * FALSE on failure. */
 static gboolean trim(const char* in, GstElement* pipeline) {
   const gboolean ends = to_seconds < G_MAXDOUBLE;
-  GstElement* reader = gst_bin_get_by_name(GST_BIN(pipeline), "reader");
+  g_autoptr(GstElement) reader = gst_bin_get_by_name(GST_BIN(pipeline), "reader");
   const gboolean ok = gst_element_seek(
       reader, 1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE, GST_SEEK_TYPE_SET,
       nanoseconds(from_seconds), ends ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE,
       ends ? nanoseconds(to_seconds) : -1);
-  gst_object_unref(reader);
   if (ok)
     gst_element_set_state(pipeline, GST_STATE_PLAYING);
   else
@@ -544,14 +509,12 @@ static void print_progress(GstElement* pipeline, guint64 events) {
   static const char full[] = "########################################";
   gint64 position = 0;
   gint64 duration = 0;
-  gdouble end;
-  gdouble share;
   if (!gst_element_query_position(pipeline, GST_FORMAT_TIME, &position) ||
       !gst_element_query_duration(pipeline, GST_FORMAT_TIME, &duration) || duration <= 0)
     return;
-  end = MIN((gdouble)duration, to_seconds * GST_SECOND);
-  share = ((gdouble)position - from_seconds * GST_SECOND) / (end - from_seconds * GST_SECOND);
-  share = CLAMP(share, 0.0, 1.0);
+  const gdouble start = from_seconds * GST_SECOND;
+  const gdouble end = MIN((gdouble)duration, to_seconds * GST_SECOND);
+  const gdouble share = CLAMP(((gdouble)position - start) / (end - start), 0.0, 1.0);
   if (isatty(STDERR_FILENO))
     PRINT_ERROR("\r[%-40.*s] %3.0f %%, %" G_GUINT64_FORMAT " events", (int)(40 * share), full,
                 100 * share, events);
@@ -566,9 +529,8 @@ static void clear_progress(void) {
 /* Prints an error, a warning or a note with its cause: the debug text, after the code location. */
 static void print_message(const char* in, GstMessage* message) {
   const char* kind;
-  GError* error = NULL;
-  gchar* debug = NULL;
-  const gchar* cause;
+  g_autoptr(GError) error = NULL;
+  g_autofree gchar* debug = NULL;
   switch (GST_MESSAGE_TYPE(message)) {
     case GST_MESSAGE_ERROR:
       kind = "error";
@@ -584,10 +546,8 @@ static void print_message(const char* in, GstMessage* message) {
   }
   clear_progress();
   PRINT_ERROR("%s: %s: %s\n", in, kind, error->message);
-  cause = debug != NULL ? strchr(debug, '\n') : NULL;
+  const gchar* cause = debug != NULL ? strchr(debug, '\n') : NULL;
   if (cause != NULL && cause[1] != '\0') PRINT_ERROR("  %s\n", cause + 1);
-  g_free(debug);
-  g_clear_error(&error);
 }
 
 static volatile sig_atomic_t interrupted;
@@ -601,7 +561,7 @@ static void interrupt(int number) {
 /* Runs until the file is written. FALSE on failure. */
 static gboolean run(const char* in, const Format* to, GstElement* pipeline,
                     const Content* content) {
-  GstBus* bus = gst_element_get_bus(pipeline);
+  g_autoptr(GstBus) bus = gst_element_get_bus(pipeline);
   gboolean trimming = is_trimmed();
   gboolean ended = FALSE;
   gboolean ending = FALSE;
@@ -612,7 +572,7 @@ static gboolean run(const char* in, const Format* to, GstElement* pipeline,
       ending = TRUE;
       gst_element_send_event(pipeline, gst_event_new_eos());
     }
-    GstMessage* message =
+    g_autoptr(GstMessage) message =
         gst_bus_timed_pop_filtered(bus, GST_SECOND,
                                    GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING |
                                        GST_MESSAGE_INFO | GST_MESSAGE_ASYNC_DONE);
@@ -629,13 +589,11 @@ static gboolean run(const char* in, const Format* to, GstElement* pipeline,
       ok = GST_MESSAGE_TYPE(message) != GST_MESSAGE_ERROR;
       if (GST_MESSAGE_TYPE(message) != GST_MESSAGE_EOS) print_message(in, message);
     }
-    gst_message_unref(message);
   }
   clear_progress();
   if (ok) print_left_out(in, pipeline, content->labelled && !keeps_labels(to));
   if (ok && !interrupted && content->events == 0 && is_part()) print_empty(in, pipeline);
   gst_element_set_state(pipeline, GST_STATE_NULL);
-  gst_object_unref(bus);
   return ok;
 }
 
@@ -657,9 +615,8 @@ static gboolean finish(const char* part, const char* path, gboolean ok) {
 /* OUT or, if it is a symbolic link, its target, so that the link is kept. NULL if that is missing.
  */
 static gchar* target_of(const char* path) {
-  gchar* target;
   if (!g_file_test(path, G_FILE_TEST_IS_SYMLINK)) return g_strdup(path);
-  target = realpath(path, NULL);
+  gchar* target = realpath(path, NULL);
   if (target == NULL) PRINT_ERROR("%s: target of the link: %s\n", path, g_strerror(errno));
   return target;
 }
@@ -668,106 +625,84 @@ static gchar* target_of(const char* path) {
  * on failure. */
 static GstElement* make_pipeline(const char* in, const Reader* from, const char* part,
                                  const Format* to, Content* content, int* status) {
-  GError* error = NULL;
-  GstElement* queue;
-  GstPad* pad;
-  gchar* line = g_strdup_printf("filesrc name=in ! %s name=reader %s queue name=events ! %s",
-                                from->element, from->has_streams ? "" : "!", to->writer);
-  GstElement* pipeline = gst_parse_launch_full(line, NULL, GST_PARSE_FLAG_FATAL_ERRORS, &error);
-  g_free(line);
+  g_autoptr(GError) error = NULL;
+  g_autofree gchar* line =
+      g_strdup_printf("filesrc name=in ! %s name=reader %s queue name=events ! %s", from->element,
+                      from->has_streams ? "" : "!", to->writer);
+  g_autoptr(GstElement) pipeline =
+      gst_parse_launch_full(line, NULL, GST_PARSE_FLAG_FATAL_ERRORS, &error);
   if (pipeline == NULL) {
     PRINT_ERROR("%s\n", error->message);
-    g_clear_error(&error);
     *status = 1;
     return NULL;
   }
   if (!set_options(pipeline)) {
-    gst_object_unref(pipeline);
     *status = 2;
     return NULL;
   }
   set_location(pipeline, "in", in);
   set_location(pipeline, "out", part);
-  queue = gst_bin_get_by_name(GST_BIN(pipeline), "events");
-  pad = gst_element_get_static_pad(queue, "src");
+  g_autoptr(GstElement) queue = gst_bin_get_by_name(GST_BIN(pipeline), "events");
+  g_autoptr(GstPad) pad = gst_element_get_static_pad(queue, "src");
   if (crop_text != NULL) crop_events(pad, &region);
   gst_pad_add_probe(pad, GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_FLUSH, count_events,
                     content, NULL);
-  gst_object_unref(pad);
-  gst_object_unref(queue);
   if (from->has_streams) link_when_known(pipeline, to);
-  return pipeline;
+  return g_steal_pointer(&pipeline);
 }
 
 /* Returns the exit status. */
 static int write_file(const char* in, const Reader* from, const char* path, const Format* to) {
   Content content = {0, FALSE};
   int status = 0;
-  gchar* part = create_part(path);
-  GstElement* pipeline;
+  g_autofree gchar* part = create_part(path);
   if (part == NULL) return 1;
-  pipeline = make_pipeline(in, from, part, to, &content, &status);
-  if (pipeline != NULL) {
-    gboolean ok = run(in, to, pipeline, &content);
-    gst_object_unref(pipeline);
-    ok = finish(part, path, ok);
-    if (ok) printf("%" G_GUINT64_FORMAT " events from %s to %s\n", content.events, in, path);
-    status = ok ? 0 : 1;
-  } else {
+  g_autoptr(GstElement) pipeline = make_pipeline(in, from, part, to, &content, &status);
+  if (pipeline == NULL) {
     remove(part);
+    return status;
   }
-  g_free(part);
-  return status;
+  if (!finish(part, path, run(in, to, pipeline, &content))) return 1;
+  printf("%" G_GUINT64_FORMAT " events from %s to %s\n", content.events, in, path);
+  return 0;
 }
 
 /* Messages of a bag of ROS 2 that SQLite has not yet moved to the file are in a journal beside it.
  */
 static void warn_of_journal(const char* in) {
-  gchar* journal = g_strconcat(in, "-wal", NULL);
+  g_autofree gchar* journal = g_strconcat(in, "-wal", NULL);
   struct stat found;
   if (g_str_has_suffix(in, ".db3") && stat(journal, &found) == 0 && found.st_size > 0)
     PRINT_ERROR(
         "%s: warning: messages in %s are not read; run: sqlite3 %s 'PRAGMA wal_checkpoint'\n", in,
         journal, in);
-  g_free(journal);
 }
 
 /* Returns the exit status. */
 static int convert(const char* in, const char* out) {
   const Format* to = format_of(out);
-  const Reader* from;
-  gchar* path;
-  int status;
   if (!can_write(out, to)) return 2;
-  from = find_reader(in);
+  const Reader* from = find_reader(in);
   if (from == NULL) return 1;
   if (!options_apply(to)) return 2;
   if (same_file(in, out)) {
     PRINT_ERROR("%s and %s are the same file\n", in, out);
     return 2;
   }
-  path = target_of(out);
+  g_autofree gchar* path = target_of(out);
   if (path == NULL) return 1;
   warn_of_journal(in);
-  status = write_file(in, from, path, to);
-  g_free(path);
-  return status;
+  return write_file(in, from, path, to);
 }
 
 /* Path of the converted file in the output directory. */
 static gchar* output_of(const char* in) {
-  gchar* name = g_path_get_basename(in);
-  gchar* dot = strrchr(name, '.');
-  gchar* path;
-  if (output_extension == NULL) {
-    path = g_build_filename(output_directory, name, NULL);
-  } else {
-    const int length = (int)(dot != NULL && dot != name ? dot - name : (gssize)strlen(name));
-    const char* extension = output_extension + (output_extension[0] == '.');
-    path = g_strdup_printf("%s/%.*s.%s", output_directory, length, name, extension);
-  }
-  g_free(name);
-  return path;
+  g_autofree gchar* name = g_path_get_basename(in);
+  if (output_extension == NULL) return g_build_filename(output_directory, name, NULL);
+  const gchar* dot = strrchr(name, '.');
+  const int length = (int)(dot != NULL && dot != name ? dot - name : (gssize)strlen(name));
+  const char* extension = output_extension + (output_extension[0] == '.');
+  return g_strdup_printf("%s/%.*s.%s", output_directory, length, name, extension);
 }
 
 /* True if no two files would become the same. */
@@ -783,21 +718,18 @@ static gboolean are_distinct(gchar** outputs) {
 
 /* Converts each file; a failure does not stop the others. Returns the exit status. */
 static int convert_all(void) {
-  gchar** outputs = g_new0(gchar*, g_strv_length(files) + 1);
-  int status = 0;
+  g_auto(GStrv) outputs = g_new0(gchar*, g_strv_length(files) + 1);
   for (gsize i = 0; files[i] != NULL; ++i) outputs[i] = output_of(files[i]);
-  if (!are_distinct(outputs)) {
-    status = 2;
-  } else if (g_mkdir_with_parents(output_directory, 0777) != 0) {
+  if (!are_distinct(outputs)) return 2;
+  if (g_mkdir_with_parents(output_directory, 0777) != 0) {
     PRINT_ERROR("%s: %s\n", output_directory, g_strerror(errno));
-    status = 1;
-  } else {
-    for (gsize i = 0; files[i] != NULL && !interrupted; ++i) {
-      const int outcome = convert(files[i], outputs[i]);
-      status = MAX(status, outcome);
-    }
+    return 1;
   }
-  g_strfreev(outputs);
+  int status = 0;
+  for (gsize i = 0; files[i] != NULL && !interrupted; ++i) {
+    const int outcome = convert(files[i], outputs[i]);
+    status = MAX(status, outcome);
+  }
   return status;
 }
 
@@ -817,28 +749,20 @@ static const char* misuse(void) {
 }
 
 int main(int argc, char** argv) {
-  GOptionContext* context;
-  GError* error = NULL;
-  const char* wrong;
-  gchar* text;
-  gboolean ok;
-
   gst_init(&argc, &argv);
-  context = g_option_context_new("IN OUT - converts event files");
-  text = help();
+  g_autoptr(GOptionContext) context = g_option_context_new("IN OUT - converts event files");
+  g_autofree gchar* text = help();
   g_option_context_set_description(context, text);
-  g_free(text);
   g_option_context_add_main_entries(context, options, NULL);
-  ok = g_option_context_parse(context, &argc, &argv, &error);
-  g_option_context_free(context);
+  g_autoptr(GError) error = NULL;
+  const gboolean ok = g_option_context_parse(context, &argc, &argv, &error);
   if (ok && print_version) {
     printf("event-convert %s\n", PACKAGE_VERSION);
     return 0;
   }
-  wrong = ok ? misuse() : error->message;
+  const char* wrong = ok ? misuse() : error->message;
   if (wrong != NULL) {
     PRINT_ERROR("%s; see %s --help\n", wrong, g_get_prgname());
-    g_clear_error(&error);
     return 2;
   }
   if (!find_plugin()) return 1;
