@@ -122,8 +122,8 @@ Chunker::Cell& Chunker::cell_of(Microseconds t) {
   const auto made = cells_.insert(after, {std::max(on_grid, start_), on_grid + length_, {}, {}});
   if (!spare_.empty()) {
     made->events = std::move(spare_.back());
-    made->events.clear();
     spare_.pop_back();
+    spare_capacity_ -= made->events.capacity();
   }
   return *made;
 }
@@ -174,27 +174,15 @@ Chunker::Interval Chunker::hand_out(Microseconds end) {
   Interval interval{start_, end - start_, {}, {}};
   start_ = end;
   if (cells_.empty() || cells_.front().start >= end) return interval;
-  if (returned_.capacity() > 0) spare_.push_back(std::move(returned_));
   auto& cell = cells_.front();
   sort(cell);
-  returned_ = std::move(cell.events);
-  returned_labels_ = std::move(cell.labels);
   const auto later = std::ranges::partition_point(
-      returned_, [&](const Event& event) { return cell.start + event.t < end; });
-  if (later == returned_.end()) {
-    cells_.pop_front();
-  } else {  // cut in the middle
-    cell.events.assign(later, returned_.end());
-    for (auto& event : cell.events) event.t -= static_cast<std::uint32_t>(end - cell.start);
-    cell.start = end;
-    if (!returned_labels_.empty()) {
-      const auto later_label = returned_labels_.begin() + (later - returned_.begin());
-      cell.labels.assign(later_label, returned_labels_.end());
-      returned_labels_.erase(later_label, returned_labels_.end());
-    }
-    returned_.erase(later, returned_.end());
-  }
-  waiting_ -= returned_.size();
+      cell.events, [&](const Event& event) { return cell.start + event.t < end; });
+  const auto count = static_cast<std::size_t>(later - cell.events.begin());
+  for (auto& event : std::span(later, cell.events.end()))  // a cut in the middle
+    event.t -= static_cast<std::uint32_t>(end - cell.start);
+  cell.start = end;
+  return_first(count);
   interval.events = returned_;
   interval.labels = returned_labels_;
   return interval;
@@ -202,18 +190,33 @@ Chunker::Interval Chunker::hand_out(Microseconds end) {
 
 /// The first events of a single time, of which more may follow: an interval without a duration.
 Chunker::Interval Chunker::hand_out_part(std::size_t count) {
-  auto& cell = cells_.front();
-  const auto part = static_cast<std::ptrdiff_t>(count);
-  returned_.assign(cell.events.begin(), cell.events.begin() + part);
-  cell.events.erase(cell.events.begin(), cell.events.begin() + part);
-  returned_labels_.clear();
-  if (!cell.labels.empty()) {
-    returned_labels_.assign(cell.labels.begin(), cell.labels.begin() + part);
-    cell.labels.erase(cell.labels.begin(), cell.labels.begin() + part);
-  }
-  if (cell.events.empty()) cells_.pop_front();
-  waiting_ -= count;
+  return_first(count);
   return {start_, 0, returned_, returned_labels_};
+}
+
+/// Moves the items from `count` on to `rest`.
+template <class Item>
+static void split(std::vector<Item>& items, std::size_t count, std::vector<Item>& rest) {
+  const auto end = items.begin() + static_cast<std::ptrdiff_t>(std::min(count, items.size()));
+  rest.assign(end, items.end());
+  items.erase(end, items.end());
+}
+
+/// Moves the first events of the first cell to `returned_`. The others stay, in the memory of those
+/// returned before.
+void Chunker::return_first(std::size_t count) {
+  auto& cell = cells_.front();
+  std::swap(cell.events, returned_);
+  std::swap(cell.labels, returned_labels_);
+  split(returned_, count, cell.events);
+  split(returned_labels_, count, cell.labels);
+  waiting_ -= count;
+  if (!cell.events.empty()) return;
+  if (spare_capacity_ + cell.events.capacity() <= max_spare) {
+    spare_capacity_ += cell.events.capacity();
+    spare_.push_back(std::move(cell.events));
+  }
+  cells_.pop_front();
 }
 
 }  // namespace eventcamera

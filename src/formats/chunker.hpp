@@ -78,6 +78,7 @@ class Chunker {
  private:
   static constexpr Microseconds never = std::numeric_limits<Microseconds>::min();
   static constexpr std::size_t max_ahead = std::size_t{1} << 16;
+  static constexpr std::size_t max_spare = 2 * max_events;
 
   /// Events of an interval of the grid, or of its rest.
   struct Cell {
@@ -98,6 +99,7 @@ class Chunker {
   static void sort(Cell& cell);
   Interval hand_out(Microseconds end);
   Interval hand_out_part(std::size_t count);
+  void return_first(std::size_t count);
   Microseconds grid_before(Microseconds t) const { return t - (t - *first_) % length_; }
 
   Microseconds length_;
@@ -115,6 +117,7 @@ class Chunker {
   std::vector<Event> returned_;  ///< by the last next()
   std::vector<Label> returned_labels_;
   std::vector<std::vector<Event>> spare_;  ///< memory for further cells
+  std::size_t spare_capacity_ = 0;         ///< sum of their capacities
   std::vector<AbsoluteEvent> ahead_;       ///< far ahead of latest_: not kept yet
   Dropped dropped_;
 };

@@ -3,6 +3,7 @@
 #include "src/formats/chunker.hpp"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <random>
@@ -251,6 +252,30 @@ TEST(Chunker, CutsAnOverfullIntervalWithoutLoss) {
   EXPECT_GT(largest, 0U);
   EXPECT_LE(largest, Chunker::max_events);
   EXPECT_EQ(chunker.dropped().late, 0U);
+}
+
+TEST(Chunker, NeedsNoMoreMemoryOverTime) {
+  const auto heap = [] {
+    const auto info = mallinfo2();
+    return info.uordblks + info.hblkhd;
+  };
+  const std::vector events(1 << 16, at(0));
+  for (const Microseconds step : {1, 300}) {  // cut in the middle of an interval, and between
+    SCOPED_TRACE(step);
+    Chunker chunker(length);
+    auto later = events;
+    const auto run = [&](int blocks) {
+      for (int i = 0; i < blocks; ++i) {
+        for (auto& event : later) event.t += step;
+        chunker.push(later);
+        while (chunker.next()) continue;
+      }
+    };
+    run(100);
+    const auto after_some = heap();
+    run(200);
+    EXPECT_LE(heap(), after_some + (std::size_t{1} << 26));
+  }
 }
 
 TEST(Chunker, LeavesOutWhatIsBeforeItsStart) {
