@@ -363,7 +363,7 @@ static void end_file(GstEventWriter* self) {
   reported(self, [&] {
     GstFlowReturn result = push_header(self, GST_CLOCK_TIME_NONE);
     if (result != GST_FLOW_OK) return result;
-    encode_triggers(self, eventcamera::Chunker::max_time);
+    encode_triggers(self, eventcamera::after_all_items);
     for (bool more = true; more && result == GST_FLOW_OK;) {
       more = priv.state->encoder->finish(priv.bytes);
       result = push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
@@ -372,6 +372,22 @@ static void end_file(GstEventWriter* self) {
     auto patch = priv.state->encoder->patch();
     return result == GST_FLOW_OK && patch ? push_patch(self, *std::move(patch)) : result;
   });
+}
+
+/// Takes triggers, which wait for the events of their interval. If too many wait, there are none:
+/// pushes them. May throw.
+static GstFlowReturn take_triggers(GstEventWriter* self, std::span<const Trigger> triggers) {
+  auto& priv = priv_of(self);
+  if (!priv.state) return GST_FLOW_OK;
+  priv.state->triggers.push(triggers);
+  if (!priv.state->triggers.is_full()) return GST_FLOW_OK;
+  ensure_segment(priv.src);
+  const auto first = std::max<Microseconds>(*priv.state->triggers.first(), 0);
+  const auto start = static_cast<GstClockTime>(first) * GST_USECOND;
+  if (const GstFlowReturn result = push_header(self, start); result != GST_FLOW_OK) return result;
+  encode_triggers(self, eventcamera::after_all_items);
+  priv.writable.reach(priv.state->last);
+  return push_bytes(self, start, GST_CLOCK_TIME_NONE);
 }
 
 /// False for words without a header, which have the sensor's size in their caps and may follow
@@ -440,9 +456,8 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       break;
     case GST_EVENT_CUSTOM_DOWNSTREAM:
       if (const auto triggers = triggers_of(event)) {
-        if (priv_of(self).state) priv_of(self).state->triggers.push(*triggers);
         gst_event_unref(event);
-        return TRUE;
+        return reported(self, [&] { return take_triggers(self, *triggers); }) == GST_FLOW_OK;
       }
       break;
     default:

@@ -65,6 +65,9 @@ class WritableEvents {
                                                    eventcamera::Microseconds start,
                                                    std::span<const eventcamera::Label> labels = {});
 
+  /// Leaves out later events that are earlier than `t`, at which something else was written.
+  void reach(eventcamera::Microseconds t) { latest_ = std::max(latest_, t); }
+
   /// Labels of the events that pick() returned, or that `write` gets from take(): one for each, or
   /// none.
   std::span<const eventcamera::Label> labels() const { return picked_labels_; }

@@ -208,7 +208,7 @@ std::optional<RecordingReader::Output> RecordingReader::next() {
       begin();
     } else if (!std::exchange(finishing_, true)) {
       finish_chunkers();
-    } else if (const auto output = next_accompanying(Chunker::max_time)) {
+    } else if (const auto output = next_accompanying(after_all_items)) {
       return output;
     } else {
       drained_ = true;
@@ -224,8 +224,11 @@ std::optional<RecordingReader::Output> RecordingReader::next_output() {
   if (!begun_) return std::nullopt;
   if (!output_due_)
     if (const auto chunk = next_chunk()) output_due_ = *chunk;
-  if (const auto* const chunk = output_due_ ? std::get_if<Chunk>(&*output_due_) : nullptr)
+  if (const auto* const chunk = output_due_ ? std::get_if<Chunk>(&*output_due_) : nullptr) {
     if (const auto before = next_accompanying(chunk->start + chunk->duration)) return before;
+  } else if (triggers_.is_full() || imu_samples_.is_full()) {
+    if (const auto early = next_accompanying(after_all_items)) return early;
+  }
   return std::exchange(output_due_, std::nullopt);
 }
 

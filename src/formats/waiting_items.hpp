@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <iterator>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -12,6 +13,9 @@
 #include "src/formats/chunker.hpp"
 
 namespace eventcamera {
+
+/// Later than any item, in any time base.
+constexpr Microseconds after_all_items = std::numeric_limits<Microseconds>::max() / 2;
 
 /// Items with a time `t`, such as triggers, that wait for the interval of events they belong to.
 template <class Item>
@@ -24,15 +28,15 @@ class WaitingItems {
     return before + items.size() - waiting_.size();
   }
 
-  /// Removes and returns the items before `end`, sorted by time; all items if too many wait. Valid
-  /// until the next call.
+  /// True if too many wait to wait any longer.
+  bool is_full() const { return waiting_.size() > max_count; }
+
+  /// Removes and returns the items before `end`, sorted by time. Valid until the next call.
   std::span<Item> take_before(Microseconds end) {
     taken_.clear();
     if (waiting_.empty()) return taken_;
     std::ranges::stable_sort(waiting_, {}, &Item::t);
-    const auto last = waiting_.size() > max_count
-                          ? waiting_.end()
-                          : std::ranges::lower_bound(waiting_, end, {}, &Item::t);
+    const auto last = std::ranges::lower_bound(waiting_, end, {}, &Item::t);
     taken_.assign(waiting_.begin(), last);
     waiting_.erase(waiting_.begin(), last);
     return taken_;

@@ -235,6 +235,19 @@ TEST(AedatMux, TakesNoPadOnceTheHeaderIsWritten) {
   EXPECT_TRUE(request_pad());
 }
 
+TEST(AedatMux, DoesNotCollectTriggersWithoutEvents) {
+  Mux mux;
+  std::vector<Trigger> triggers;
+  for (int i = 0; i < 20; ++i) {
+    for (int j = 0; j < 10'000; ++j)
+      triggers.push_back({10 * static_cast<Microseconds>(triggers.size()), 1, j % 2 == 0});
+    EXPECT_TRUE(gst_harness_push_event(mux.get(), event_of(std::span(triggers).last<10'000>())));
+  }
+  mux.wait_for_events();
+  EXPECT_GT(gst_harness_buffers_in_queue(mux.get()), 1U);
+  EXPECT_EQ(mux.end().triggers, triggers);
+}
+
 TEST(AedatMux, EndsInAnErrorOnAFullDisk) {
   Pipeline pipeline(
       "videotestsrc pattern=snow num-buffers=20 ! video/x-raw,format=GRAY8,width=64,height=48 ! "

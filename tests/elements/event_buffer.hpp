@@ -8,6 +8,19 @@
 #include "src/core/event.hpp"
 #include "tests/elements/harness.hpp"
 
+/// Triggers on their way from a reader to a writer.
+inline GstEvent* event_of(std::span<const eventcamera::Trigger> triggers) {
+  std::vector<gint64> numbers;
+  for (const auto& trigger : triggers)
+    numbers.insert(numbers.end(),
+                   {trigger.t, gint64{trigger.id} | (trigger.rising ? gint64{1} << 32 : 0)});
+  GBytes* const records = g_bytes_new(numbers.data(), numbers.size() * sizeof numbers[0]);
+  GstStructure* const structure =
+      gst_structure_new("GstEventCameraTriggers", "records", G_TYPE_BYTES, records, nullptr);
+  g_bytes_unref(records);
+  return gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, structure);
+}
+
 /// Buffer of events whose times are relative to its PTS.
 inline GstBuffer* buffer_of(GstClockTime pts, const std::vector<eventcamera::Event>& events,
                             GstClockTime duration) {

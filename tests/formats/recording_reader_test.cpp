@@ -486,6 +486,40 @@ TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
   }
 }
 
+TEST(RecordingReader, DoesNotCollectTriggersWithoutEvents) {
+  constexpr std::size_t at_once = 10'000;
+  constexpr std::size_t max_waiting = std::size_t{1} << 17;
+  const auto events = some_events();
+  const auto half = events.size() / 2;  // before a silence
+  const auto encoder = make_prophesee_raw_encoder(EvtFormat::evt3, sensor);
+  RecordingReader reader(
+      [] { return std::make_unique<OneStreamDecoder>(make_prophesee_raw_decoder()); },
+      chunk_length);
+  Outcome outcome;
+  Bytes bytes;
+  const auto read = [&] {
+    reader.push(bytes);
+    outcome.take_all(reader);
+    bytes.clear();
+  };
+  encoder->encode(std::span(events).first(half), bytes);
+  read();
+  std::vector<Trigger> triggers;
+  for (auto t = events[half - 1].t; triggers.size() < 300'000; t += 10) {
+    triggers.push_back({t - events.front().t, 1, triggers.size() % 2 == 0});
+    encoder->encode_trigger({t, 1, triggers.back().rising}, bytes);
+    if (triggers.size() % at_once != 0) continue;
+    read();
+    ASSERT_LE(triggers.size() - outcome.triggers.size(), max_waiting);
+  }
+  encoder->encode(std::span(events).subspan(half), bytes);
+  read();
+  reader.finish();
+  outcome.take_all(reader);
+  EXPECT_EQ(outcome.triggers, triggers);
+  EXPECT_EQ(outcome.events(reader.origin()), events);
+}
+
 TEST(RecordingReader, GuessesTheSizeOfASensor) {
   const auto file = npy_file();
   for (const std::size_t size : {1UL, 1UL << 24}) {

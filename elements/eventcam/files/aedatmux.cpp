@@ -59,6 +59,7 @@
 #include "gst/recording/stream_header.hpp"
 #include "gst/recording/writable_events.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
+#include "src/formats/waiting_items.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(aedat_mux_debug);
 #define GST_CAT_DEFAULT aedat_mux_debug
@@ -69,6 +70,7 @@ using eventcamera::ImuSample;
 using eventcamera::Microseconds;
 using eventcamera::SensorSize;
 using eventcamera::Trigger;
+using eventcamera::WaitingItems;
 
 namespace {
 
@@ -93,8 +95,8 @@ struct State {
   Microseconds flushed = 0;                ///< time of the last flushed packet
   /// Set once they are announced, so that the header has a stream for them; then those waiting for
   /// the next buffer.
-  std::optional<std::vector<Trigger>> triggers;
-  std::optional<std::vector<ImuSample>> imu_samples;
+  std::optional<WaitingItems<Trigger>> triggers;
+  std::optional<WaitingItems<ImuSample>> imu_samples;
   WarnOnce warn{GST_CAT_DEFAULT};
 };
 
@@ -278,9 +280,10 @@ static Bytes waiting_items(GstAedatMux* self) {
   State& state = self->priv->state;
   Bytes out;
   const auto encode = [&]<class Sample>(const char* name,
-                                        std::optional<std::vector<Sample>>& waiting) {
-    const auto samples = waiting ? std::exchange(*waiting, {}) : std::vector<Sample>();
-    const auto count = state.encoder->encode(std::span<const Sample>(samples), out);
+                                        std::optional<WaitingItems<Sample>>& waiting) {
+    const std::span<const Sample> samples =
+        waiting ? waiting->take_before(eventcamera::after_all_items) : std::span<Sample>();
+    const auto count = state.encoder->encode(samples, out);
     if (!samples.empty())
       GST_LOG_OBJECT(self, "wrote %" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT " %s", count,
                      samples.size(), name);
@@ -451,14 +454,20 @@ static GstFlowReturn write_some(GstAedatMux* self) {
   return result == GST_FLOW_OK ? GST_FLOW_EOS : result;
 }
 
-static GstFlowReturn aggregate(GstAggregator* aggregator, gboolean /*timeout*/) {
-  auto* self = GST_AEDAT_MUX(aggregator);
+/// Runs `work`; reports any exception.
+template <class Work>
+static GstFlowReturn reported(GstAedatMux* self, const Work& work) {
   return guarded(
       self,
       [](const auto& error) {
         return WritableEvents::failure(error, {GST_STREAM_ERROR_MUX, "Cannot write the file."});
       },
-      [&] { return write_some(self); });
+      work);
+}
+
+static GstFlowReturn aggregate(GstAggregator* aggregator, gboolean /*timeout*/) {
+  auto* self = GST_AEDAT_MUX(aggregator);
+  return reported(self, [&] { return write_some(self); });
 }
 
 /// Live pipelines wait for other pads until the running time of the earliest buffer, once the file
@@ -502,10 +511,10 @@ static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* c
 /// Adds triggers or IMU samples to the waiting ones. False if the event has other contents.
 template <class Sample>
 static bool take_waiting(std::optional<std::vector<Sample>>&& samples,
-                         std::optional<std::vector<Sample>>& waiting) {
+                         std::optional<WaitingItems<Sample>>& waiting) {
   if (!samples) return false;
   if (!waiting) waiting.emplace();
-  waiting->insert(waiting->end(), samples->begin(), samples->end());
+  waiting->push(*samples);
   return true;
 }
 
@@ -513,6 +522,16 @@ static GstFlowReturn sink_event_pre_queue(GstAggregator* aggregator, GstAggregat
                                           GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT_DONE) event = gap_at_segment_end(pad, event);
   return PARENT_AGGREGATOR_CLASS->sink_event_pre_queue(aggregator, pad, event);
+}
+
+/// Writes the triggers and IMU samples if too many wait for a buffer. May throw.
+static GstFlowReturn write_waiting(GstAedatMux* self) {
+  const State& state = self->priv->state;
+  const auto is_full = [](const auto& waiting) { return waiting && waiting->is_full(); };
+  if (!is_full(state.triggers) && !is_full(state.imu_samples)) return GST_FLOW_OK;
+  if (!state.encoder)
+    if (const GstFlowReturn begun = begin_file(self); begun != GST_FLOW_OK) return begun;
+  return push_bytes(self, waiting_items(self));
 }
 
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
@@ -531,7 +550,7 @@ static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, Gst
   } else if (take_waiting(triggers_of(event), state.triggers) ||
              take_waiting(imu_samples_of(event), state.imu_samples)) {
     gst_event_unref(event);
-    return TRUE;
+    return reported(self, [&] { return write_waiting(self); }) == GST_FLOW_OK;
   } else if (GST_EVENT_TYPE(event) == GST_EVENT_TAG) {
     GstTagList* tags = nullptr;
     gchar* source = nullptr;
