@@ -132,15 +132,33 @@ static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, Own
                            .encoder = std::move(encoder)});
 }
 
+/// Caps of this sensor that downstream takes.
+static OwnedCaps allowed_caps(GstPad* src, const GstEventCameraInfo& info) {
+  const OwnedCaps own(gst_caps_make_writable(gst_pad_get_pad_template_caps(src)));
+  for (guint i = 0; i < gst_caps_get_size(own.get()); ++i) {
+    GstStructure* words = gst_caps_get_structure(own.get(), i);
+    if (gst_structure_has_name(words, GST_EVENT_CAMERA_MEDIA_TYPE))
+      gst_structure_set(words, "width", G_TYPE_INT, info.width, "height", G_TYPE_INT, info.height,
+                        nullptr);
+  }
+  return OwnedCaps(gst_pad_peer_query_caps(src, own.get()));
+}
+
 static GstFlowReturn negotiate(GstEventWriter* self, const GstEventCameraInfo& info) {
   auto& priv = priv_of(self);
-  const auto fixate = format_of(self).fixate;
-  GstCaps* caps = gst_pad_get_allowed_caps(priv.src);
-  if (caps == nullptr) caps = gst_pad_get_pad_template_caps(priv.src);
-  if (!gst_caps_is_empty(caps)) {
-    caps = gst_caps_truncate(caps);
-    if (fixate != nullptr) caps = fixate(info, priv.settings.copy().choice.variant, caps);
+  OwnedCaps allowed = allowed_caps(priv.src, info);
+  if (gst_caps_is_empty(allowed.get())) {
+    const OwnedCaps taken(gst_pad_peer_query_caps(priv.src, nullptr));
+    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
+                      ("Downstream does not take this format, or not from a sensor of %s. Correct "
+                       "the caps after this element.",
+                       eventcamera::in_pixels({info.width, info.height}).c_str()),
+                      ("downstream takes %" GST_PTR_FORMAT, taken.get()));
+    return GST_FLOW_NOT_NEGOTIATED;
   }
+  GstCaps* caps = gst_caps_truncate(allowed.release());
+  if (const auto fixate = format_of(self).fixate)
+    caps = fixate(info, priv.settings.copy().choice.variant, caps);
   OwnedCaps fixed(caps);
   if (!gst_caps_is_fixed(fixed.get())) return GST_FLOW_NOT_NEGOTIATED;
   GST_DEBUG_OBJECT(self, "writing the events of %dx%d pixels as %" GST_PTR_FORMAT, info.width,

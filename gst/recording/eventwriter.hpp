@@ -43,8 +43,9 @@ struct EventFileFormat {
   /// Creates the encoder for a stream with these output caps. May throw.
   std::unique_ptr<eventcamera::Encoder> (*create)(eventcamera::SensorSize size, Choice choice,
                                                   const GstCaps* caps);
-  /// Fixates the caps (not empty) that the member `caps` and downstream have in common. Takes
-  /// ownership of them and returns fixed caps. Null if they are always fixed.
+  /// Fixates the caps (not empty) that the member `caps` and downstream have in common; those of
+  /// words have the size of the sensor. Takes ownership of them and returns fixed caps. Null if
+  /// they are always fixed.
   GstCaps* (*fixate)(const GstEventCameraInfo& info, int variant, GstCaps* caps) = nullptr;
 };
 

@@ -208,4 +208,17 @@ TEST(EvtEnc, TakesTheFormatThatDownstreamLeaves) {
   EXPECT_NE(h.out_caps().find("width=(int)320"), std::string::npos);
 }
 
+TEST(EvtEnc, RefusesCapsOfAnotherSensor) {
+  const TemporaryFile file(file_of(format_of("evt3"), some_events()));
+  const std::string other = "application/x-event-camera,format=EVT3,width=32,height=32";
+  Pipeline refused(file.source() + "evtdec ! evtenc ! " + other + " ! fakesink");
+  EXPECT_FALSE(refused.play());
+  EXPECT_EQ(refused.error,
+            "Downstream does not take this format, or not from a sensor of 320 x 240 pixels. "
+            "Correct the caps after this element.");
+  const Writer chooses("evtenc", other + "; application/x-event-camera,format=EVT2");
+  EXPECT_NE(chooses.out_caps().find("EVT2"), std::string::npos);
+  EXPECT_NE(chooses.out_caps().find("width=(int)320"), std::string::npos);
+}
+
 }  // namespace

@@ -70,8 +70,6 @@ static GstCaps* fixate_evt(const GstEventCameraInfo& info, int variant, GstCaps*
   if (gst_structure_has_name(structure, GST_EVENT_CAMERA_MEDIA_TYPE)) {
     gst_structure_fixate_field_string(structure, "format",
                                       evt_format_name(static_cast<EvtFormat>(variant)));
-    gst_structure_fixate_field_nearest_int(structure, "width", info.width);
-    gst_structure_fixate_field_nearest_int(structure, "height", info.height);
     if (gst_structure_has_field(structure, "framerate"))
       gst_structure_fixate_field_nearest_fraction(structure, "framerate", info.fps_n, info.fps_d);
     else
