@@ -229,9 +229,9 @@ static GstFlowReturn push_bytes(GstAedatMux* self, Bytes bytes, bool header = fa
   return gst_aggregator_finish_buffer(GST_AGGREGATOR(self), buffer);
 }
 
-/// Sends the caps, with the header as streamheader for late joiners.
+/// Sends the caps, with the header as streamheader for late joiners. May throw.
 static void send_caps(GstAedatMux* self, const Bytes& header) {
-  const OwnedBuffer buffer(gst_buffer_new_memdup(header.data(), header.size()));
+  const OwnedBuffer buffer(copied_buffer(std::as_bytes(std::span(header))));
   const OwnedCaps caps = with_stream_header(
       OwnedCaps(gst_caps_new_simple("application/x-aedat", "version", G_TYPE_INT, 4, nullptr)),
       buffer.get());

@@ -52,6 +52,7 @@
 #include "elements/eventcam/network/rtp_events.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
+#include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/guarded.hpp"
@@ -144,6 +145,11 @@ static void update_segment(GstRtpEventDepay* self, GstClockTime start, GstClockT
                 gst_segment_to_stream_time(&in, in.format, arrival));
 }
 
+static Report no_memory(const std::exception&) {
+  return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
+}
+
+/// May throw.
 static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
   const auto start = static_cast<GstClockTime>(interval.start);
   const auto duration = static_cast<GstClockTime>(interval.duration);
@@ -159,7 +165,7 @@ static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
     gst_pad_push_event(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), gst_event_new_gap(start, duration));
     return;
   }
-  GstBuffer* buffer = gst_buffer_new_memdup(interval.events.data(), interval.events.size_bytes());
+  GstBuffer* buffer = copied_buffer(std::as_bytes(interval.events));
   GST_BUFFER_PTS(buffer) = start;
   GST_BUFFER_DURATION(buffer) = duration;
   if (std::exchange(state.is_discontinuous, false))
@@ -168,15 +174,13 @@ static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
 }
 
 static void flush(GstRtpEventDepay* self) {
-  if (auto& state = self->priv->state)
-    state->unpacker.flush([&](const RtpInterval& interval) { push(self, interval); });
+  guarded(self, no_memory, [&] {
+    if (auto& state = self->priv->state)
+      state->unpacker.flush([&](const RtpInterval& interval) { push(self, interval); });
+  });
 }
 
 /* input */
-
-static Report no_memory(const std::exception&) {
-  return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
-}
 
 static void warn_of_rejected(GstRtpEventDepay* self, guint number) {
   self->priv->warn_of_rejected(
