@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "src/formats/byte_source.hpp"
+#include "src/formats/collected_bytes.hpp"
 #include "src/formats/hdf5/hdf5_reader.hpp"
 
 namespace eventcamera {
@@ -15,15 +15,10 @@ namespace {
 /// The events of a file.
 class Hdf5Decoder final : public RecordingDecoder {
  public:
-  void push(std::span<const std::uint8_t> piece) override {
-    constexpr std::size_t max_collected = std::size_t{1} << 28;
-    if (piece.size() > max_collected - collected_.size())
-      throw UnsupportedFormat("an HDF5 file this large has to be pulled, as from filesrc");
-    collected_.insert(collected_.end(), piece.begin(), piece.end());
-  }
+  void push(std::span<const std::uint8_t> piece) override { collected_.push(piece); }
 
   void finish() override {
-    reader_ = std::make_unique<Hdf5Reader>(std::make_unique<MemoryBytes>(std::move(collected_)));
+    reader_ = std::make_unique<Hdf5Reader>(collected_.take());
     describe();
   }
 
@@ -85,7 +80,7 @@ class Hdf5Decoder final : public RecordingDecoder {
     streams_.front().labelled = reader_->has_labels();
   }
 
-  std::vector<std::uint8_t> collected_;
+  CollectedBytes collected_{"an HDF5 file"};
   std::unique_ptr<Hdf5Reader> reader_;  ///< set once the file can be read
   std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
   std::vector<AbsoluteEvent> events_;

@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "src/core/max_side.hpp"
+#include "src/formats/collected_bytes.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/zip_archive.hpp"
 
@@ -268,15 +269,10 @@ class NpzDecoder final : public RecordingDecoder {
  public:
   explicit NpzDecoder(const TableSettings& settings) : settings_(settings) {}
 
-  void push(std::span<const std::uint8_t> piece) override {
-    constexpr std::size_t max_collected = std::size_t{1} << 28;
-    if (piece.size() > max_collected - collected_.size())
-      throw UnsupportedFormat("a NumPy archive this large has to be pulled, as from filesrc");
-    collected_.insert(collected_.end(), piece.begin(), piece.end());
-  }
+  void push(std::span<const std::uint8_t> piece) override { collected_.push(piece); }
 
   void finish() override {
-    bytes_ = std::make_unique<MemoryBytes>(std::move(collected_));
+    bytes_ = collected_.take();
     open(*bytes_);
   }
 
@@ -310,9 +306,9 @@ class NpzDecoder final : public RecordingDecoder {
 
  private:
   TableSettings settings_;
-  std::vector<std::uint8_t> collected_;
-  std::unique_ptr<MemoryBytes> bytes_;  ///< collected bytes
-  std::unique_ptr<Archive> archive_;    ///< set once it can be read
+  CollectedBytes collected_{"a NumPy archive"};
+  std::unique_ptr<ByteSource> bytes_;  ///< collected bytes
+  std::unique_ptr<Archive> archive_;   ///< set once it can be read
   std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
   Decoded decoded_;
 };

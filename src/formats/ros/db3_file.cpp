@@ -25,16 +25,9 @@ constexpr std::int64_t before_all = std::numeric_limits<std::int64_t>::min();
 Db3File::Db3File(TakeTopic take_topic) : BagFile(std::move(take_topic)) {}
 Db3File::~Db3File() = default;
 
-void Db3File::push(std::span<const std::uint8_t> piece) {
-  constexpr std::size_t max_collected = std::size_t{1} << 28;
-  if (piece.size() > max_collected - collected_.size())
-    throw UnsupportedFormat("a .db3 file this large has to be pulled, as from filesrc");
-  collected_.insert(collected_.end(), piece.begin(), piece.end());
-}
-
 void Db3File::finish() {
   if (database_) return;
-  own_bytes_ = std::make_unique<MemoryBytes>(std::move(collected_));
+  own_bytes_ = collected_.take();
   database_ = std::make_unique<SqliteDatabase>(*own_bytes_);
   read_topics();
 }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "src/formats/collected_bytes.hpp"
 #include "src/formats/compression/compressed_frames.hpp"
 #include "src/formats/ros/bag_file.hpp"
 
@@ -26,7 +27,7 @@ class Db3File final : public BagFile {
   Db3File(const Db3File&) = delete;
   Db3File& operator=(const Db3File&) = delete;
 
-  void push(std::span<const std::uint8_t> piece) override;
+  void push(std::span<const std::uint8_t> piece) override { collected_.push(piece); }
   void finish() override;
   bool open(ByteSource& source) override;
   std::optional<BagMessage> next() override;
@@ -40,8 +41,8 @@ class Db3File final : public BagFile {
   void read_from(std::int64_t id);
   std::optional<std::span<const std::uint8_t>> content_of(std::span<const std::uint8_t> data);
 
-  std::vector<std::uint8_t> collected_;    ///< in push mode
-  std::unique_ptr<ByteSource> own_bytes_;  ///< the same, at the end
+  CollectedBytes collected_{"a .db3 file"};  ///< in push mode
+  std::unique_ptr<ByteSource> own_bytes_;    ///< the same, at the end
   std::unique_ptr<SqliteDatabase> database_;
   std::unique_ptr<SqliteRows> messages_;  ///< those not yet read
   bool is_opened_ = false;                ///< with random access
