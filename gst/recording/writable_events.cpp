@@ -13,10 +13,6 @@ using eventcamera::Microseconds;
 using eventcamera::SensorSize;
 using eventcamera::TemporaryFileError;
 
-static std::string text_of(SensorSize size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
 void WritableEvents::begin_file(SensorSize sensor) {
   sensor_ = sensor;
   latest_ = 0;
@@ -28,7 +24,7 @@ bool WritableEvents::accepts(SensorSize sensor) const {
   if (sensor == sensor_) return true;
   post_message(element_, GST_MESSAGE_ERROR,
                {GST_STREAM_ERROR_FORMAT,
-                "The sensor size changes from " + text_of(sensor_) + " to " + text_of(sensor) +
+                "The sensor size changes from " + in_pixels(sensor_) + " to " + in_pixels(sensor) +
                     " within a file. Start a new file for it, or set width and "
                     "height where the events are read."},
                "new caps after events were written");
@@ -93,8 +89,7 @@ void WritableEvents::warn_of_earlier() {
 }
 
 void WritableEvents::warn_of_outside() {
-  warn(outside_,
-       "outside the sensor. Correct the size in the caps, " + text_of(sensor_) + " pixels.",
+  warn(outside_, "outside the sensor. Correct the size in the caps, " + in_pixels(sensor_) + ".",
        "x or y is past the width or height in the caps");
 }
 

@@ -63,7 +63,7 @@ TEST(AedatDemux, Aedat2WithoutACameraHasTheSizeThatIsAskedFor) {
     EXPECT_TRUE(assumed.play()) << assumed.error;
     EXPECT_TRUE(assumed.events == events);
     ASSERT_EQ(assumed.warnings.size(), 1U);
-    EXPECT_NE(assumed.warnings.front().find("assuming 240x180 pixels"), std::string::npos);
+    EXPECT_NE(assumed.warnings.front().find("assuming 240 x 180 pixels"), std::string::npos);
 
     auto moved = events;  // by what a DAVIS346 has more of
     for (auto& e : moved) e = AbsoluteEvent::at(e.x + 106, e.y() + 80, e.t, e.polarity());

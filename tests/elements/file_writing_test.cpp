@@ -20,7 +20,7 @@ TEST_P(EveryFormat, IsWrittenWithoutWhatLiesOutsideTheSensor) {
   EXPECT_TRUE(h.pull_event(GST_EVENT_GAP));
   EXPECT_TRUE(
       h.warning().starts_with("Left out 2 events outside the sensor. Correct the size in the "
-                              "caps, 320x240 pixels"));
+                              "caps, 320 x 240 pixels"));
   EXPECT_EQ(events_in(format(), h.end()), (std::vector{events[0], events[3]}));
   EXPECT_EQ(h.left_out(), "");
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));

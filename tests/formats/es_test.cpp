@@ -74,7 +74,7 @@ TEST(EventStream, IsAnErrorThatSaysWhy) {
   EXPECT_NE(error(file(9, {})).find('9'), std::string::npos);
   auto no_rows = file(1, {});
   no_rows[18] = no_rows[19] = 0;
-  EXPECT_NE(error(no_rows).find("320x0"), std::string::npos);
+  EXPECT_NE(error(no_rows).find("320 x 0"), std::string::npos);
 }
 
 TEST(EventStream, IsWrittenByteByByte) {

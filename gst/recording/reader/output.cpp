@@ -206,24 +206,24 @@ bool EventReader::find_size(std::size_t index) {
     }
   }
   if (stream.is_implausible) {
-    const auto max_side = std::to_string(eventcamera::UsedPixels::max_guessed_side);
+    constexpr int max_side = eventcamera::UsedPixels::max_guessed_side;
     post_message(
         element_, GST_MESSAGE_ERROR,
         {GST_STREAM_ERROR_FORMAT,
-         "The file does not state its sensor size, and its events lie beyond " + max_side + "x" +
-             max_side + " pixels. If that is right, set width and height."},
+         "The file does not state its sensor size, and its events lie beyond " +
+             eventcamera::in_pixels({max_side, max_side}) +
+             ". If that is right, set width and height."},
         "columns and rows may have fractions, or other columns may have been read for them");
     return false;
   }
-  const auto text =
-      std::to_string(stream.info.size.width) + "x" + std::to_string(stream.info.size.height);
+  const auto text = in_pixels(stream.info.size);
   GST_INFO_OBJECT(element_, "the file does not state the sensor size; assuming %s", text.c_str());
   if (stream.info.mirrored)
-    warn_of_assumption_(element_,
-                        {GST_STREAM_ERROR_FORMAT,
-                         "The file does not state its sensor size; assuming " + text +
-                             " pixels. If events are in the wrong place, set width and height."},
-                        "columns and rows of the file count from the far corner");
+    warn_of_assumption_(
+        element_,
+        {GST_STREAM_ERROR_FORMAT, "The file does not state its sensor size; assuming " + text +
+                                      ". If events are in the wrong place, set width and height."},
+        "columns and rows of the file count from the far corner");
   return true;
 }
 
@@ -245,13 +245,12 @@ bool EventReader::send_caps(std::size_t index) {
 GstFlowReturn EventReader::refused_size(std::size_t index) {
   const GstFlowReturn refusal = pad_of(index).refusal();
   if (refusal == GST_FLOW_FLUSHING) return refusal;
-  const auto size = recording_->streams()[index].info.size;
-  const auto text = std::to_string(size.width) + "x" + std::to_string(size.height);
+  const auto text = in_pixels(recording_->streams()[index].info.size);
   post_message(element_, GST_MESSAGE_ERROR,
                {GST_STREAM_ERROR_FORMAT,
                 "Events lie outside the assumed sensor, whose size the file does not state. Set "
                 "width and height; the events so far need " +
-                    text + " pixels."},
+                    text + "."},
                "downstream refuses to change the size to " + text);
   return GST_FLOW_ERROR;
 }

@@ -173,8 +173,7 @@ class EsDecoder final : public UnitStreamDecoder {
   template <class EventDecoder>
   void begin_events(SensorSize size) {
     if (!is_side(size.width) || !is_side(size.height))
-      throw UnsupportedFormat("Event Stream with an impossible sensor size of " +
-                              std::to_string(size.width) + "x" + std::to_string(size.height));
+      throw UnsupportedFormat("Event Stream with an impossible sensor size of " + in_pixels(size));
     begin(std::make_unique<EventDecoder>(size, origin_), size);
   }
 
