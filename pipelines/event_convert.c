@@ -19,7 +19,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "crop.h"
 #include "plugin.h"
 
 /* Prints text unchanged: names are bytes, messages are UTF-8. g_print() would replace characters
@@ -102,7 +101,7 @@ static Option properties[] = {
 static gdouble from_seconds;
 static gdouble to_seconds = G_MAXDOUBLE;
 static gchar* crop_text;
-static Region region;
+static struct { guint width, height, x, y; } region;
 
 static gchar* output_directory;
 static gchar* output_extension;
@@ -478,6 +477,41 @@ static gint64 nanoseconds(gdouble seconds) {
   return (gint64)(seconds * GST_SECOND + 0.5);
 }
 
+/* Parses WIDTHxHEIGHT+X+Y. FALSE if the text is invalid. */
+static gboolean set_region(const char* text) {
+  /* Alone, sscanf() would take signs and spaces. */
+  static const char form[] = "^[0-9]{1,5}x[0-9]{1,5}[+][0-9]{1,5}[+][0-9]{1,5}\\z";
+  return g_regex_match_simple(form, text, 0, 0) &&
+         sscanf(text, "%5ux%5u+%5u+%5u", &region.width, &region.height, &region.x, &region.y) ==
+             4 &&
+         region.width > 0 && region.height > 0 &&
+         region.x + region.width <= GST_EVENT_CAMERA_MAX_SIDE &&
+         region.y + region.height <= GST_EVENT_CAMERA_MAX_SIDE;
+}
+
+/* Makes `crop` keep the region, once the size of the sensor is known. Runs in the streaming thread.
+ */
+static GstPadProbeReturn set_crop(GstPad* pad, GstPadProbeInfo* info, gpointer crop) {
+  GstEvent* event = GST_PAD_PROBE_INFO_EVENT(info);
+  GstCaps* caps;
+  GstEventCameraInfo sensor;
+  (void)pad;
+  if (GST_EVENT_TYPE(event) != GST_EVENT_CAPS) return GST_PAD_PROBE_OK;
+  gst_event_parse_caps(event, &caps);
+  if (!gst_event_camera_info_from_caps(&sensor, caps) ||
+      region.x + region.width > (guint)sensor.width ||
+      region.y + region.height > (guint)sensor.height) {
+    GST_ELEMENT_ERROR(crop, STREAM, FORMAT,
+                      ("The region %ux%u+%u+%u is not within the sensor.", region.width,
+                       region.height, region.x, region.y),
+                      ("%" GST_PTR_FORMAT, (void*)caps));
+    return GST_PAD_PROBE_DROP;
+  }
+  g_object_set(crop, "left", region.x, "right", (guint)sensor.width - region.x - region.width,
+               "top", region.y, "bottom", (guint)sensor.height - region.y - region.height, NULL);
+  return GST_PAD_PROBE_OK;
+}
+
 /* True if only a part of the time is converted. */
 static gboolean is_trimmed(void) {
   return from_seconds > 0 || to_seconds < G_MAXDOUBLE;
@@ -626,9 +660,9 @@ static gchar* target_of(const char* path) {
 static GstElement* make_pipeline(const char* in, const Reader* from, const char* part,
                                  const Format* to, Content* content, int* status) {
   g_autoptr(GError) error = NULL;
-  g_autofree gchar* line =
-      g_strdup_printf("filesrc name=in ! %s name=reader %s queue name=events ! %s", from->element,
-                      from->has_streams ? "" : "!", to->writer);
+  g_autofree gchar* line = g_strdup_printf(
+      "filesrc name=in ! %s name=reader %s queue name=events ! %s %s", from->element,
+      from->has_streams ? "" : "!", crop_text != NULL ? "eventcrop name=crop !" : "", to->writer);
   g_autoptr(GstElement) pipeline =
       gst_parse_launch_full(line, NULL, GST_PARSE_FLAG_FATAL_ERRORS, &error);
   if (pipeline == NULL) {
@@ -642,9 +676,13 @@ static GstElement* make_pipeline(const char* in, const Reader* from, const char*
   }
   set_location(pipeline, "in", in);
   set_location(pipeline, "out", part);
-  g_autoptr(GstElement) queue = gst_bin_get_by_name(GST_BIN(pipeline), "events");
-  g_autoptr(GstPad) pad = gst_element_get_static_pad(queue, "src");
-  if (crop_text != NULL) crop_events(pad, &region);
+  g_autoptr(GstElement) last =
+      gst_bin_get_by_name(GST_BIN(pipeline), crop_text != NULL ? "crop" : "events");
+  if (crop_text != NULL) {
+    g_autoptr(GstPad) sink = gst_element_get_static_pad(last, "sink");
+    gst_pad_add_probe(sink, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, set_crop, last, NULL);
+  }
+  g_autoptr(GstPad) pad = gst_element_get_static_pad(last, "src");
   gst_pad_add_probe(pad, GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_FLUSH, count_events,
                     content, NULL);
   if (from->has_streams) link_when_known(pipeline, to);
@@ -743,7 +781,7 @@ static const char* misuse(void) {
   if (!(from_seconds >= 0 && from_seconds < to_seconds && from_seconds < 1e9))
     return "--from must be at least 0 and less than --to";
   if (to_seconds < G_MAXDOUBLE && to_seconds >= 1e9) return "--to must be less than 1e9";
-  if (crop_text != NULL && !region_from_text(&region, crop_text))
+  if (crop_text != NULL && !set_region(crop_text))
     return "--crop needs WIDTHxHEIGHT+X+Y, such as 320x240+100+50";
   return NULL;
 }

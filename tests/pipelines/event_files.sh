@@ -319,7 +319,12 @@ for ending in npz h5 csv; do
   convert "${format[@]}" labelled.npz "labels.$ending" 2>left-out
   if grep "left out" left-out; then fail "labels are left out of labels.$ending"; fi
 done
+timeout 60 "$GST_LAUNCH" -q filesrc location=labelled.npz ! eventnpzdec ! eventcrop left=50 right=170 top=60 bottom=100 ! eventcsvenc format=labels ! filesink location=region-labels.csv
+convert --format=labels --crop=100x80+50+60 labelled.npz cropped-labels.csv
+cmp region-labels.csv cropped-labels.csv || fail "labels of a region are lost"
 for ending in csv raw hdf5 aedat4; do
+  convert --crop=100x80+50+60 labelled.npz "unlabelled.$ending" 2>left-out
+  grep -q "labelled.npz: left out: labels$" left-out || fail "nobody tells of labels of a region that unlabelled.$ending lacks"
   convert labelled.npz "unlabelled.$ending" 2>left-out
   grep -q "labelled.npz: left out: labels$" left-out || fail "nobody tells of labels that unlabelled.$ending lacks"
 done
