@@ -34,8 +34,9 @@ run_lines() { # PAGE...
       *rtspsrc*) line=${line/fakesink/fakesink num-buffers=10} ;;
       gst-play*) line="$line --no-interactive --videosink=fakesink" ;;
       *--from=10\ --to=20*) line=${line/--from=10 --to=20/--from=0.1 --to=0.2} ;;
-      event-calibrate*) # one and a half seconds are enough
+      event-calibrate*) # a second is enough
         line=${line/--to 2 --measure-from 2 --measure-to 10/--to 0.3 --measure-from 0.3 --measure-to 1}
+        line=${line/--lag find/--lag find --to 0.3}
         line="${line/eventsim-dvs/\"eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0\"}"
         ;;
     esac
