@@ -27,7 +27,7 @@ class Chunker {
   static constexpr Microseconds max_time = Microseconds{1} << 52;
   static constexpr bool is_time(Microseconds t) { return t >= -max_time && t <= max_time; }
   /// Bounds the memory: an interval with more events is cut in two.
-  static constexpr std::size_t max_events = std::size_t{1} << 22;
+  static constexpr std::size_t max_events = std::size_t{1} << 21;
 
   struct Interval {
     Microseconds start;
