@@ -31,15 +31,13 @@
 
 #include <algorithm>
 #include <atomic>
-#include <memory>
 #include <optional>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
+#include "elements/eventcam/files/aedat_file.hpp"
 #include "gst/aggregator/segment_end.hpp"
 #include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/authors.hpp"
@@ -52,25 +50,16 @@
 #include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
-#include "gst/base/video_frame.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/frame_buffer.hpp"
-#include "gst/recording/sensor_events.hpp"
 #include "gst/recording/stream_header.hpp"
-#include "gst/recording/writable_events.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
-#include "src/formats/waiting_items.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(aedat_mux_debug);
 #define GST_CAT_DEFAULT aedat_mux_debug
 
 using eventcamera::Aedat4Compression;
-using eventcamera::Aedat4Encoder;
-using eventcamera::ImuSample;
 using eventcamera::Microseconds;
-using eventcamera::SensorSize;
-using eventcamera::Trigger;
-using eventcamera::WaitingItems;
 
 namespace {
 
@@ -78,40 +67,19 @@ struct Settings {
   Aedat4Compression compression = Aedat4Compression::lz4;
 };
 
-/// Maximum time that events wait to be written as a packet.
-constexpr Microseconds max_wait = 100'000;
-
 using Pad = OwnedAggregatorPad;
-
-using Bytes = std::vector<guint8>;
-
-/// State of the file being written, from caps to stop.
-struct State {
-  SensorSize size;  ///< size of the event stream
-  std::optional<GstVideoInfo> video;
-  std::string source;                      ///< name of the camera
-  std::unique_ptr<Aedat4Encoder> encoder;  ///< null until the header is written
-  std::optional<GstSegment> segment;       ///< of the events written last
-  Microseconds flushed = 0;                ///< time of the last flushed packet
-  /// Set once they are announced, so that the header has a stream for them; then those waiting for
-  /// the next buffer.
-  std::optional<WaitingItems<Trigger>> triggers;
-  std::optional<WaitingItems<ImuSample>> imu_samples;
-  WarnOnce warn{GST_CAT_DEFAULT};
-};
 
 }  // namespace
 
 struct GstAedatMuxPrivate {
-  explicit GstAedatMuxPrivate(GstElement* self)
-      : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_MUX) {}
+  explicit GstAedatMuxPrivate(GstElement* self) : file(self, GST_CAT_DEFAULT) {}
 
   Guarded<Settings> settings;
   std::atomic<bool> has_header = false;  ///< no pads can be added
 
   // Accessed by the streaming thread only, or while there is none.
-  State state;
-  WritableEvents writable;
+  AedatFile file;
+  std::optional<GstSegment> segment;  ///< of the events written last
 };
 
 G_DECLARE_FINAL_TYPE(GstAedatMux, gst_aedat_mux, GST, AEDAT_MUX, GstAggregator)
@@ -213,16 +181,10 @@ static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
   return earliest;
 }
 
-/// Warns about dropped input.
-static void warn(GstAedatMux* self, const char* what, const std::string& cause) {
-  self->priv->state.warn(self, {GST_STREAM_ERROR_MUX, std::string("Left out ") + what + "."},
-                         cause);
-}
-
 /* output */
 
 /// Pushes `bytes` downstream.
-static GstFlowReturn push_bytes(GstAedatMux* self, Bytes bytes, bool header = false) {
+static GstFlowReturn push_bytes(GstAedatMux* self, AedatFile::Bytes bytes, bool header = false) {
   if (bytes.empty()) return GST_FLOW_OK;
   GstBuffer* const buffer = owning_buffer(std::move(bytes));
   if (header) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_HEADER);
@@ -230,7 +192,7 @@ static GstFlowReturn push_bytes(GstAedatMux* self, Bytes bytes, bool header = fa
 }
 
 /// Sends the caps, with the header as streamheader for late joiners. May throw.
-static void send_caps(GstAedatMux* self, const Bytes& header) {
+static void send_caps(GstAedatMux* self, const AedatFile::Bytes& header) {
   const OwnedBuffer buffer(copied_buffer(std::as_bytes(std::span(header))));
   const OwnedCaps caps = with_stream_header(
       OwnedCaps(gst_caps_new_simple("application/x-aedat", "version", G_TYPE_INT, 4, nullptr)),
@@ -249,85 +211,31 @@ static void send_segment(GstAedatMux* self, guint64 position) {
 /// Writes the header. May throw.
 static GstFlowReturn begin_file(GstAedatMux* self) {
   self->priv->has_header = true;
-  State& state = self->priv->state;
   eventcamera::Aedat4Settings settings;
-  settings.size = state.size;
-  if (state.size == SensorSize{} && state.video)
-    settings.size = {GST_VIDEO_INFO_WIDTH(&*state.video), GST_VIDEO_INFO_HEIGHT(&*state.video)};
-  settings.source = state.source;
   settings.frames = std::ranges::any_of(
       sink_pads(self), [](const Pad& pad) { return kind_of(pad.get()) != Kind::events; });
   settings.table = peer_can_seek(GST_AGGREGATOR_SRC_PAD(self), GST_FORMAT_BYTES);
   settings.compression = self->priv->settings.copy().compression;
-  settings.triggers = state.triggers.has_value();
-  settings.imu_samples = state.imu_samples.has_value();
-  self->priv->writable.begin_file(state.size);
-  GST_DEBUG_OBJECT(self, "beginning a file of %dx%d pixels%s%s%s, %s a table of packets",
-                   settings.size.width, settings.size.height, settings.frames ? ", frames" : "",
-                   settings.triggers ? ", triggers" : "",
-                   settings.imu_samples ? ", IMU samples" : "",
-                   settings.table ? "with" : "without");
-  state.encoder = std::make_unique<Aedat4Encoder>(settings);
-  Bytes header;
-  state.encoder->flush(header);
+  auto header = self->priv->file.begin(std::move(settings));
   send_caps(self, header);
   send_segment(self, 0);
   return push_bytes(self, std::move(header), true);
 }
 
-/// Encodes the waiting triggers and IMU samples. May throw.
-static Bytes waiting_items(GstAedatMux* self) {
-  State& state = self->priv->state;
-  Bytes out;
-  const auto encode = [&]<class Sample>(const char* name,
-                                        std::optional<WaitingItems<Sample>>& waiting) {
-    const std::span<const Sample> samples =
-        waiting ? waiting->take_before(eventcamera::after_all_items) : std::span<Sample>();
-    const auto count = state.encoder->encode(samples, out);
-    if (!samples.empty())
-      GST_LOG_OBJECT(self, "wrote %" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT " %s", count,
-                     samples.size(), name);
-    return count;
-  };
-  const auto triggers = encode("triggers", state.triggers);
-  const auto imu_samples = encode("IMU samples", state.imu_samples);
-  const auto written = self->priv->writable.written().lock();
-  written->triggers += triggers;
-  written->imu_samples += imu_samples;
-  return out;
-}
-
 /// Writes the end of the file, and patches the header. May throw.
 static GstFlowReturn end_file(GstAedatMux* self) {
-  State& state = self->priv->state;
-  self->priv->writable.end_file();
-  Bytes bytes = waiting_items(self);
-  state.encoder->finish(bytes);
-  const GstFlowReturn result = push_bytes(self, std::move(bytes));
-  auto patch = state.encoder->patch();
+  auto& file = self->priv->file;
+  const GstFlowReturn result = push_bytes(self, file.finish());
+  auto patch = file.patch();
   GST_DEBUG_OBJECT(self, "the file ends%s", patch ? "; completing its header" : "");
   if (result != GST_FLOW_OK || !patch) return result;
   send_segment(self, patch->position);
   return push_bytes(self, std::move(patch->bytes));
 }
 
-/// Encodes the events of a buffer. May throw.
-static void write_events(GstAedatMux* self, GstBuffer* buffer, Bytes& out) {
-  const MappedEvents mapped(buffer);
-  if (!mapped) {
-    warn(self, "a buffer with a partial event",
-         std::to_string(gst_buffer_get_size(buffer)) + " bytes");
-    return;
-  }
-  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, mapped.events().size(),
-                 GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
-  self->priv->state.encoder->encode(self->priv->writable.pick(mapped.events(), mapped.start()),
-                                    out);
-}
-
 /// Segment of the events before the next frame, or of those that come first; none without events.
 static std::optional<GstSegment> segment_of_events(GstAedatMux* self) {
-  if (const auto& segment = self->priv->state.segment) return segment;
+  if (const auto& segment = self->priv->segment) return segment;
   for (const Pad& pad : sink_pads(self))
     if (kind_of(pad.get()) == Kind::events) return segment_of(pad.get());
   return std::nullopt;
@@ -344,29 +252,9 @@ static Microseconds frame_time(GstAedatMux* self, GstBuffer* frame, GstClockTime
   return static_cast<Microseconds>(time / GST_USECOND);
 }
 
-/// Encodes a frame. May throw.
-static void write_frame(GstAedatMux* self, GstBuffer* buffer, Microseconds t, Bytes& out) {
-  State& state = self->priv->state;
-  GST_LOG_OBJECT(self, "frame at %" G_GINT64_FORMAT " us", gint64{t});
-  const auto reject = [&](const char* cause) {
-    warn(self, "a frame that does not fit into the file",
-         std::string(cause) + ", at " + std::to_string(t) + " us");
-  };
-  if (!state.video) return reject("no caps");
-  const VideoFrame video(*state.video, buffer, GST_MAP_READ);
-  if (!video) return reject(video.fault().c_str());
-  const auto frame = recorded_frame(video.get(), t);
-  try {
-    state.encoder->encode(frame, out);
-    ++self->priv->writable.written().lock()->frames;
-  } catch (const std::invalid_argument& error) {
-    reject(error.what());
-  }
-}
-
 /// Writes the earliest buffer. May throw.
 static GstFlowReturn write_next(GstAedatMux* self) {
-  State& state = self->priv->state;
+  auto& file = self->priv->file;
   GstClockTime time = 0;
   const Pad pad = earliest_pad(self, &time);
   if (!pad) return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -374,26 +262,16 @@ static GstFlowReturn write_next(GstAedatMux* self) {
   if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
   const GstClockTime running = running_time(pad.get(), buffer.get());
   if (!GST_CLOCK_TIME_IS_VALID(running)) {
-    warn(self, "a buffer without a timestamp, or outside its segment",
-         "pad " + std::string(GST_PAD_NAME(pad.get())) + ", no running time");
+    file.leave_out("a buffer without a timestamp, or outside its segment",
+                   "pad " + std::string(GST_PAD_NAME(pad.get())) + ", no running time");
     return GST_FLOW_OK;
   }
-  Bytes out = waiting_items(self);
   const bool of_events = kind_of(pad.get()) == Kind::events;
   const Microseconds t = of_events
                              ? static_cast<Microseconds>(GST_BUFFER_PTS(buffer.get()) / GST_USECOND)
                              : frame_time(self, buffer.get(), running);
-  if (of_events) state.segment = segment_of(pad.get());
-  const bool silent = is_silent(buffer.get());
-  if (!silent && of_events)
-    write_events(self, buffer.get(), out);
-  else if (!silent)
-    write_frame(self, buffer.get(), t, out);
-  if (t - state.flushed >= max_wait) {
-    state.flushed = t;
-    state.encoder->flush(out);
-  }
-  return push_bytes(self, std::move(out));
+  if (of_events) self->priv->segment = segment_of(pad.get());
+  return push_bytes(self, file.write(buffer.get(), t, of_events));
 }
 
 static bool is_at_end(const Pad& pad) {
@@ -403,12 +281,12 @@ static bool is_at_end(const Pad& pad) {
 /// True if enough is known to write the header: the caps, and the announcements before the first
 /// buffer.
 static bool is_known(GstAedatMux* self) {
-  const State& state = self->priv->state;
-  if (state.size != SensorSize{})
+  const auto& file = self->priv->file;
+  if (file.has_sensor())
     return std::ranges::all_of(sink_pads(self), [](const Pad& pad) {
       return kind_of(pad.get()) != Kind::events || is_at_end(pad) || next_buffer(pad.get());
     });
-  return state.video && std::ranges::all_of(sink_pads(self), [](const Pad& pad) {
+  return file.has_video() && std::ranges::all_of(sink_pads(self), [](const Pad& pad) {
            return kind_of(pad.get()) == Kind::video || is_at_end(pad);
          });
 }
@@ -429,9 +307,9 @@ static OwnedEvent take_segment_ends(GstAedatMux* self) {
 
 /// Writes the header, the earliest buffer, the end of a segment, or that of the file. May throw.
 static GstFlowReturn write_some(GstAedatMux* self) {
-  auto& encoder = self->priv->state.encoder;
+  auto& file = self->priv->file;
   const bool ended = std::ranges::all_of(sink_pads(self), is_at_end);
-  if (!encoder) {
+  if (!file.has_begun()) {
     if (!is_known(self)) {
       if (!ended) return GST_AGGREGATOR_FLOW_NEED_DATA;
       GST_ELEMENT_ERROR(self, STREAM, MUX,
@@ -444,9 +322,7 @@ static GstFlowReturn write_some(GstAedatMux* self) {
   }
   if (!ended) return write_next(self);
   if (OwnedEvent done = take_segment_ends(self)) {
-    Bytes out = waiting_items(self);
-    encoder->flush(out);
-    const GstFlowReturn result = push_bytes(self, std::move(out));
+    const GstFlowReturn result = push_bytes(self, file.flush());
     gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self), done.release());
     return result;
   }
@@ -474,7 +350,7 @@ static GstFlowReturn aggregate(GstAggregator* aggregator, gboolean /*timeout*/) 
 /// has begun or can begin.
 static GstClockTime get_next_time(GstAggregator* aggregator) {
   auto* self = GST_AEDAT_MUX(aggregator);
-  if (!self->priv->state.encoder && !is_known(self)) return GST_CLOCK_TIME_NONE;
+  if (!self->priv->file.has_begun() && !is_known(self)) return GST_CLOCK_TIME_NONE;
   GstClockTime time = GST_CLOCK_TIME_NONE;
   return earliest_pad(self, &time) ? time : GST_CLOCK_TIME_NONE;
 }
@@ -482,7 +358,7 @@ static GstClockTime get_next_time(GstAggregator* aggregator) {
 /* events, queries, pads */
 
 static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* caps) {
-  State& state = self->priv->state;
+  auto& file = self->priv->file;
   const Kind kind = kind_of(caps);
   for (const Pad& other : sink_pads(self)) {
     if (other.get() == pad || kind_of(other.get()) != kind) continue;
@@ -497,25 +373,12 @@ static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* c
   if (kind == Kind::video) {
     GstVideoInfo video;
     if (!gst_video_info_from_caps(&video, caps)) return false;
-    state.video = video;
+    file.take_video(video);
     return true;
   }
   GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-  const SensorSize size{info.width, info.height};
-  if (state.encoder && !self->priv->writable.accepts(size)) return false;
-  state.size = size;
-  return true;
-}
-
-/// Adds triggers or IMU samples to the waiting ones. False if the event has other contents.
-template <class Sample>
-static bool take_waiting(std::optional<std::vector<Sample>>&& samples,
-                         std::optional<WaitingItems<Sample>>& waiting) {
-  if (!samples) return false;
-  if (!waiting) waiting.emplace();
-  waiting->push(*samples);
-  return true;
+  return gst_event_camera_info_from_caps(&info, caps) &&
+         file.take_sensor({info.width, info.height});
 }
 
 static GstFlowReturn sink_event_pre_queue(GstAggregator* aggregator, GstAggregatorPad* pad,
@@ -526,17 +389,16 @@ static GstFlowReturn sink_event_pre_queue(GstAggregator* aggregator, GstAggregat
 
 /// Writes the triggers and IMU samples if too many wait for a buffer. May throw.
 static GstFlowReturn write_waiting(GstAedatMux* self) {
-  const State& state = self->priv->state;
-  const auto is_full = [](const auto& waiting) { return waiting && waiting->is_full(); };
-  if (!is_full(state.triggers) && !is_full(state.imu_samples)) return GST_FLOW_OK;
-  if (!state.encoder)
+  auto& file = self->priv->file;
+  if (!file.is_full()) return GST_FLOW_OK;
+  if (!file.has_begun())
     if (const GstFlowReturn begun = begin_file(self); begun != GST_FLOW_OK) return begun;
-  return push_bytes(self, waiting_items(self));
+  return push_bytes(self, file.write_items());
 }
 
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
   auto* self = GST_AEDAT_MUX(aggregator);
-  State& state = self->priv->state;
+  auto& file = self->priv->file;
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_forwards(self, event, "write"))
     return FALSE;
   if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
@@ -547,15 +409,14 @@ static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, Gst
       gst_event_unref(event);
       return FALSE;
     }
-  } else if (take_waiting(triggers_of(event), state.triggers) ||
-             take_waiting(imu_samples_of(event), state.imu_samples)) {
+  } else if (file.take_items(event)) {
     gst_event_unref(event);
     return reported(self, [&] { return write_waiting(self); }) == GST_FLOW_OK;
   } else if (GST_EVENT_TYPE(event) == GST_EVENT_TAG) {
     GstTagList* tags = nullptr;
     gchar* source = nullptr;
     gst_event_parse_tag(event, &tags);
-    if (gst_tag_list_get_string(tags, GST_TAG_DEVICE_MODEL, &source)) state.source = source;
+    if (gst_tag_list_get_string(tags, GST_TAG_DEVICE_MODEL, &source)) file.take_source(source);
     g_free(source);
   } else if (GST_EVENT_TYPE(event) == GST_EVENT_GAP) {
     take_segment_end(pad, event);
@@ -612,8 +473,8 @@ static gboolean start(GstAggregator* aggregator) {
 
 static gboolean stop(GstAggregator* aggregator) {
   auto* priv = GST_AEDAT_MUX(aggregator)->priv;
-  if (priv->state.encoder) priv->writable.end_file();
-  priv->state = State();
+  priv->file.reset();
+  priv->segment.reset();
   priv->has_header = false;
   take_segment_ends(GST_AEDAT_MUX(aggregator));
   return TRUE;
@@ -621,15 +482,11 @@ static gboolean stop(GstAggregator* aggregator) {
 
 /// After a flush, filesink has truncated the file, so start with a new header.
 static GstFlowReturn flush(GstAggregator* aggregator) {
-  State& state = GST_AEDAT_MUX(aggregator)->priv->state;
+  auto* priv = GST_AEDAT_MUX(aggregator)->priv;
   GST_DEBUG_OBJECT(aggregator, "flushed: beginning a new file");
-  GST_AEDAT_MUX(aggregator)->priv->has_header = false;
-  state.encoder.reset();
-  state.triggers.reset();
-  state.imu_samples.reset();
-  state.segment.reset();
-  state.flushed = 0;
-  state.warn.reset();
+  priv->has_header = false;
+  priv->file.start_over();
+  priv->segment.reset();
   return GST_FLOW_OK;
 }
 
@@ -657,7 +514,7 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
       g_param_spec_enum("compression", "Compression", "Compression of the file", compression_type(),
                         static_cast<int>(Settings().compression), mutable_ready_flags));
   install_stats(
-      object_class, [](GObject* object) { return GST_AEDAT_MUX(object)->priv->writable.stats(); },
+      object_class, [](GObject* object) { return GST_AEDAT_MUX(object)->priv->file.stats(); },
       WritableEvents::stats_blurb);
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
