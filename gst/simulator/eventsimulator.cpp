@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/simulator/eventsimulator.hpp"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -156,18 +157,36 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
 }
 
+/// True if a condition holds for the pads of class images and flow that are linked.
+template <class Condition>
+static bool all_companions(GstBaseTransform* transform, const Condition& condition) {
+  return std::ranges::all_of(simulation_of(transform).companions(), [&](auto* companion) {
+    const OwnedPad pad = companion->pad();
+    return !pad || !gst_pad_is_linked(pad.get()) || condition(pad.get());
+  });
+}
+
 /// True if a seek can be forwarded. Class images and flow must stay with the video, so none of
 /// their upstreams may refuse.
 static bool can_seek(GstBaseTransform* transform, const SeekRequest& request) {
-  bool is_alone = true;
-  bool all_would = would_seek(GST_BASE_TRANSFORM_SINK_PAD(transform), request);
-  for (auto* companion : simulation_of(transform).companions()) {
-    const OwnedPad pad = companion->pad();
-    if (!pad || !gst_pad_is_linked(pad.get())) continue;
-    is_alone = false;
-    all_would = all_would && would_seek(pad.get(), request);
-  }
-  return is_alone || all_would;
+  const auto would = [&](GstPad* pad) { return would_seek(pad, request); };
+  return all_companions(transform, [](GstPad*) { return false; }) ||
+         (would(GST_BASE_TRANSFORM_SINK_PAD(transform)) && all_companions(transform, would));
+}
+
+/// Range of the video, if class images and flow can stay with it.
+static gboolean answer_seeking(GstBaseTransform* transform, GstQuery* query) {
+  if (!PARENT_TRANSFORM_CLASS->query(transform, GST_PAD_SRC, query)) return FALSE;
+  GstFormat format = GST_FORMAT_UNDEFINED;
+  gboolean seekable = FALSE;
+  gint64 start = -1;
+  gint64 end = -1;
+  gst_query_parse_seeking(query, &format, &seekable, &start, &end);
+  const bool all_can = all_companions(transform, [&](GstPad* pad) {
+    return format == GST_FORMAT_TIME && peer_can_seek(pad, format);
+  });
+  gst_query_set_seeking(query, format, all_can ? seekable : FALSE, start, end);
+  return TRUE;
 }
 
 static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
@@ -204,6 +223,8 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
   const bool is_serialized =
       (gst_query_type_get_flags(GST_QUERY_TYPE(query)) & GST_QUERY_TYPE_SERIALIZED) != 0;
   if (direction == GST_PAD_SINK && is_serialized) simulation_of(transform).finish();
+  if (direction == GST_PAD_SRC && GST_QUERY_TYPE(query) == GST_QUERY_SEEKING)
+    return answer_seeking(transform, query);
   if (direction != GST_PAD_SRC || GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
     return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 

@@ -272,6 +272,33 @@ TEST_F(ClassImages, AreNotSeekedIfTheVideoCannotBe) {
       EXPECT_NE(GST_EVENT_TYPE(event.get()), GST_EVENT_SEEK);
 }
 
+TEST_F(ClassImages, KeepTheVideoFromSeekingIfTheyCannot) {
+  const auto make_seekable = [](GstHarness* h) {
+    gst_pad_set_query_function(
+        h->srcpad, +[](GstPad* pad, GstObject* parent, GstQuery* query) -> gboolean {
+          if (GST_QUERY_TYPE(query) != GST_QUERY_SEEKING)
+            return gst_pad_query_default(pad, parent, query);
+          GstFormat format = GST_FORMAT_UNDEFINED;
+          gst_query_parse_seeking(query, &format, nullptr, nullptr, nullptr);
+          gst_query_set_seeking(query, format, TRUE, 0, GST_SECOND);
+          return TRUE;
+        });
+  };
+  const auto is_seekable = [&] {
+    GstQuery* const query = gst_query_new_seeking(GST_FORMAT_TIME);
+    gboolean seekable = FALSE;
+    EXPECT_TRUE(gst_pad_peer_query(video->sinkpad, query));
+    gst_query_parse_seeking(query, nullptr, &seekable, nullptr, nullptr);
+    gst_query_unref(query);
+    return seekable != FALSE;
+  };
+  begin();
+  make_seekable(video.get());
+  EXPECT_FALSE(is_seekable());
+  make_seekable(images.get());
+  EXPECT_TRUE(is_seekable());
+}
+
 TEST_F(ClassImages, PadIsOnlyThereOnce) {
   auto* pad_template = gst_element_get_pad_template(dvs.element.get(), "label_sink");
   EXPECT_EQ(gst_element_request_pad(dvs.element.get(), pad_template, nullptr, nullptr), nullptr);
