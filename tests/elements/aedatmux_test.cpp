@@ -125,6 +125,29 @@ TEST(AedatMux, WritesFramesWithTheEventsOfTheirRunningTime) {
   EXPECT_EQ(content.events.size(), 2U);
 }
 
+/// At twice the rate, a gap of 40 ms ends before a frame of running time 30 ms.
+TEST(AedatMux, WritesEventsAfterAGapBeforeLaterFrames) {
+  const TwoInputs mux("aedatmux", "events_0", "video_0");
+  auto* const events = mux.first.get();
+  auto* const video = mux.second.get();
+  gst_harness_set_src_caps_str(
+      events, "application/x-event-camera, format=XYTP, width=8, height=4, framerate=0/1");
+  gst_harness_set_src_caps_str(video,
+                               "video/x-raw, format=GRAY8, width=4, height=4, framerate=0/1");
+  push_segment(events, 0, 0, 2);
+  gst_harness_push_event(events, gst_event_new_gap(0, 40 * GST_MSECOND));
+  GstBuffer* const frame = gst_buffer_new_memdup("0123456789abcdef", 16);
+  GST_BUFFER_PTS(frame) = 30 * GST_MSECOND;
+  EXPECT_EQ(gst_harness_push(video, frame), GST_FLOW_OK);
+  push_segment(events, 40 * GST_MSECOND, 20 * GST_MSECOND);
+  EXPECT_EQ(gst_harness_push(events, buffer_of(40 * GST_MSECOND, {{0, 1, 2}}, GST_MSECOND)),
+            GST_FLOW_OK);
+  for (auto* h : {events, video}) gst_harness_push_event(h, gst_event_new_eos());
+  const auto content = rest_of_file(events);
+  ASSERT_EQ(content.pictures.size(), 1U);
+  EXPECT_EQ(content.pictures[0].times[0], 50'000) << "the segment of the events after the gap";
+}
+
 TEST(AedatMux, RefusesToRunBackwards) {
   Mux mux;
   push_backwards_segment(mux.get());

@@ -155,14 +155,16 @@ static bool is_silent(GstBuffer* buffer) {
   return gst_buffer_get_size(buffer) == 0;
 }
 
-/// Time that a buffer is written at: its start, but the end of a gap, until which its pad has
-/// nothing to wait for.
+/// Running time that a buffer is written at: that of its start, but of the end of a gap, until
+/// which its pad has nothing to wait for.
 static GstClockTime due_time(GstAggregatorPad* pad, GstBuffer* buffer) {
-  const GstClockTime running = running_time(pad, buffer);
-  if (!GST_CLOCK_TIME_IS_VALID(running)) return 0;
-  return is_silent(buffer) && GST_BUFFER_DURATION_IS_VALID(buffer)
-             ? running + GST_BUFFER_DURATION(buffer)
-             : running;
+  const auto segment = segment_of(pad);
+  GstClockTime time = GST_BUFFER_PTS(buffer);
+  if (!segment || time > segment->stop) return 0;
+  if (is_silent(buffer) && GST_BUFFER_DURATION_IS_VALID(buffer))
+    time += std::min(GST_BUFFER_DURATION(buffer), segment->stop - time);
+  const auto running = gst_segment_to_running_time(&*segment, GST_FORMAT_TIME, time);
+  return GST_CLOCK_TIME_IS_VALID(running) ? running : 0;
 }
 
 /// Returns the pad with the earliest next buffer; a buffer without a time comes first, and events
