@@ -8,7 +8,6 @@
 
 #include "gst/base/errors.hpp"
 #include "gst/base/played_segment.hpp"
-#include "gst/base/seek_request.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_aggregator_debug);
 #define GST_CAT_DEFAULT event_aggregator_debug
@@ -237,6 +236,7 @@ struct EventAggregatorFunctions {
       GST_DEBUG_OBJECT(element, "forwarding %" GST_PTR_FORMAT, event);
       // GstAggregator would apply it to its segment at once, before that of the main pad is there.
       if (!request.flushes()) return forward(element, event);
+      of(element).prepare_seek(request);
     }
     return PARENT_AGGREGATOR_CLASS->src_event(element, event);
   }

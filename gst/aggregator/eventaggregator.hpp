@@ -12,6 +12,7 @@
 #include "gst/base/event_faults.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/seek_request.hpp"
 
 /// Implementation of an element that combines event streams and video. Each subclass of
 /// GstEventAggregator owns one, which lives as long as the element.
@@ -57,6 +58,9 @@ class EventAggregator {
   /// Like GstAggregatorClass::get_next_time: when to continue without further input from live
   /// sources.
   virtual GstClockTime next_time() { return GST_CLOCK_TIME_NONE; }
+
+  /// Prepares for a seek that GstAggregator forwards next. Called from any thread.
+  virtual void prepare_seek(const SeekRequest&) {}
 
  protected:
   GstAggregator* element() const { return element_; }

@@ -48,6 +48,20 @@ bool SeekRequest::apply(GstSegment& segment) const {
                              stop.type, stop.position, nullptr) != FALSE;
 }
 
+SeekRequest SeekRequest::in_later_stream(gint64 delay) const {
+  SeekRequest request = *this;
+  if (const auto set = start()) request.start_ = std::max<gint64>(*set - delay, 0);
+  if (const auto set = stop(); set && *set >= 0) request.stop_ = std::max<gint64>(*set - delay, 0);
+  return request;
+}
+
+OwnedEvent SeekRequest::event() const {
+  GstEvent* const seek =
+      gst_event_new_seek(rate_, format_, flags_, start_type_, start_, stop_type_, stop_);
+  gst_event_set_seqnum(seek, seqnum_);
+  return OwnedEvent(seek);
+}
+
 /// Segment of a sink pad; that of a stream which starts at 0 if none of times was received.
 static GstSegment segment_of(GstPad* sink) {
   const OwnedEvent event(gst_pad_get_sticky_event(sink, GST_EVENT_SEGMENT, 0));

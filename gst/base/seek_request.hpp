@@ -3,6 +3,11 @@
 
 #include <gst/gst.h>
 
+#include <algorithm>
+#include <optional>
+
+#include "gst/base/owned.hpp"
+
 /// Parsed seek event.
 class SeekRequest {
  public:
@@ -18,6 +23,20 @@ class SeekRequest {
   double rate() const { return rate_; }
   GstFormat format() const { return format_; }
   guint32 seqnum() const { return seqnum_; }
+
+  /// Positions, if they are set; a stop that is set to none is -1.
+  std::optional<gint64> start() const {
+    return start_type_ == GST_SEEK_TYPE_SET ? std::optional(std::max<gint64>(start_, 0))
+                                            : std::nullopt;
+  }
+  std::optional<gint64> stop() const {
+    return stop_type_ == GST_SEEK_TYPE_SET ? std::optional(std::max<gint64>(stop_, -1))
+                                           : std::nullopt;
+  }
+
+  /// The same seek in a stream that starts so much later.
+  SeekRequest in_later_stream(gint64 delay) const;
+  OwnedEvent event() const;
 
   /// Applies the seek to `segment`. False if the seek is invalid; `segment` is then unspecified.
   bool apply(GstSegment& segment) const;

@@ -564,21 +564,60 @@ TEST(Merge, EndsASegmentOfAllRecordings) {
   EXPECT_EQ(end.get(), all.events.size());
 }
 
-/// Streams of one clock, the second of which starts 10 s later.
+/// Recordings of one clock, the second of which starts 10 s later.
+struct Distant {
+  std::string line() const {
+    const auto source = [](const TemporaryFile& file) {
+      return file.source() + "eventcsvdec width=8 height=4 ! ";
+    };
+    return "eventmerge name=m  " + source(late) + "m.sink_0  " + source(early) + "m.sink_1  m.";
+  }
+
+  TemporaryFile early{std::string("t,x,y,p\n1000000,1,1,1\n1999000,2,1,1\n")};
+  TemporaryFile late{std::string("t,x,y,p\n11000000,3,1,1\n11999000,4,1,1\n")};
+};
+
 TEST(Merge, LastsFromTheFirstStartToTheLastEnd) {
-  const TemporaryFile early(std::string("t,x,y,p\n0,1,1,1\n999000,2,1,1\n"));
-  const TemporaryFile late(std::string("t,x,y,p\n10000000,3,1,1\n10999000,4,1,1\n"));
-  const auto source = [](const TemporaryFile& file) {
-    return file.source() + "eventcsvdec width=8 height=4 ! ";
-  };
-  Player player("eventmerge name=m  " + source(early) + "m.sink_0  " + source(late) +
-                "m.sink_1  m.");
+  const Distant recordings;
+  Player player(recordings.line());
   ASSERT_TRUE(player.reaches(GST_STATE_PAUSED)) << player.error;
   const auto duration = player.duration();
   ASSERT_TRUE(player.play()) << player.error;
   EXPECT_EQ(player.events.size(), 4U);
   EXPECT_EQ(duration / ms, 10'999U);
   EXPECT_EQ(player.position() / ms, 10'999U);
+}
+
+/// Positions count from the start of the first recording. The second seek comes before the segments
+/// of the first one.
+TEST(Merge, SeeksInTheStreamTimeOfItsOutput) {
+  const Distant recordings;
+  struct Range {
+    GstClockTime start;
+    GstClockTime stop;
+    Events events;
+  };
+  const auto early = on_at(2, 1, 1'999'000);
+  const auto late = on_at(3, 1, 11'000'000);
+  for (const auto& [start, stop, events] :
+       {Range{500 * ms, 10'500 * ms, {early, late}}, Range{500 * ms, 5'000 * ms, {early}},
+        Range{5'000 * ms, 10'500 * ms, {late}}, Range{10'000 * ms, 10'500 * ms, {late}}}) {
+    Player player(recordings.line());
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED)) << player.error;
+    for (int i = 0; i < 2; ++i) ASSERT_TRUE(player.seek(start, stop));
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+    ASSERT_TRUE(player.play()) << player.error;
+    EXPECT_EQ(player.events, events);
+    GstPad* const sink = gst_element_get_static_pad(player["sink"], "sink");
+    const Owned<GstEvent> event(gst_pad_get_sticky_event(sink, GST_EVENT_SEGMENT, 0));
+    gst_object_unref(sink);
+    ASSERT_TRUE(event);
+    GstSegment segment;
+    gst_event_copy_segment(event.get(), &segment);
+    EXPECT_EQ(segment.time, start);
+    EXPECT_EQ(segment.start, GST_SECOND + start);
+    EXPECT_EQ(segment.stop, GST_SECOND + stop);
+  }
 }
 
 /// Streams reach it at different times.

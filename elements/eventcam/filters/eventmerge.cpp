@@ -33,6 +33,7 @@
  * ]|
  */
 #include <algorithm>
+#include <atomic>
 #include <map>
 #include <optional>
 #include <span>
@@ -41,13 +42,16 @@
 #include <vector>
 
 #include "elements/eventcam/filters/eventmerge_pad.hpp"
+#include "elements/eventcam/filters/merged_timeline.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/event_faults.hpp"
 #include "gst/base/event_pool.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
+#include "gst/base/seek_request.hpp"
 #include "gst/eventcamera/eventcamera.h"
 
 GST_DEBUG_CATEGORY_STATIC(event_merge_debug);
@@ -103,6 +107,7 @@ class EventMerge final : public EventAggregator {
   bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
+  void prepare_seek(const SeekRequest& request) override;
 
   GstFlowReturn choose_caps(GstCaps* downstream, GstCaps** result);
   GstStructure* stats() const;
@@ -123,6 +128,8 @@ class EventMerge final : public EventAggregator {
   GstFlowReturn push_gap(GstClockTime start, GstClockTime duration);
 
   Guarded<Counts> counts_;
+  std::atomic<guint32> last_seek_ = GST_SEQNUM_INVALID;
+  Guarded<std::optional<SeekRequest>> sought_;  ///< the seek that the next segment is of
 
   // Accessed by the source pad's thread only, or while there is none.
   EventMerger merger_;
@@ -214,7 +221,7 @@ bool EventMerge::load(const OwnedAggregatorPad& pad) {
 /* output */
 
 /// Chooses, once, the segment of the stream that starts first, up to the end of the one that ends
-/// last.
+/// last; from and to where a seek wants, which some streams may not reach.
 void EventMerge::choose_segment(std::span<const OwnedAggregatorPad> pads) {
   if (pads.empty() || std::exchange(segment_chosen_, true)) return;
   GstSegment chosen = segment_of(pads.front().get());
@@ -225,7 +232,23 @@ void EventMerge::choose_segment(std::span<const OwnedAggregatorPad> pads) {
     if (segment.start < chosen.start) chosen = segment;
   }
   chosen.stop = stop;
+  if (const auto sought = std::exchange(*sought_.lock(), std::nullopt)) {
+    const MergedTimeline timeline(GST_ELEMENT(element()));
+    if (const auto start = sought->start()) {
+      chosen.start = chosen.position = timeline.timestamp_at(*start);
+      chosen.time = static_cast<GstClockTime>(*start);
+    }
+    if (const auto end = sought->stop(); end && *end >= 0)
+      chosen.stop = timeline.timestamp_at(*end);
+  }
   set_segment(chosen);
+}
+
+void EventMerge::prepare_seek(const SeekRequest& request) {
+  // A bin sends a seek to each of its sinks.
+  if (last_seek_.exchange(request.seqnum()) == request.seqnum()) return;
+  MergedTimeline(GST_ELEMENT(element())).translate(request);
+  *sought_.lock() = request;
 }
 
 void EventMerge::count(const MergedInterval& interval) {
@@ -414,7 +437,11 @@ void EventMerge::flush() noexcept {
 
 void EventMerge::stop() {
   flush();
-  for (const auto& pad : numbered_pads(element())) stream_of(pad).sensor = {};
+  for (const auto& pad : numbered_pads(element())) {
+    stream_of(pad).sensor = {};
+    gst_segment_init(&*stream_of(pad).segment.lock(), GST_FORMAT_TIME);
+  }
+  sought_.lock()->reset();
   buffers_.reset();
   latency_ = 0;
   gst_aggregator_set_latency(element(), latency_, latency_);
@@ -482,36 +509,24 @@ static void release_pad(GstElement* element, GstPad* pad) {
   PARENT_ELEMENT_CLASS->release_pad(element, pad);
 }
 
-/// Timestamp that a stream has at a stream time; negative if that is before timestamp 0.
-static GstClockTimeDiff timestamp_at(GstAggregatorPad* pad, gint64 stream_time) {
-  const GstSegment segment = segment_of(pad);
-  guint64 distance = 0;
-  const gint sign = gst_segment_position_from_stream_time_full(
-      &segment, GST_FORMAT_TIME, static_cast<guint64>(stream_time), &distance);
-  return sign * static_cast<GstClockTimeDiff>(distance);
+/// The segment of a stream is reset by a flush, but is needed to seek again before the next one.
+static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && segment_of(event).format == GST_FORMAT_TIME)
+    *GST_EVENT_MERGE_PAD(pad)->priv->segment.lock() = segment_of(event);
+  return PARENT_AGGREGATOR_CLASS->sink_event(aggregator, pad, event);
 }
 
-/// Duration from the start of the earliest stream to the end of the latest one.
-static gboolean answer_duration(GstElement* element, GstQuery* query) {
-  GstClockTimeDiff start = G_MAXINT64;
-  std::optional<GstClockTimeDiff> end;
-  for (const auto& pad : numbered_pads(element)) {
-    start = std::min(start, timestamp_at(pad.get(), 0));
-    gint64 duration = -1;
-    if (gst_pad_peer_query_duration(GST_PAD(pad.get()), GST_FORMAT_TIME, &duration) &&
-        duration >= 0)
-      end = std::max(end.value_or(G_MININT64), timestamp_at(pad.get(), duration));
-  }
-  if (!end) return FALSE;
-  gst_query_set_duration(query, GST_FORMAT_TIME, *end - start);
-  return TRUE;
+static gboolean answer_duration(GstAggregator* aggregator, GstQuery* query) {
+  const auto duration = MergedTimeline(GST_ELEMENT(aggregator)).duration();
+  if (duration) gst_query_set_duration(query, GST_FORMAT_TIME, *duration);
+  return duration ? TRUE : FALSE;
 }
 
 static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
   GstFormat format = GST_FORMAT_UNDEFINED;
   if (GST_QUERY_TYPE(query) == GST_QUERY_DURATION)
     gst_query_parse_duration(query, &format, nullptr);
-  return format == GST_FORMAT_TIME ? answer_duration(GST_ELEMENT(aggregator), query)
+  return format == GST_FORMAT_TIME ? answer_duration(aggregator, query)
                                    : PARENT_AGGREGATOR_CLASS->src_query(aggregator, query);
 }
 
@@ -551,5 +566,6 @@ static void gst_event_merge_class_init(GstEventMergeClass* klass) {
   aggregator_class->update_src_caps = [](GstAggregator* element, GstCaps* caps, GstCaps** result) {
     return aggregator_impl<EventMerge>(element).choose_caps(caps, result);
   };
+  aggregator_class->sink_event = sink_event;
   aggregator_class->src_query = src_query;
 }

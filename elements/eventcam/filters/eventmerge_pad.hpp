@@ -21,7 +21,10 @@ struct SensorPosition {
 G_DECLARE_FINAL_TYPE(GstEventMergePad, gst_event_merge_pad, GST, EVENT_MERGE_PAD, GstAggregatorPad)
 
 struct GstEventMergePadPrivate {
+  GstEventMergePadPrivate() { gst_segment_init(&*segment.lock(), GST_FORMAT_TIME); }
+
   Guarded<SensorPosition> position;  ///< properties xpos and ypos
+  Guarded<GstSegment> segment;       ///< the last one received, also while the pad is flushed
 
   // Accessed by the source pad's thread only, or while there is none.
   eventcamera::SensorSize sensor;  ///< 0x0 before caps
