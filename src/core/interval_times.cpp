@@ -15,19 +15,19 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// An event is two words: its time, and in the lower half of the second its place.
+// An event is two words: its time, and x and y_p in the lower half of the second.
 static_assert(sizeof(AbsoluteEvent) == 2 * sizeof(std::int64_t));
 static_assert(offsetof(AbsoluteEvent, x) == 8 && offsetof(AbsoluteEvent, y_p) == 10);
 static_assert(offsetof(Event, x) == 4 && offsetof(Event, y_p) == 6);
 
-bool count_times(Microseconds start, Microseconds latest, std::span<const AbsoluteEvent> events,
-                 Event* out) {
+bool convert(Microseconds start, Microseconds latest, std::span<const AbsoluteEvent> events,
+             Event* out) {
   const hn::ScalableTag<std::int64_t> words;
   const auto lanes = hn::Lanes(words);
   const auto* in = reinterpret_cast<const std::int64_t*>(events.data());
   auto falls = hn::Zero(words);
   bool falls_here = false;
-  const auto place_one = [&](std::size_t i) {
+  const auto convert_one = [&](std::size_t i) {
     falls_here |= events[i].t < latest;
     latest = events[i].t;
     // Unsigned, because the times of corrupt files may overflow.
@@ -35,18 +35,19 @@ bool count_times(Microseconds start, Microseconds latest, std::span<const Absolu
     out[i] = {static_cast<std::uint32_t>(t), events[i].x, events[i].y_p};
   };
   std::size_t i = 0;
-  if (!events.empty()) place_one(i++);  // the others have one before them
+  if (!events.empty()) convert_one(i++);  // the others have one before them
   for (; i + lanes <= events.size(); i += lanes) {
-    hn::Vec<decltype(words)> before, times, places;
-    hn::LoadInterleaved2(words, in + 2 * i - 2, before, places);
-    hn::LoadInterleaved2(words, in + 2 * i, times, places);
+    hn::Vec<decltype(words)> before, times, pixels;
+    hn::LoadInterleaved2(words, in + 2 * i - 2, before, pixels);
+    hn::LoadInterleaved2(words, in + 2 * i, times, pixels);
     falls = hn::Or(falls, hn::VecFromMask(words, hn::Lt(times, before)));
-    const auto counted = hn::And(hn::Sub(times, hn::Set(words, start)), hn::Set(words, 0xffffffff));
-    const auto event = hn::Or(counted, hn::ShiftLeft<32>(places));
+    const auto relative =
+        hn::And(hn::Sub(times, hn::Set(words, start)), hn::Set(words, 0xffffffff));
+    const auto event = hn::Or(relative, hn::ShiftLeft<32>(pixels));
     hn::StoreU(event, words, reinterpret_cast<std::int64_t*>(out + i));
   }
   if (i > 0 && i < events.size()) latest = events[i - 1].t;
-  for (; i < events.size(); ++i) place_one(i);
+  for (; i < events.size(); ++i) convert_one(i);
   return !falls_here && hn::AllTrue(words, hn::Eq(falls, hn::Zero(words)));
 }
 
@@ -57,11 +58,11 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace eventcamera {
 
-HWY_EXPORT(count_times);
+HWY_EXPORT(convert);
 
-bool count_times_from(Microseconds start, Microseconds latest,
-                      std::span<const AbsoluteEvent> events, Event* out) {
-  return HWY_DYNAMIC_DISPATCH(count_times)(start, latest, events, out);
+bool to_interval_times(Microseconds start, Microseconds latest,
+                       std::span<const AbsoluteEvent> events, Event* out) {
+  return HWY_DYNAMIC_DISPATCH(convert)(start, latest, events, out);
 }
 
 }  // namespace eventcamera

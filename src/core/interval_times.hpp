@@ -7,9 +7,9 @@
 
 namespace eventcamera {
 
-/// Writes events to `out` with times counted from `start`, modulo 2^32. False if an event is
-/// earlier than the one before it; before the first one, `latest` counts.
-bool count_times_from(Microseconds start, Microseconds latest,
-                      std::span<const AbsoluteEvent> events, Event* out);
+/// Converts events to times after `start`, the start of their interval, modulo 2^32. Returns false
+/// if an event is earlier than the one before it, or the first one earlier than `latest`.
+bool to_interval_times(Microseconds start, Microseconds latest,
+                       std::span<const AbsoluteEvent> events, Event* out);
 
 }  // namespace eventcamera

@@ -45,13 +45,13 @@ class Grey8 {
   /// The view is valid until the next call, and no longer than `frame`.
   ImageView<std::uint8_t> of(const LumaView& frame) {
     if (frame.format.bits == 8) return frame.as<std::uint8_t>();
-    const auto picture = frame.as<std::uint16_t>();
-    if (upper_.width() != picture.width || upper_.height() != picture.height)
-      upper_ = Image<std::uint8_t>(picture.width, picture.height);
+    const auto deep = frame.as<std::uint16_t>();
+    if (upper_.width() != deep.width || upper_.height() != deep.height)
+      upper_ = Image<std::uint8_t>(deep.width, deep.height);
     const int shift = frame.format.bits - 8;
-    for (int y = 0; y < picture.height; ++y)
-      for (int x = 0; x < picture.width; ++x)
-        upper_.at(x, y) = static_cast<std::uint8_t>(picture.row(y)[x] >> shift);
+    for (int y = 0; y < deep.height; ++y)
+      for (int x = 0; x < deep.width; ++x)
+        upper_.at(x, y) = static_cast<std::uint8_t>(deep.row(y)[x] >> shift);
     return upper_.view();
   }
 

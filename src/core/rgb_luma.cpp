@@ -58,26 +58,26 @@ const Pixel* row_of(const ColourView& colour, int y) {
 
 /// Computes a row with interleaved colours, which are separated block by block.
 template <class Pixel>
-void weigh_interleaved(const LumaWeights& weights, const RgbView& picture, int y, int width,
+void weigh_interleaved(const LumaWeights& weights, const RgbView& frame, int y, int width,
                        Pixel* out) {
   const hn::CappedTag<Pixel, 32> block;
   constexpr int max = static_cast<int>(hn::MaxLanes(block));
   const int lanes = static_cast<int>(hn::Lanes(block));
   HWY_ALIGN Pixel apart[4][max];
   HWY_ALIGN Pixel last[4 * max] = {};
-  const Pixel* row = row_of<Pixel>(picture.red, y);
+  const Pixel* row = row_of<Pixel>(frame.red, y);
   for (int x = 0; x < width; x += lanes) {
     const int count = std::min(lanes, width - x);
-    const Pixel* from = row + std::ptrdiff_t{x} * picture.samples;
+    const Pixel* from = row + std::ptrdiff_t{x} * frame.samples;
     if (count < lanes) {
-      std::copy_n(from, count * picture.samples, last);
+      std::copy_n(from, count * frame.samples, last);
       from = last;
     }
     auto first = hn::Zero(block);
     auto second = first;
     auto third = first;
     auto fourth = first;
-    if (picture.samples == 3)
+    if (frame.samples == 3)
       hn::LoadInterleaved3(block, from, first, second, third);
     else
       hn::LoadInterleaved4(block, from, first, second, third, fourth);
@@ -85,41 +85,41 @@ void weigh_interleaved(const LumaWeights& weights, const RgbView& picture, int y
     hn::Store(second, block, apart[1]);
     hn::Store(third, block, apart[2]);
     hn::Store(fourth, block, apart[3]);
-    weigh(weights, apart[picture.red.place], apart[picture.green.place], apart[picture.blue.place],
-          count, out + x);
+    weigh(weights, apart[frame.red.place], apart[frame.green.place], apart[frame.blue.place], count,
+          out + x);
   }
 }
 
 template <class Pixel>
-void luma_of_samples(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
+void luma_of_samples(const RgbView& frame, const LumaWeights& weights, ThreadPool& threads,
                      Image<Pixel>& out) {
   for_each_row(threads, out.height(), [&](int y) {
-    if (picture.samples == 1)
-      weigh(weights, row_of<Pixel>(picture.red, y), row_of<Pixel>(picture.green, y),
-            row_of<Pixel>(picture.blue, y), out.width(), out.row(y));
+    if (frame.samples == 1)
+      weigh(weights, row_of<Pixel>(frame.red, y), row_of<Pixel>(frame.green, y),
+            row_of<Pixel>(frame.blue, y), out.width(), out.row(y));
     else
-      weigh_interleaved(weights, picture, y, out.width(), out.row(y));
+      weigh_interleaved(weights, frame, y, out.width(), out.row(y));
   });
 }
 
-void luma_of_bytes(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
+void luma_of_bytes(const RgbView& frame, const LumaWeights& weights, ThreadPool& threads,
                    Image<std::uint8_t>& out) {
-  luma_of_samples(picture, weights, threads, out);
+  luma_of_samples(frame, weights, threads, out);
 }
 
-void luma_of_16_bits(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
+void luma_of_16_bits(const RgbView& frame, const LumaWeights& weights, ThreadPool& threads,
                      Image<std::uint16_t>& out) {
-  luma_of_samples(picture, weights, threads, out);
+  luma_of_samples(frame, weights, threads, out);
 }
 
-void luma_of_words(const RgbWordsView& picture, const LumaWeights& weights, ThreadPool& threads,
+void luma_of_words(const RgbWordsView& frame, const LumaWeights& weights, ThreadPool& threads,
                    Image<std::uint8_t>& out) {
   const Sums sums;
   const hn::Rebind<std::uint16_t, Sums> words;
   const hn::Rebind<std::uint8_t, Sums> pixels;
   const int lanes = static_cast<int>(hn::Lanes(sums));
   const LumaWeights in_order =
-      picture.is_blue_first ? LumaWeights{weights.blue, weights.green, weights.red} : weights;
+      frame.is_blue_first ? LumaWeights{weights.blue, weights.green, weights.red} : weights;
   // Expands the colour of `bits` bits at `shift` to 8 bits.
   const auto colour = [&](SumVector word, int shift, int bits) {
     const auto value =
@@ -128,12 +128,12 @@ void luma_of_words(const RgbWordsView& picture, const LumaWeights& weights, Thre
   };
   const auto step = [&](const auto loaded, std::uint8_t* to) {
     const auto word = hn::PromoteTo(sums, loaded);
-    const auto luma = luma_of(in_order, colour(word, 5 + picture.green_bits, 5),
-                              colour(word, 5, picture.green_bits), colour(word, 0, 5));
+    const auto luma = luma_of(in_order, colour(word, 5 + frame.green_bits, 5),
+                              colour(word, 5, frame.green_bits), colour(word, 0, 5));
     hn::StoreU(hn::DemoteTo(pixels, luma), pixels, to);
   };
   for_each_row(threads, out.height(), [&](int y) {
-    const auto* row = row_of<std::uint16_t>({picture.data, picture.stride}, y);
+    const auto* row = row_of<std::uint16_t>({frame.data, frame.stride}, y);
     int x = 0;
     for (; x + lanes <= out.width(); x += lanes) step(hn::LoadU(words, row + x), out.row(y) + x);
     if (x < out.width()) step(load_first(words, row + x, out.width() - x), out.row(y) + x);
@@ -151,19 +151,19 @@ HWY_EXPORT(luma_of_bytes);
 HWY_EXPORT(luma_of_16_bits);
 HWY_EXPORT(luma_of_words);
 
-void luma_of_rgb(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
+void luma_of_rgb(const RgbView& frame, const LumaWeights& weights, ThreadPool& threads,
                  Image<std::uint8_t>& out) {
-  HWY_DYNAMIC_DISPATCH(luma_of_bytes)(picture, weights, threads, out);
+  HWY_DYNAMIC_DISPATCH(luma_of_bytes)(frame, weights, threads, out);
 }
 
-void luma_of_rgb(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
+void luma_of_rgb(const RgbView& frame, const LumaWeights& weights, ThreadPool& threads,
                  Image<std::uint16_t>& out) {
-  HWY_DYNAMIC_DISPATCH(luma_of_16_bits)(picture, weights, threads, out);
+  HWY_DYNAMIC_DISPATCH(luma_of_16_bits)(frame, weights, threads, out);
 }
 
-void luma_of_rgb(const RgbWordsView& picture, const LumaWeights& weights, ThreadPool& threads,
+void luma_of_rgb(const RgbWordsView& frame, const LumaWeights& weights, ThreadPool& threads,
                  Image<std::uint8_t>& out) {
-  HWY_DYNAMIC_DISPATCH(luma_of_words)(picture, weights, threads, out);
+  HWY_DYNAMIC_DISPATCH(luma_of_words)(frame, weights, threads, out);
 }
 
 }  // namespace eventcamera

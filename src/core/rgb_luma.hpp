@@ -53,11 +53,11 @@ struct RgbWordsView {
 
 /// Computes the luma of a frame of the size of `out`: (weights * colours + one / 2) / one, rounded
 /// down. Colours of words are expanded to 8 bits by repeating their upper bits.
-void luma_of_rgb(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
+void luma_of_rgb(const RgbView& frame, const LumaWeights& weights, ThreadPool& threads,
                  Image<std::uint8_t>& out);
-void luma_of_rgb(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
+void luma_of_rgb(const RgbView& frame, const LumaWeights& weights, ThreadPool& threads,
                  Image<std::uint16_t>& out);
-void luma_of_rgb(const RgbWordsView& picture, const LumaWeights& weights, ThreadPool& threads,
+void luma_of_rgb(const RgbWordsView& frame, const LumaWeights& weights, ThreadPool& threads,
                  Image<std::uint8_t>& out);
 
 }  // namespace eventcamera

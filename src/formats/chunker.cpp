@@ -39,7 +39,7 @@ std::size_t Chunker::keep_sorted(std::span<const AbsoluteEvent> events) {
     events = {events.begin(), std::ranges::partition_point(
                                   events, [&](const auto& event) { return event.t < cell.end; })};
   std::array<Event, block_size> block;
-  if (!count_times_from(cell.start, latest_, events, block.data()))
+  if (!to_interval_times(cell.start, latest_, events, block.data()))
     return 0;  // the cell is not left empty: place() keeps the first event
   cell.events.insert(cell.events.end(), block.begin(), block.begin() + events.size());
   if (keeps_labels_) std::ranges::transform(events, std::back_inserter(cell.labels), label_of);

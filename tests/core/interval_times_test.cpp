@@ -39,7 +39,7 @@ TEST(IntervalTimes, EqualThePlainReferenceAtEverySize) {
     for (std::size_t count = 0; count < 70; ++count) {
       const auto events = random_events(count);
       std::vector<Event> out(count + 1);
-      EXPECT_TRUE(count_times_from(start, start, events, out.data())) << target << ' ' << count;
+      EXPECT_TRUE(to_interval_times(start, start, events, out.data())) << target << ' ' << count;
       EXPECT_EQ(out, expected(events)) << target << ' ' << count;
     }
   });
@@ -53,7 +53,7 @@ TEST(IntervalTimes, NoticeEveryFall) {
         const auto before = late == 0 ? start : events[late - 1].t;
         for (std::size_t i = late; i < count; ++i) events[i].t = before - 1;
         std::vector<Event> out(count + 1);
-        EXPECT_FALSE(count_times_from(start, start, events, out.data()))
+        EXPECT_FALSE(to_interval_times(start, start, events, out.data()))
             << target << ' ' << count << ' ' << late;
         EXPECT_EQ(out, expected(events)) << target << ' ' << count << ' ' << late;
       }
@@ -68,7 +68,7 @@ TEST(IntervalTimes, AreComparedOverTheirWholeRange) {
       events[count - 2].t = far;
       events[count - 1].t = -far;  // further back than 64 bits can tell
       std::vector<Event> out(count);
-      EXPECT_FALSE(count_times_from(start, start, events, out.data())) << target << ' ' << count;
+      EXPECT_FALSE(to_interval_times(start, start, events, out.data())) << target << ' ' << count;
     }
   });
 }
