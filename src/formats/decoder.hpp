@@ -31,6 +31,8 @@
 //   chunker.cpp                   events -> intervals of equal length, sorted
 //   waiting_items.hpp             triggers and IMU samples that wait for their interval
 // encoder.hpp                   events -> bytes, in units by word_writer.hpp
+// byte_source.hpp               random access to the bytes of a file
+// collected_bytes.hpp           the same for bytes that are pushed
 // corruption.hpp                what was wrong with the bytes, and where
 
 namespace eventcamera {
