@@ -16,23 +16,23 @@ namespace eventcamera {
 namespace {
 
 /// Pixels of a difference frame that exceeded the threshold of one polarity, in raster order.
-struct Kept {
+struct KeptPixels {
   std::vector<Point> places;
   std::vector<int> differences;    ///< I(i) - I(i-1) at each pixel
   std::vector<std::size_t> first;  ///< index of the first one of each band, and the end
 };
 
 /// One polarity of the last two difference frames.
-struct Part {
-  Part(int width, int height)
-      : picture(width, height, 1), is_black(static_cast<std::size_t>(height), 1) {
+struct PolarityFrames {
+  PolarityFrames(int width, int height)
+      : image(width, height, 1), is_black(static_cast<std::size_t>(height), 1) {
     now.first.assign(static_cast<std::size_t>(band_count(height)) + 1, 0);
   }
 
-  Kept last;
-  Kept now;
-  Image<std::uint8_t> picture;         ///< `now` as an 8-bit image, 0 for pixels not kept
-  std::vector<std::uint8_t> is_black;  ///< 1 for each row of the picture without a kept pixel
+  KeptPixels last;
+  KeptPixels now;
+  Image<std::uint8_t> image;           ///< `now` as an 8-bit image, 0 for pixels not kept
+  std::vector<std::uint8_t> is_black;  ///< 1 for each row of the image without a kept pixel
   PointTracker tracker{1};
 
   /// Makes `now` the last difference frame, and starts a new one with empty bands.
@@ -49,11 +49,11 @@ struct Part {
     now.differences.resize(now.first.back());
   }
 
-  /// Removes the last frame's pixels of a band from the picture.
+  /// Removes the last frame's pixels of a band from the image.
   void clear(std::size_t band) {
     for (std::size_t i = last.first[band]; i < last.first[band + 1]; ++i) {
       const auto& place = last.places[i];
-      picture.at(place.x, place.y) = 0;
+      image.at(place.x, place.y) = 0;
       is_black[static_cast<std::size_t>(place.y)] = 1;
     }
   }
@@ -61,21 +61,21 @@ struct Part {
   void keep(std::size_t i, const Point& place, int difference, int shift) {
     now.places[i] = place;
     now.differences[i] = difference;
-    picture.at(place.x, place.y) =
+    image.at(place.x, place.y) =
         static_cast<std::uint8_t>(std::max(1, std::abs(difference) >> shift));
     is_black[static_cast<std::size_t>(place.y)] = 0;
   }
 
   /// Prepares to track to this difference frame and, in the next interval, from it.
   void push(ThreadPool& threads) {
-    if (!now.places.empty()) tracker.push(picture.view(), threads, is_black);
+    if (!now.places.empty()) tracker.push(image.view(), threads, is_black);
   }
 
   /// True if a pixel of this difference frame is kept within one pixel of `place`.
   bool keeps_near(const Point& place) const {
     int near = 0;
     for (int y = place.y - 1; y <= place.y + 1; ++y)
-      for (int x = place.x - 1; x <= place.x + 1; ++x) near |= picture.at(x, y);
+      for (int x = place.x - 1; x <= place.x + 1; ++x) near |= image.at(x, y);
     return near != 0;
   }
 };
@@ -214,17 +214,18 @@ class DiffSimulator final : public Simulator {
   }
 
   /// Tracks the kept pixels of the last difference frame into this one.
-  void follow(Part& part, int steps) {
-    const auto& last = part.last;
-    if (last.places.empty() || part.now.places.empty()) return;  // no track ends near a kept pixel
-    const auto tracks = part.tracker.track(last.places, threads());
+  void follow(PolarityFrames& polarity, int steps) {
+    const auto& last = polarity.last;
+    if (last.places.empty() || polarity.now.places.empty())
+      return;  // no track ends near a kept pixel
+    const auto tracks = polarity.tracker.track(last.places, threads());
     threads().for_each(static_cast<int>(moving_.size()), [&](int i, int) {
       const auto index = static_cast<std::size_t>(i);
       auto& band = moving_[index];
       for (std::size_t k = last.first[index]; k < last.first[index + 1]; ++k) {
         const auto point =
             moving_point(last.places[k], tracks[k], steps, format().width, format().height);
-        if (!point || !part.keeps_near(point->at(steps))) continue;
+        if (!point || !polarity.keeps_near(point->at(steps))) continue;
         band.points.push_back(*point);
         band.strengths.push_back(strength_of(last.differences[k]));
       }
@@ -244,8 +245,8 @@ class DiffSimulator final : public Simulator {
 
   Image<Pixel> last_;
   bool has_difference_ = false;
-  Part on_;
-  Part off_;
+  PolarityFrames on_;
+  PolarityFrames off_;
   std::vector<MovingBand<Strength>> moving_;
   std::vector<DifferenceFrame<Strength>> frames_;  ///< one per thread
 };

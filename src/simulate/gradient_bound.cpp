@@ -39,15 +39,15 @@ class LargestDifference {
 
 /// Measures the row of 4x4 cells that starts at image row `top`. Reads past the right border, which
 /// can only increase the bound.
-void measure_row(const ImageView<std::uint8_t>& picture, int top, std::uint8_t* x_out,
+void measure_row(const ImageView<std::uint8_t>& image, int top, std::uint8_t* x_out,
                  std::uint8_t* y_out) {
-  const int bottom = std::min(top + 4, picture.height);
-  for (int left = 0; left < picture.width; left += columns_at_once) {
+  const int bottom = std::min(top + 4, image.height);
+  for (int left = 0; left < image.width; left += columns_at_once) {
     LargestDifference x;
     LargestDifference y;
     for (int row = top; row < bottom; ++row) {
-      const std::uint8_t* here = picture.row(row) + left;
-      const std::uint8_t* below = picture.row(std::min(row + 1, picture.height - 1)) + left;
+      const std::uint8_t* here = image.row(row) + left;
+      const std::uint8_t* below = image.row(std::min(row + 1, image.height - 1)) + left;
       x.add(here, here + 1);
       y.add(here, below);
     }
@@ -88,14 +88,14 @@ void GradientBound::Cells::shape(int cell_side, int columns, int rows) {
   y = Image<std::uint8_t>(columns, rows);
 }
 
-void GradientBound::measure(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
-  const int columns = (picture.width + 15) / 16;
-  const int rows = (picture.height + 15) / 16;
+void GradientBound::measure(const ImageView<std::uint8_t>& image, ThreadPool& threads) {
+  const int columns = (image.width + 15) / 16;
+  const int rows = (image.height + 15) / 16;
   far_.shape(16, columns, rows);
   near_.shape(4, 4 * columns, 4 * rows);
   threads.for_each(rows, [&](int row, int) {
-    for (int y = 4 * row; y < 4 * row + 4 && 4 * y < picture.height; ++y)
-      HWY_DYNAMIC_DISPATCH(measure_row)(picture, 4 * y, near_.x.row(y), near_.y.row(y));
+    for (int y = 4 * row; y < 4 * row + 4 && 4 * y < image.height; ++y)
+      HWY_DYNAMIC_DISPATCH(measure_row)(image, 4 * y, near_.x.row(y), near_.y.row(y));
     gather_row(near_.x, row, far_.x);
     gather_row(near_.y, row, far_.y);
   });

@@ -12,8 +12,8 @@ namespace eventcamera {
 /// boxes, 16x16 for large ones.
 class GradientBound {
  public:
-  /// `picture` must be the view of an Image: SIMD code reads past its rows.
-  void measure(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
+  /// `image` must be the view of an Image: SIMD code reads past its rows.
+  void measure(const ImageView<std::uint8_t>& image, ThreadPool& threads);
 
   struct Bound {
     int x;  ///< between a pixel and its right neighbour, grey levels

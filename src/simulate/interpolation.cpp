@@ -66,12 +66,12 @@ struct SamplePlaces {
 /// Vector version of sample() in warp.hpp. Needs the view of an Image.
 class Sampler {
  public:
-  explicit Sampler(const ImageView<std::uint8_t>& picture)
-      : pixels_(reinterpret_cast<const std::int32_t*>(picture.data)),
-        stride_(hn::Set(Words(), static_cast<std::int32_t>(picture.stride))),
-        right_end_(hn::Set(Words(), (picture.width - 1) * 64)),
-        lower_end_(hn::Set(Words(), (picture.height - 1) * 64)),
-        last_row_(hn::Set(Words(), picture.height - 1)) {}
+  explicit Sampler(const ImageView<std::uint8_t>& frame)
+      : pixels_(reinterpret_cast<const std::int32_t*>(frame.data)),
+        stride_(hn::Set(Words(), static_cast<std::int32_t>(frame.stride))),
+        right_end_(hn::Set(Words(), (frame.width - 1) * 64)),
+        lower_end_(hn::Set(Words(), (frame.height - 1) * 64)),
+        last_row_(hn::Set(Words(), frame.height - 1)) {}
 
   /// Positions in 1/65536 of a pixel; samples in 1/4096 of a grey level.
   Vector at(Vector x, Vector y) const {
@@ -188,16 +188,16 @@ using FirstSteps = std::array<int, max_side / tile_width>;
 
 /// Pairs each pixel of rows [first, last) with the one below it, those of the bottom row with
 /// themselves.
-void pair_rows(const ImageView<std::uint8_t>& picture, int first, int last,
+void pair_rows(const ImageView<std::uint8_t>& frame, int first, int last,
                Image<std::uint16_t>& pairs) {
   const hn::CappedTag<std::uint16_t, 32> words;
   const hn::Rebind<std::uint8_t, decltype(words)> bytes;
   const int lanes = static_cast<int>(hn::Lanes(words));
   for (int y = first; y < last; ++y) {
-    const std::uint8_t* here = picture.row(y);
-    const std::uint8_t* below = picture.row(std::min(y + 1, picture.height - 1));
+    const std::uint8_t* here = frame.row(y);
+    const std::uint8_t* below = frame.row(std::min(y + 1, frame.height - 1));
     std::uint16_t* out = pairs.row(y);
-    for (int x = 0; x < picture.width; x += lanes) {
+    for (int x = 0; x < frame.width; x += lanes) {
       const auto low = hn::PromoteTo(words, hn::LoadU(bytes, here + x));
       const auto high = hn::PromoteTo(words, hn::LoadU(bytes, below + x));
       hn::StoreU(hn::Or(low, hn::ShiftLeft<8>(high)), words, out + x);

@@ -19,14 +19,14 @@ enum class Interpolation {
 /// Bilinear sample of an image at (x, y), in 1/65536 of a pixel, rounded to 1/64; the border is
 /// replicated. The result is exact, in 1/4096 of a grey level.
 template <class Pixel>
-std::int32_t sample(const ImageView<Pixel>& picture, std::int32_t x, std::int32_t y) {
-  const int qx = std::clamp((x + 512) >> 10, 0, (picture.width - 1) * 64);
-  const int qy = std::clamp((y + 512) >> 10, 0, (picture.height - 1) * 64);
+std::int32_t sample(const ImageView<Pixel>& image, std::int32_t x, std::int32_t y) {
+  const int qx = std::clamp((x + 512) >> 10, 0, (image.width - 1) * 64);
+  const int qy = std::clamp((y + 512) >> 10, 0, (image.height - 1) * 64);
   const int x0 = qx >> 6;
   const int y0 = qy >> 6;
-  const int x1 = std::min(x0 + 1, picture.width - 1);
-  const Pixel* upper = picture.row(y0);
-  const Pixel* lower = picture.row(std::min(y0 + 1, picture.height - 1));
+  const int x1 = std::min(x0 + 1, image.width - 1);
+  const Pixel* upper = image.row(y0);
+  const Pixel* lower = image.row(std::min(y0 + 1, image.height - 1));
   const int right = qx & 63;
   const int down = qy & 63;
   return (upper[x0] * (64 - right) + upper[x1] * right) * (64 - down) +
