@@ -11,9 +11,10 @@
 //
 // dis/: Kroeger et al., Fast optical flow using dense inverse search, ECCV 2016
 //   pyramid.cpp                   scales and image gradients
-//   patches.cpp                   inverse search: the flow u of a patch that minimises the sum of
-//                                 (J(x + u) - I(x))^2, less the means; densification: the mean of
-//                                 the flows of the patches that cover a pixel, weighted by match
+//   inverse_search.cpp            the flow u of a patch that minimises the sum of
+//                                 (J(x + u) - I(x))^2, less the means
+//   densification.cpp             the mean of the flows of the patches that cover a pixel, weighted
+//                                 by match
 //   variational_refinement.cpp    energy of constant brightness and gradients, and of smoothness:
 //                                 Brox et al., High accuracy optical flow estimation based on a
 //                                 theory for warping, ECCV 2004

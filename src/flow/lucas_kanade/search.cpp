@@ -12,6 +12,7 @@
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
 #include "src/flow/lucas_kanade/window_sums-inl.hpp"
+#include "src/flow/product_sum-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -61,22 +62,6 @@ struct GradientSums {
   std::int32_t y;
 };
 
-#if HWY_TARGET != HWY_SCALAR
-/// In each 128-bit block, lane c is the sum of the lanes of that block of sum c.
-template <class Lanes, class Value = hn::Vec<Lanes>>
-HWY_INLINE Value add_lanes(Lanes lanes, Value sum0, Value sum1, Value sum2, Value sum3) {
-  const hn::Repartition<std::int64_t, Lanes> pairs;
-  const auto add_pairs = [&](Value a, Value b) {
-    return hn::BitCast(pairs,
-                       hn::Add(hn::InterleaveLower(lanes, a, b), hn::InterleaveUpper(lanes, a, b)));
-  };
-  const auto low = add_pairs(sum0, sum1);
-  const auto high = add_pairs(sum2, sum3);
-  return hn::Add(hn::BitCast(lanes, hn::InterleaveLower(pairs, low, high)),
-                 hn::BitCast(lanes, hn::InterleaveUpper(pairs, low, high)));
-}
-#endif
-
 /// Calls body(row) for each row of a window, unrolled so that values carried from row to row stay
 /// in registers.
 template <class Body>
@@ -89,23 +74,6 @@ HWY_INLINE void for_each_row(const Body& body) {
     body(row + 3);
   }
 }
-
-/// Lane-wise sum of the products of two columns of vectors.
-template <class Factors = Values>
-class ProductSum {
- public:
-  using Factor = hn::Vec<Factors>;
-  using Lanes = hn::Repartition<std::int32_t, Factors>;
-
-  // Not defaulted: GCC 12 compiles a defaulted constructor without the target's instructions.
-  ProductSum() : low_(hn::Zero(Lanes())), high_(hn::Zero(Lanes())) {}
-  void add(Factor a, Factor b) { low_ = hn::ReorderWidenMulAccumulate(Lanes(), a, b, low_, high_); }
-  hn::Vec<Lanes> lanes() const { return hn::Add(low_, high_); }
-
- private:
-  hn::Vec<Lanes> low_;
-  hn::Vec<Lanes> high_;
-};
 
 /// Partial sums per ProductSum in the output of store_parts(): one per 128-bit block.
 constexpr std::ptrdiff_t parts = hn::MaxLanes(Sums()) == 8 ? 2 : 1;
@@ -159,8 +127,8 @@ HWY_INLINE Value load_pixels(const std::uint8_t* at) {
 }
 
 struct BothSum {
-  ProductSum<> x;
-  ProductSum<> y;
+  ProductSum<Values> x;
+  ProductSum<Values> y;
 
   void add(const Both& slopes, Value pixels) {
     x.add(slopes.x, pixels);

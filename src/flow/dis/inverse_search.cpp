@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/dis/patches.hpp"
+#include "src/flow/dis/inverse_search.hpp"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "src/flow/scratch.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/flow/dis/patches.cpp"
+#define HWY_TARGET_INCLUDE "src/flow/dis/inverse_search.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
-#include "src/core/simd-inl.hpp"
+#include "src/flow/product_sum-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -20,7 +21,6 @@ namespace {
 
 /// Pixels of a patch: up to two rows of 8x8 pixels, or all four of 4x4.
 using Words = hn::CappedTag<std::int16_t, 16>;
-using Sums = hn::Repartition<std::int32_t, Words>;
 using Word = hn::Vec<Words>;
 
 /// Lanes of a sum once its halves are added.
@@ -33,28 +33,18 @@ using Vector = hn::Vec<Floats>;
 /// Lower bound to which determinants of gradient matrices are clamped.
 constexpr double min_determinant = 1e-3;
 
-/// Lane-wise sum of products, exact in 32 bits.
-class ProductSum {
- public:
-  // Not defaulted: GCC 12 compiles a defaulted constructor without the target's instructions.
-  ProductSum() : low_(hn::Zero(Sums())), high_(hn::Zero(Sums())) {}
-  void add(Word a, Word b) { low_ = hn::ReorderWidenMulAccumulate(Sums(), a, b, low_, high_); }
-  hn::Vec<Quarters> lanes() const { return quarters(hn::Add(low_, high_)); }
+using WordSum = ProductSum<Words>;
 
- private:
-  template <class Sum>
-  static HWY_INLINE hn::Vec<Quarters> quarters(Sum sum) {
+/// Adds the halves of a sum, if it has more lanes than Quarters.
+template <class Sum>
+HWY_INLINE hn::Vec<Quarters> quarters(Sum sum) {
 #if HWY_TARGET != HWY_SCALAR
-    if constexpr (hn::MaxLanes(hn::DFromV<Sum>()) > hn::MaxLanes(Quarters()))
-      return hn::Add(hn::LowerHalf(Quarters(), sum), hn::UpperHalf(Quarters(), sum));
-    else
+  if constexpr (hn::MaxLanes(hn::DFromV<Sum>()) > hn::MaxLanes(Quarters()))
+    return hn::Add(hn::LowerHalf(Quarters(), sum), hn::UpperHalf(Quarters(), sum));
+  else
 #endif
-      return sum;
-  }
-
-  hn::Vec<Sums> low_;
-  hn::Vec<Sums> high_;
-};
+    return sum;
+}
 
 /// Sums at one of the four pixels of a patch's cell.
 struct Corner {
@@ -67,28 +57,21 @@ struct Corner {
     along_y.add(d, slope_y);
   }
 
-  ProductSum square;
-  ProductSum plain;
-  ProductSum along_x;
-  ProductSum along_y;
+  WordSum square;
+  WordSum plain;
+  WordSum along_x;
+  WordSum along_y;
 };
 
 /// Stores the totals of four sums.
-HWY_INLINE void store_totals(const ProductSum& sum0, const ProductSum& sum1, const ProductSum& sum2,
-                             const ProductSum& sum3, std::int32_t* out) {
+HWY_INLINE void store_totals(const WordSum& sum0, const WordSum& sum1, const WordSum& sum2,
+                             const WordSum& sum3, std::int32_t* out) {
 #if HWY_TARGET == HWY_SCALAR
   for (const auto* sum : {&sum0, &sum1, &sum2, &sum3}) *out++ = hn::GetLane(sum->lanes());
 #else
   const Quarters lanes;
-  const hn::Repartition<std::int64_t, Quarters> pairs;
-  const auto add_pairs = [&](auto a, auto b) {
-    return hn::BitCast(pairs,
-                       hn::Add(hn::InterleaveLower(lanes, a, b), hn::InterleaveUpper(lanes, a, b)));
-  };
-  const auto low = add_pairs(sum0.lanes(), sum1.lanes());
-  const auto high = add_pairs(sum2.lanes(), sum3.lanes());
-  hn::StoreU(hn::Add(hn::BitCast(lanes, hn::InterleaveLower(pairs, low, high)),
-                     hn::BitCast(lanes, hn::InterleaveUpper(pairs, low, high))),
+  hn::StoreU(add_lanes(lanes, quarters(sum0.lanes()), quarters(sum1.lanes()),
+                       quarters(sum2.lanes()), quarters(sum3.lanes())),
              lanes, out);
 #endif
 }
@@ -185,11 +168,11 @@ class Search {
   /// Computes the values that stay constant during the search for a patch.
   void read_gradients(int i) {
     const int x = left_ + i * stride_;
-    ProductSum xx;
-    ProductSum xy;
-    ProductSum yy;
-    ProductSum total_x;
-    ProductSum total_y;
+    WordSum xx;
+    WordSum xy;
+    WordSum yy;
+    WordSum total_x;
+    WordSum total_y;
     const auto one = hn::Set(Words(), 1);
     for (int first = 0; first < side * side; first += vector_size) {
       const auto slope_x = load_words(gradients_.x(), x, top_, first);
@@ -223,12 +206,12 @@ class Search {
     Corner c1;
     Corner c2;
     Corner c3;
-    ProductSum d01;
-    ProductSum d02;
-    ProductSum d03;
-    ProductSum d12;
-    ProductSum d13;
-    ProductSum d23;
+    WordSum d01;
+    WordSum d02;
+    WordSum d03;
+    WordSum d12;
+    WordSum d13;
+    WordSum d23;
     for (int first = 0; first < side * side; first += vector_size) {
       const auto here = load_words(from_, x, top_, first);
       const auto slope_x = load_words(gradients_.x(), x, top_, first);
@@ -389,124 +372,6 @@ void search_one_row(const PatchGrid& grid, const Image<std::uint8_t>& from,
     search<8>(grid, from, gradients, to, row, iterations, flows);
 }
 
-/// Weighted sums over the patches that cover the pixels of a row.
-struct SumRow {
-  float* x;
-  float* y;
-  float* weight;
-};
-
-/// Adds rows [first, last) of a patch with this flow, whose top left pixel is (x, y); sums_of(row)
-/// are those of a row.
-template <int side, class SumsOf>
-HWY_INLINE void add_patch(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, int x,
-                          int y, int width, int first, int last, const Flow& flow,
-                          const SumsOf& sums_of) {
-  const hn::CappedTag<float, side> floats;
-  const hn::RebindToSigned<decltype(floats)> ints;
-  const hn::Rebind<std::uint8_t, decltype(floats)> bytes;
-  const int lanes = static_cast<int>(hn::Lanes(floats));
-  // Past these limits, all pixels would be replicated ones.
-  const float to_x = std::clamp(static_cast<float>(x) + flow.x, static_cast<float>(-width),
-                                static_cast<float>(to.width()));
-  const float to_y = std::clamp(static_cast<float>(y) + flow.y, static_cast<float>(y - last),
-                                static_cast<float>(to.height()));
-  const int left = static_cast<int>(std::floor(to_x));
-  const int top = static_cast<int>(std::floor(to_y));
-  const auto right = hn::Set(floats, to_x - static_cast<float>(left));
-  const auto down = hn::Set(floats, to_y - static_cast<float>(top));
-  const auto flow_x = hn::Set(floats, flow.x);
-  const auto flow_y = hn::Set(floats, flow.y);
-  const auto one = hn::Set(floats, 1.0F);
-  const auto load = [&](const std::uint8_t* pixels) {
-    return hn::ConvertTo(floats, hn::PromoteTo(ints, hn::LoadU(bytes, pixels)));
-  };
-  const auto between = [](auto a, auto b, auto weight) {
-    return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
-  };
-  for (int k = 0; k < width; k += lanes) {
-    const auto along = [&](int row) {
-      const std::uint8_t* pixels = to.row(row - y + top) + left + k;
-      return between(load(pixels), load(pixels + 1), right);
-    };
-    auto above = along(first);
-    for (int row = first; row < last; ++row) {
-      const auto below = along(row + 1);
-      const auto there = between(above, below, down);
-      above = below;
-      const auto difference = hn::Abs(hn::Sub(there, load(from.row(row) + x + k)));
-      const auto weight = hn::Div(one, hn::Max(one, difference));
-      const SumRow sums = sums_of(row);
-      const auto add = [&](float* sum, auto value) {
-        hn::StoreU(hn::Add(hn::LoadU(floats, sum + x + k), value), floats, sum + x + k);
-      };
-      add(sums.x, hn::Mul(weight, flow_x));
-      add(sums.y, hn::Mul(weight, flow_y));
-      add(sums.weight, weight);
-    }
-  }
-}
-
-/// Divides sums by weights.
-void divide_row(const SumRow& sums, int y, SplitPlane& flow_x, SplitPlane& flow_y) {
-  const Floats floats;
-  const int lanes = static_cast<int>(hn::Lanes(floats));
-  for (int k = 0; k < flow_x.count(0); k += lanes) {
-    const auto load = [&](const float* row, Vector* values) {
-      hn::LoadInterleaved2(floats, row + std::ptrdiff_t{2} * k, values[0], values[1]);
-    };
-    Vector x[2];
-    Vector y_[2];
-    Vector weight[2];
-    load(sums.x, x);
-    load(sums.y, y_);
-    load(sums.weight, weight);
-    for (int parity = 0; parity < 2; ++parity) {
-      hn::StoreU(hn::Div(x[parity], weight[parity]), floats, flow_x.row(parity, y) + k);
-      hn::StoreU(hn::Div(y_[parity], weight[parity]), floats, flow_y.row(parity, y) + k);
-    }
-  }
-  flow_x.replicate_ends(y);
-  flow_y.replicate_ends(y);
-}
-
-template <int side>
-void spread(const PatchGrid& grid, const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
-            const Image<Flow>& flows, int first, int last, float* sums, int padded_width,
-            SplitPlane& x, SplitPlane& y) {
-  const auto sums_of = [&](int row) -> SumRow {
-    float* values = sums + std::ptrdiff_t{row - first} * 3 * padded_width;
-    return {values, values + padded_width, values + std::ptrdiff_t{2} * padded_width};
-  };
-  const int width = from.width();
-  for (int row = first; row < last; ++row) {
-    const SumRow sum = sums_of(row);
-    std::fill_n(sum.x, 2 * padded_width + width, 0.0F);
-    std::fill(sum.weight + width, sum.weight + padded_width, 1.0F);
-  }
-  const int first_patches = std::clamp((first - side) / grid.stride, 0, grid.rows - 1);
-  for (int j = first_patches; j < grid.rows && j * grid.stride < last; ++j) {
-    const int top = std::max(first, j * grid.stride);
-    const int bottom = std::min(last, j == grid.rows - 1 ? last : j * grid.stride + side);
-    for (int i = 0; i < grid.columns; ++i) {
-      const int left = i * grid.stride;
-      const int covered = i == grid.columns - 1 ? width - left : side;
-      add_patch<side>(from, to, left, j * grid.stride, covered, top, bottom, flows.at(i, j),
-                      sums_of);
-    }
-  }
-  for (int row = first; row < last; ++row) divide_row(sums_of(row), row, x, y);
-}
-
-void spread_rows(const PatchGrid& grid, const Image<std::uint8_t>& from,
-                 const Image<std::uint8_t>& to, const Image<Flow>& flows, int first, int last,
-                 float* sums, int padded_width, SplitPlane& x, SplitPlane& y) {
-  if (grid.side == 4)
-    spread<4>(grid, from, to, flows, first, last, sums, padded_width, x, y);
-  else
-    spread<8>(grid, from, to, flows, first, last, sums, padded_width, x, y);
-}
-
 }  // namespace
 }  // namespace eventcamera::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -515,21 +380,10 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 
 HWY_EXPORT(search_one_row);
-HWY_EXPORT(spread_rows);
 
 void search_row(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradients& gradients,
                 const Image<std::uint8_t>& to, int row, int iterations, Flow* flows) {
   HWY_DYNAMIC_DISPATCH(search_one_row)(grid, from, gradients, to, row, iterations, flows);
-}
-
-void spread_patches(const PatchGrid& grid, const Image<std::uint8_t>& from,
-                    const Image<std::uint8_t>& to, const Image<Flow>& flows, int first, int last,
-                    std::vector<float>& sums, SplitPlane& x, SplitPlane& y) {
-  const int padded_width = from.width() + 3 * row_padding;
-  float* rows = scratch_of(sums, std::size_t{3} * static_cast<std::size_t>(padded_width) *
-                                     static_cast<std::size_t>(last - first));
-  HWY_DYNAMIC_DISPATCH(spread_rows)
-  (grid, from, to, flows, first, last, rows, padded_width, x, y);
 }
 
 }  // namespace eventcamera

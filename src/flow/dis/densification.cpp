@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/flow/dis/densification.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "src/flow/scratch.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/flow/dis/densification.cpp"
+#include <hwy/foreach_target.h>
+// Compiled once per SIMD target.
+#include "src/core/simd-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+/// One lane per pixel.
+using Floats = hn::CappedTag<float, row_padding>;
+using Vector = hn::Vec<Floats>;
+
+/// Weighted sums over the patches that cover the pixels of a row.
+struct SumRow {
+  float* x;
+  float* y;
+  float* weight;
+};
+
+/// Adds rows [first, last) of a patch with this flow, whose top left pixel is (x, y); sums_of(row)
+/// are those of a row.
+template <int side, class SumsOf>
+HWY_INLINE void add_patch(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, int x,
+                          int y, int width, int first, int last, const Flow& flow,
+                          const SumsOf& sums_of) {
+  const hn::CappedTag<float, side> floats;
+  const hn::RebindToSigned<decltype(floats)> ints;
+  const hn::Rebind<std::uint8_t, decltype(floats)> bytes;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  // Past these limits, all pixels would be replicated ones.
+  const float to_x = std::clamp(static_cast<float>(x) + flow.x, static_cast<float>(-width),
+                                static_cast<float>(to.width()));
+  const float to_y = std::clamp(static_cast<float>(y) + flow.y, static_cast<float>(y - last),
+                                static_cast<float>(to.height()));
+  const int left = static_cast<int>(std::floor(to_x));
+  const int top = static_cast<int>(std::floor(to_y));
+  const auto right = hn::Set(floats, to_x - static_cast<float>(left));
+  const auto down = hn::Set(floats, to_y - static_cast<float>(top));
+  const auto flow_x = hn::Set(floats, flow.x);
+  const auto flow_y = hn::Set(floats, flow.y);
+  const auto one = hn::Set(floats, 1.0F);
+  const auto load = [&](const std::uint8_t* pixels) {
+    return hn::ConvertTo(floats, hn::PromoteTo(ints, hn::LoadU(bytes, pixels)));
+  };
+  const auto between = [](auto a, auto b, auto weight) {
+    return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
+  };
+  for (int k = 0; k < width; k += lanes) {
+    const auto along = [&](int row) {
+      const std::uint8_t* pixels = to.row(row - y + top) + left + k;
+      return between(load(pixels), load(pixels + 1), right);
+    };
+    auto above = along(first);
+    for (int row = first; row < last; ++row) {
+      const auto below = along(row + 1);
+      const auto there = between(above, below, down);
+      above = below;
+      const auto difference = hn::Abs(hn::Sub(there, load(from.row(row) + x + k)));
+      const auto weight = hn::Div(one, hn::Max(one, difference));
+      const SumRow sums = sums_of(row);
+      const auto add = [&](float* sum, auto value) {
+        hn::StoreU(hn::Add(hn::LoadU(floats, sum + x + k), value), floats, sum + x + k);
+      };
+      add(sums.x, hn::Mul(weight, flow_x));
+      add(sums.y, hn::Mul(weight, flow_y));
+      add(sums.weight, weight);
+    }
+  }
+}
+
+/// Divides sums by weights.
+void divide_row(const SumRow& sums, int y, SplitPlane& flow_x, SplitPlane& flow_y) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  for (int k = 0; k < flow_x.count(0); k += lanes) {
+    const auto load = [&](const float* row, Vector* values) {
+      hn::LoadInterleaved2(floats, row + std::ptrdiff_t{2} * k, values[0], values[1]);
+    };
+    Vector x[2];
+    Vector y_[2];
+    Vector weight[2];
+    load(sums.x, x);
+    load(sums.y, y_);
+    load(sums.weight, weight);
+    for (int parity = 0; parity < 2; ++parity) {
+      hn::StoreU(hn::Div(x[parity], weight[parity]), floats, flow_x.row(parity, y) + k);
+      hn::StoreU(hn::Div(y_[parity], weight[parity]), floats, flow_y.row(parity, y) + k);
+    }
+  }
+  flow_x.replicate_ends(y);
+  flow_y.replicate_ends(y);
+}
+
+template <int side>
+void spread(const PatchGrid& grid, const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
+            const Image<Flow>& flows, int first, int last, float* sums, int padded_width,
+            SplitPlane& x, SplitPlane& y) {
+  const auto sums_of = [&](int row) -> SumRow {
+    float* values = sums + std::ptrdiff_t{row - first} * 3 * padded_width;
+    return {values, values + padded_width, values + std::ptrdiff_t{2} * padded_width};
+  };
+  const int width = from.width();
+  for (int row = first; row < last; ++row) {
+    const SumRow sum = sums_of(row);
+    std::fill_n(sum.x, 2 * padded_width + width, 0.0F);
+    std::fill(sum.weight + width, sum.weight + padded_width, 1.0F);
+  }
+  const int first_patches = std::clamp((first - side) / grid.stride, 0, grid.rows - 1);
+  for (int j = first_patches; j < grid.rows && j * grid.stride < last; ++j) {
+    const int top = std::max(first, j * grid.stride);
+    const int bottom = std::min(last, j == grid.rows - 1 ? last : j * grid.stride + side);
+    for (int i = 0; i < grid.columns; ++i) {
+      const int left = i * grid.stride;
+      const int covered = i == grid.columns - 1 ? width - left : side;
+      add_patch<side>(from, to, left, j * grid.stride, covered, top, bottom, flows.at(i, j),
+                      sums_of);
+    }
+  }
+  for (int row = first; row < last; ++row) divide_row(sums_of(row), row, x, y);
+}
+
+void spread_rows(const PatchGrid& grid, const Image<std::uint8_t>& from,
+                 const Image<std::uint8_t>& to, const Image<Flow>& flows, int first, int last,
+                 float* sums, int padded_width, SplitPlane& x, SplitPlane& y) {
+  if (grid.side == 4)
+    spread<4>(grid, from, to, flows, first, last, sums, padded_width, x, y);
+  else
+    spread<8>(grid, from, to, flows, first, last, sums, padded_width, x, y);
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+
+HWY_EXPORT(spread_rows);
+
+void spread_patches(const PatchGrid& grid, const Image<std::uint8_t>& from,
+                    const Image<std::uint8_t>& to, const Image<Flow>& flows, int first, int last,
+                    std::vector<float>& sums, SplitPlane& x, SplitPlane& y) {
+  const int padded_width = from.width() + 3 * row_padding;
+  float* rows = scratch_of(sums, std::size_t{3} * static_cast<std::size_t>(padded_width) *
+                                     static_cast<std::size_t>(last - first));
+  HWY_DYNAMIC_DISPATCH(spread_rows)
+  (grid, from, to, flows, first, last, rows, padded_width, x, y);
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE
