@@ -55,9 +55,9 @@ class DenseFlow {
  public:
   virtual ~DenseFlow() = default;
 
-  /// Makes `picture` the later image, and the previous one the earlier image. `picture` need not
+  /// Makes `image` the later image, and the previous one the earlier image. `image` need not
   /// outlive the call.
-  virtual void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) = 0;
+  virtual void push(const ImageView<std::uint8_t>& image, ThreadPool& threads) = 0;
 
   /// Returns the flow from the earlier image to the later one. Needs two push() of the same size
   /// first. Valid until the next call; the same for any number of threads.

@@ -11,14 +11,15 @@ HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-/// At most as wide as the boxes that are common.
+/// No wider than the boxes that are common.
 using Floats = hn::CappedTag<float, 16>;
 
 FlowRange range_of(const ImageView<Flow>& flow, const Box& box) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
   const int count = 2 * box.width();
-  // Of the box after the next, or before the last column: its rows are far apart.
+  // Prefetches the box after the next, as far as the row goes: its rows are too far apart for the
+  // hardware prefetcher.
   const int ahead = std::min(2 * count, 2 * (flow.width - box.right));
   auto lowest = hn::Zero(floats);
   auto highest = hn::Zero(floats);

@@ -12,28 +12,29 @@ std::mutex mutex;  // guards the variables below and OpenCV's thread count
 std::condition_variable changed;
 unsigned next_ticket = 0;  // first come, first served, so that no thread starves
 unsigned serving = 0;
-int calls = 0;
-int in_force = 0;
-int before = 0;
+int objects = 0;              // OpenCvThreads that exist
+int current_threads = 0;      // their thread count
+int application_threads = 0;  // the thread count before the first of them
 
 }  // namespace
 
 OpenCvThreads::OpenCvThreads(int threads) {
   std::unique_lock lock(mutex);
   const unsigned ticket = next_ticket++;
-  changed.wait(lock, [&] { return ticket == serving && (calls == 0 || in_force == threads); });
+  changed.wait(lock,
+               [&] { return ticket == serving && (objects == 0 || current_threads == threads); });
   ++serving;
   changed.notify_all();
-  if (calls++ > 0) return;
-  in_force = threads;
-  before = cv::getNumThreads();
-  if (before != threads) cv::setNumThreads(threads);
+  if (objects++ > 0) return;
+  current_threads = threads;
+  application_threads = cv::getNumThreads();
+  if (application_threads != threads) cv::setNumThreads(threads);
 }
 
 OpenCvThreads::~OpenCvThreads() {
   const std::lock_guard lock(mutex);
-  if (--calls > 0) return;
-  if (before != in_force) cv::setNumThreads(before);
+  if (--objects > 0) return;
+  if (application_threads != current_threads) cv::setNumThreads(application_threads);
   changed.notify_all();
 }
 

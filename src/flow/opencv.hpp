@@ -8,9 +8,9 @@
 namespace eventcamera {
 
 /// Wraps an image in a cv::Mat without copying. Read-only, which cv::Mat cannot express.
-inline cv::Mat opencv_picture(const ImageView<std::uint8_t>& picture) {
-  return {picture.height, picture.width, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
-          static_cast<std::size_t>(picture.stride)};
+inline cv::Mat opencv_image(const ImageView<std::uint8_t>& image) {
+  return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data),
+          static_cast<std::size_t>(image.stride)};
 }
 
 /// Sets OpenCV's thread count during its lifetime.

@@ -22,13 +22,12 @@ class OpenCvDisFlow final : public DenseFlow {
     regularise(*dis_);
   }
 
-  void push(const ImageView<std::uint8_t>& picture, ThreadPool& /*threads*/) override {
+  void push(const ImageView<std::uint8_t>& image, ThreadPool& /*threads*/) override {
     cv::swap(last_, next_);
-    cv::copyMakeBorder(opencv_picture(picture), next_, 0,
-                       std::max(0, DisFlow::min_side - picture.height), 0,
-                       std::max(0, DisFlow::min_side - picture.width), cv::BORDER_REPLICATE);
-    width_ = picture.width;
-    height_ = picture.height;
+    cv::copyMakeBorder(opencv_image(image), next_, 0, std::max(0, DisFlow::min_side - image.height),
+                       0, std::max(0, DisFlow::min_side - image.width), cv::BORDER_REPLICATE);
+    width_ = image.width;
+    height_ = image.height;
   }
 
   ImageView<Flow> flow(ThreadPool& threads) override {

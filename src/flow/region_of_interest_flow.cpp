@@ -21,8 +21,8 @@ struct Range {
   }
 };
 
-ImageView<std::uint8_t> cut_out(const ImageView<std::uint8_t>& picture, const Box& part) {
-  return {picture.row(part.top) + part.left, picture.stride, part.width(), part.height()};
+ImageView<std::uint8_t> crop(const ImageView<std::uint8_t>& image, const Box& part) {
+  return {image.row(part.top) + part.left, image.stride, part.width(), part.height()};
 }
 
 }  // namespace
@@ -65,7 +65,7 @@ void RegionOfInterestFlow::find_in_part(const ImageView<std::uint8_t>& from,
                                         const ImageView<std::uint8_t>& to, const Box& part,
                                         ThreadPool& threads) {
   if (!part_) part_ = make_dense_flow(method_);
-  const auto found = part_->find(cut_out(from, part), cut_out(to, part), threads);
+  const auto found = part_->find(crop(from, part), crop(to, part), threads);
   clear();
   for (int y = 0; y < part.height(); ++y)
     std::copy_n(found.row(y), part.width(), flow_.row(part.top + y) + part.left);

@@ -20,7 +20,7 @@ inline eventcamera::Image<eventcamera::Flow> opencv_dis(
   eventcamera::regularise(*dis);
   cv::Mat flow;
   // Contiguous rows, as it requires.
-  dis->calc(opencv_picture(from.view()).clone(), opencv_picture(to.view()).clone(), flow);
+  dis->calc(opencv_image(from.view()).clone(), opencv_image(to.view()).clone(), flow);
   eventcamera::Image<eventcamera::Flow> result(from.width(), from.height());
   result.assign({flow.ptr<eventcamera::Flow>(), static_cast<std::ptrdiff_t>(flow.step[0]),
                  from.width(), from.height()});

@@ -12,8 +12,7 @@ inline eventcamera::Image<eventcamera::Flow> opencv_farneback(
   eventcamera::Image<eventcamera::Flow> flow(from.width(), from.height());
   cv::Mat mat(from.height(), from.width(), CV_32FC2, flow.row(0),
               static_cast<std::size_t>(flow.stride()));
-  cv::calcOpticalFlowFarneback(eventcamera::opencv_picture(from.view()),
-                               eventcamera::opencv_picture(to.view()), mat, 0.5, 3, 15, 3, 5, 1.2,
-                               0);
+  cv::calcOpticalFlowFarneback(eventcamera::opencv_image(from.view()),
+                               eventcamera::opencv_image(to.view()), mat, 0.5, 3, 15, 3, 5, 1.2, 0);
   return flow;
 }

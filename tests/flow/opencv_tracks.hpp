@@ -17,8 +17,8 @@ inline std::vector<eventcamera::Track> opencv_tracks(
   std::vector<cv::Point2f> ends;
   std::vector<unsigned char> status;
   std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(eventcamera::opencv_picture(from.view()),
-                           eventcamera::opencv_picture(to.view()), starts, ends, status, error,
+  cv::calcOpticalFlowPyrLK(eventcamera::opencv_image(from.view()),
+                           eventcamera::opencv_image(to.view()), starts, ends, status, error,
                            {15, 15}, 3, {3, 10, 0.03});
   std::vector<eventcamera::Track> tracks;
   for (std::size_t i = 0; i < points.size(); ++i)

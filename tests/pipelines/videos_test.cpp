@@ -132,8 +132,8 @@ Image<std::uint8_t> part(const Image<std::uint8_t>& last, const Image<std::uint8
 cv::Mat min_slopes(const Image<std::uint8_t>& picture) {
   cv::Mat x;
   cv::Mat y;
-  cv::Scharr(opencv_picture(picture.view()), x, CV_32F, 1, 0, 1 / 32.0);
-  cv::Scharr(opencv_picture(picture.view()), y, CV_32F, 0, 1, 1 / 32.0);
+  cv::Scharr(opencv_image(picture.view()), x, CV_32F, 1, 0, 1 / 32.0);
+  cv::Scharr(opencv_image(picture.view()), y, CV_32F, 0, 1, 1 / 32.0);
   const auto mean = [](const cv::Mat& products) {
     cv::Mat result;
     cv::boxFilter(products, result, -1, {15, 15});

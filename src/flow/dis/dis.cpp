@@ -75,12 +75,12 @@ void DisFlow::start(int width, int height) {
   }
 }
 
-ImageView<std::uint8_t> DisFlow::padded(const ImageView<std::uint8_t>& picture) {
-  if (std::min(picture.width, picture.height) >= min_side) return picture;
+ImageView<std::uint8_t> DisFlow::padded(const ImageView<std::uint8_t>& image) {
+  if (std::min(image.width, image.height) >= min_side) return image;
   for (int y = 0; y < padded_.height(); ++y) {
-    const std::uint8_t* row = picture.row(std::min(y, picture.height - 1));
-    std::fill(std::copy_n(row, picture.width, padded_.row(y)), padded_.row(y) + padded_.width(),
-              row[picture.width - 1]);
+    const std::uint8_t* row = image.row(std::min(y, image.height - 1));
+    std::fill(std::copy_n(row, image.width, padded_.row(y)), padded_.row(y) + padded_.width(),
+              row[image.width - 1]);
   }
   return padded_.view();
 }
@@ -93,9 +93,9 @@ void DisFlow::for_each_band(int height, ThreadPool& threads, const Body& body) {
                    [&](int band, int thread) { body(BandRows(band, height), scratch_[thread]); });
 }
 
-void DisFlow::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
-  if (picture.width != width_ || picture.height != height_) start(picture.width, picture.height);
-  auto from = padded(picture);
+void DisFlow::push(const ImageView<std::uint8_t>& image, ThreadPool& threads) {
+  if (image.width != width_ || image.height != height_) start(image.width, image.height);
+  auto from = padded(image);
   for (auto& level : levels_) {
     std::swap(level.last, level.next);
     for_each_band(level.shrink.height(), threads, [&](const BandRows& rows, Scratch& scratch) {
@@ -126,10 +126,10 @@ ImageView<Flow> DisFlow::flow(ThreadPool& threads) {
     level.refinement.run(last, next, threads);
     coarser = &level;
   }
-  constexpr int wide_rows = 64;  // per round; neighbouring rows share rows of the finest level
-  threads.for_each((height_ + wide_rows - 1) / wide_rows, [&](int round, int thread) {
-    const int first = round * wide_rows;
-    widen(first, std::min(first + wide_rows, height_), scratch_[thread]);
+  constexpr int rows_per_round = 64;  // neighbouring rows share rows of the finest level
+  threads.for_each((height_ + rows_per_round - 1) / rows_per_round, [&](int round, int thread) {
+    const int first = round * rows_per_round;
+    upsample(first, std::min(first + rows_per_round, height_), scratch_[thread]);
   });
   return flow_.view();
 }
@@ -159,25 +159,25 @@ void DisFlow::search(const Level* coarser, Level& level, int row) const {
 }
 
 /// Computes rows [first, last) of the flow from the finest level.
-void DisFlow::widen(int first, int last, Scratch& scratch) {
+void DisFlow::upsample(int first, int last, Scratch& scratch) {
   const auto& finest = levels_.front().refinement;
   std::array<int, 2> known = {-1, -1};
-  const auto wide_row = [&](int y) {
+  const auto upsampled_row = [&](int y) {
     const auto slot = static_cast<std::size_t>(y) % 2;
     const auto padded_width = static_cast<std::size_t>(columns_.size()) + row_padding;
-    Flow* wide = scratch_of(scratch.wide_rows[slot], padded_width);
-    if (std::exchange(known[slot], y) == y) return wide;
+    Flow* upsampled = scratch_of(scratch.upsampled_rows[slot], padded_width);
+    if (std::exchange(known[slot], y) == y) return upsampled;
     Flow* row = scratch_of(scratch.row,
                            static_cast<std::size_t>(finest.width()) + std::size_t{2} * row_padding);
     finest.row(y, row);
     row[finest.width()] = row[finest.width() - 1];
-    resample_row(row, columns_, static_cast<float>(1 << finest_scale_), wide);
-    return wide;
+    resample_row(row, columns_, static_cast<float>(1 << finest_scale_), upsampled);
+    return upsampled;
   };
   for (int y = first; y < last; ++y) {
     const int upper = rows_.first()[y];
     const int lower = std::min(upper + 1, finest.height() - 1);
-    blend_rows(wide_row(upper), wide_row(lower), rows_.weight()[y], width_, flow_.row(y));
+    blend_rows(upsampled_row(upper), upsampled_row(lower), rows_.weight()[y], width_, flow_.row(y));
   }
 }
 

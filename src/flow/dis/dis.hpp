@@ -39,7 +39,7 @@ class DisFlow final : public DenseFlow {
 
   explicit DisFlow(const Quality& quality) : quality_(quality) {}
 
-  void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) override;
+  void push(const ImageView<std::uint8_t>& image, ThreadPool& threads) override;
   ImageView<Flow> flow(ThreadPool& threads) override;
 
  private:
@@ -47,8 +47,8 @@ class DisFlow final : public DenseFlow {
     Level(const AreaShrink& shrink_, const Quality& quality);
 
     AreaShrink shrink;  ///< from the next finer level, or from the whole image
-    PyramidPicture last;
-    PyramidPicture next;
+    PyramidImage last;
+    PyramidImage next;
     Gradients gradients;  ///< of `last`
     PatchGrid grid;
     Image<Flow> flows;  ///< of patches
@@ -60,15 +60,15 @@ class DisFlow final : public DenseFlow {
     std::vector<float> sums;
     std::vector<std::int16_t> slopes;
     std::vector<Flow> row;
-    std::array<std::vector<Flow>, 2> wide_rows;
+    std::array<std::vector<Flow>, 2> upsampled_rows;
   };
 
   void start(int width, int height);
   template <class Body>
   void for_each_band(int height, ThreadPool& threads, const Body& body);
-  ImageView<std::uint8_t> padded(const ImageView<std::uint8_t>& picture);
+  ImageView<std::uint8_t> padded(const ImageView<std::uint8_t>& image);
   void search(const Level* coarser, Level& level, int row) const;
-  void widen(int first, int last, Scratch& scratch);
+  void upsample(int first, int last, Scratch& scratch);
 
   Quality quality_;
   int width_ = 0;

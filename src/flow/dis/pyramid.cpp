@@ -131,10 +131,10 @@ AreaShrink::Axis::Axis(int from_, int to) : from(from_), first(static_cast<std::
 AreaShrink::AreaShrink(int from_width, int from_height, int width, int height)
     : columns_(from_width, width), rows_(from_height, height) {}
 
-void AreaShrink::row(const ImageView<std::uint8_t>& picture, int y, std::vector<float>& sums,
+void AreaShrink::row(const ImageView<std::uint8_t>& image, int y, std::vector<float>& sums,
                      std::uint8_t* out) const {
   if (columns_.from == 2 * width() && rows_.from == 2 * height()) {
-    HWY_DYNAMIC_DISPATCH(halve_rows)(picture.row(2 * y), picture.row(2 * y + 1), width(), out);
+    HWY_DYNAMIC_DISPATCH(halve_rows)(image.row(2 * y), image.row(2 * y + 1), width(), out);
     return;
   }
   const int reached = columns_.from + columns_.taps + row_padding;
@@ -144,7 +144,7 @@ void AreaShrink::row(const ImageView<std::uint8_t>& picture, int y, std::vector<
   for (int t = 0; t < rows_.taps; ++t) {
     const float weight = rows_.weights_of(y)[t];
     if (weight == 0) continue;
-    HWY_DYNAMIC_DISPATCH(add_row)(picture.row(rows_.first[y] + t), weight, columns_.from, sum);
+    HWY_DYNAMIC_DISPATCH(add_row)(image.row(rows_.first[y] + t), weight, columns_.from, sum);
   }
   const double area = static_cast<double>(columns_.from) * rows_.from;
   for (int x = 0; x < width(); ++x) {
@@ -156,15 +156,15 @@ void AreaShrink::row(const ImageView<std::uint8_t>& picture, int y, std::vector<
   }
 }
 
-void PyramidPicture::shrink_row(const AreaShrink& shrink, const ImageView<std::uint8_t>& picture,
-                                int y, std::vector<float>& sums) {
+void PyramidImage::shrink_row(const AreaShrink& shrink, const ImageView<std::uint8_t>& image, int y,
+                              std::vector<float>& sums) {
   std::uint8_t* out = grey_.row(y);
-  shrink.row(picture, y, sums, out);
+  shrink.row(image, y, sums, out);
   std::memset(out - margin, out[0], margin);
   std::memset(out + grey_.width(), out[grey_.width() - 1], margin);
 }
 
-void PyramidPicture::replicate_rows() {
+void PyramidImage::replicate_rows() {
   const auto copy = [&](int from, int to) {
     std::memcpy(grey_.row(to) - margin, grey_.row(from) - margin,
                 static_cast<std::size_t>(grey_.width()) + std::size_t{2} * margin);
@@ -175,9 +175,9 @@ void PyramidPicture::replicate_rows() {
   }
 }
 
-void Gradients::row(const Image<std::uint8_t>& picture, int y, std::vector<std::int16_t>& scratch) {
-  const int width = picture.width();
-  const int end = picture.height() - 1;
+void Gradients::row(const Image<std::uint8_t>& image, int y, std::vector<std::int16_t>& scratch) {
+  const int width = image.width();
+  const int end = image.height() - 1;
   const auto padded_width = static_cast<std::size_t>(width) + std::size_t{2} * row_padding;
   std::int16_t* sums = scratch_of(scratch, 2 * padded_width) + 1;
   std::int16_t* differences = sums + padded_width;
@@ -185,8 +185,7 @@ void Gradients::row(const Image<std::uint8_t>& picture, int y, std::vector<std::
     return std::clamp(i < 0 ? -i : i > end ? 2 * end - i : i, 0, end);
   };
   HWY_DYNAMIC_DISPATCH(slope_columns)
-  (picture.row(mirrored(y - 1)), picture.row(y), picture.row(mirrored(y + 1)), width, sums,
-   differences);
+  (image.row(mirrored(y - 1)), image.row(y), image.row(mirrored(y + 1)), width, sums, differences);
   for (std::int16_t* values : {sums, differences}) {
     values[-1] = values[std::min(1, width - 1)];
     values[width] = values[std::max(0, width - 2)];

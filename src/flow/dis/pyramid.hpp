@@ -16,7 +16,7 @@ class AreaShrink {
   int width() const { return columns_.size(); }
   int height() const { return rows_.size(); }
   /// Writes row y to `out`. `sums` is scratch.
-  void row(const ImageView<std::uint8_t>& picture, int y, std::vector<float>& sums,
+  void row(const ImageView<std::uint8_t>& image, int y, std::vector<float>& sums,
            std::uint8_t* out) const;
 
  private:
@@ -38,15 +38,15 @@ class AreaShrink {
 };
 
 /// Level of an image pyramid, with replicated pixels around it.
-class PyramidPicture {
+class PyramidImage {
  public:
   static constexpr int margin = 16;
 
-  PyramidPicture(int width, int height) : grey_(width, height, margin) {}
+  PyramidImage(int width, int height) : grey_(width, height, margin) {}
 
   const Image<std::uint8_t>& grey() const { return grey_; }
   /// Computes row y.
-  void shrink_row(const AreaShrink& shrink, const ImageView<std::uint8_t>& picture, int y,
+  void shrink_row(const AreaShrink& shrink, const ImageView<std::uint8_t>& image, int y,
                   std::vector<float>& sums);
   /// Fills the rows above and below, once all rows are computed.
   void replicate_rows();
@@ -64,7 +64,7 @@ class Gradients {
   const Image<std::int16_t>& x() const { return x_; }
   const Image<std::int16_t>& y() const { return y_; }
   /// Computes row y. `scratch` holds sums over columns.
-  void row(const Image<std::uint8_t>& picture, int y, std::vector<std::int16_t>& scratch);
+  void row(const Image<std::uint8_t>& image, int y, std::vector<std::int16_t>& scratch);
 
  private:
   Image<std::int16_t> x_;

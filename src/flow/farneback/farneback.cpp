@@ -67,8 +67,8 @@ void FarnebackFlow::start(int width, int height) {
   }
 }
 
-void FarnebackFlow::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
-  if (picture.width != width_ || picture.height != height_) start(picture.width, picture.height);
+void FarnebackFlow::push(const ImageView<std::uint8_t>& image, ThreadPool& threads) {
+  if (image.width != width_ || image.height != height_) start(image.width, image.height);
   scratch_.resize(static_cast<std::size_t>(threads.threads()));
   int bands = 0;
   for (auto& level : levels_) {
@@ -78,13 +78,13 @@ void FarnebackFlow::push(const ImageView<std::uint8_t>& picture, ThreadPool& thr
   threads.for_each(bands, [&](int band, int thread) {
     for (auto& level : levels_) {
       const int here = expansion_bands(level.pyramid.height());
-      if (band < here) return expand(picture, level, band, scratch_[thread]);
+      if (band < here) return expand(image, level, band, scratch_[thread]);
       band -= here;
     }
   });
 }
 
-void FarnebackFlow::expand(const ImageView<std::uint8_t>& picture, Level& level, int band,
+void FarnebackFlow::expand(const ImageView<std::uint8_t>& image, Level& level, int band,
                            Scratch& scratch) {
   constexpr int reach = PolynomialExpansion::reach;
   const int first = band * rows_per_expansion;
@@ -98,7 +98,7 @@ void FarnebackFlow::expand(const ImageView<std::uint8_t>& picture, Level& level,
   int known = std::max(0, first - reach);
   for (int y = first; y < last; ++y) {
     for (; known <= std::min(y + reach, end); ++known)
-      level.pyramid.row(picture, known, scratch.pyramid, row(known));
+      level.pyramid.row(image, known, scratch.pyramid, row(known));
     PolynomialExpansion::Window window;
     for (std::size_t k = 0; k < window.size(); ++k)
       window[k] = row(std::clamp(y - reach + static_cast<int>(k), 0, end));

@@ -22,7 +22,7 @@ class FarnebackFlow final : public DenseFlow {
   /// Number of pyramid levels of images of this size, each half as large as the one before.
   static int level_count(int width, int height);
 
-  void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) override;
+  void push(const ImageView<std::uint8_t>& image, ThreadPool& threads) override;
   ImageView<Flow> flow(ThreadPool& threads) override;
 
  private:
@@ -50,7 +50,7 @@ class FarnebackFlow final : public DenseFlow {
   };
 
   void start(int width, int height);
-  static void expand(const ImageView<std::uint8_t>& picture, Level& level, int band,
+  static void expand(const ImageView<std::uint8_t>& image, Level& level, int band,
                      Scratch& scratch);
   static void start_row(const Level* coarser, const Level& level, int y, int first, int last,
                         Scratch& scratch, Flow* out);

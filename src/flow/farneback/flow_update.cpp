@@ -87,9 +87,9 @@ struct Targets {
 
 /// Interpolates the later polynomials bilinearly; outside the image they are 0.
 ///
-/// Neighbours mostly move alike: they end between columns of the same two vectors, in the same row
-/// or an adjacent one. All such lanes read the same three rows; the row that a lane does not need
-/// has weight 0. The remaining lanes are processed next, grouped in the same way.
+/// Neighbours mostly have similar flow: they end between columns of the same two vectors, in the
+/// same row or an adjacent one. All such lanes read the same three rows; the row that a lane does
+/// not need has weight 0. The remaining lanes are processed next, grouped in the same way.
 HWY_INLINE void interpolate(const PolynomialExpansion& to, const Targets& targets, Vector* sums) {
   const Words words;
   const Floats floats;

@@ -104,11 +104,11 @@ PyramidLevel::PyramidLevel(int width, int height, int level)
       columns_(width, shrunk(width, level)),
       rows_(height, shrunk(height, level)) {}
 
-void PyramidLevel::row(const ImageView<std::uint8_t>& picture, int y, Scratch& scratch,
+void PyramidLevel::row(const ImageView<std::uint8_t>& image, int y, Scratch& scratch,
                        float* out) const {
   const int count = static_cast<int>(kernel_.size());
   const int reach = count / 2;
-  const int width = picture.width;
+  const int width = image.width;
   const auto padded_width = static_cast<std::size_t>(width) + row_padding;
 
   // Blur and interpolation between two rows in one kernel, one row longer.
@@ -120,7 +120,7 @@ void PyramidLevel::row(const ImageView<std::uint8_t>& picture, int y, Scratch& s
     weights[t + 1] += lower * kernel_[t];
   }
   for (int t = 0; t <= count; ++t)
-    rows[t] = picture.row(mirrored(rows_.first()[y] - reach + t, picture.height));
+    rows[t] = image.row(mirrored(rows_.first()[y] - reach + t, image.height));
   float* sums =
       scratch_of(scratch.column_sums, padded_width + 2 * static_cast<std::size_t>(reach)) + reach;
   HWY_DYNAMIC_DISPATCH(add_rows)

@@ -27,7 +27,7 @@ class PyramidLevel {
   /// Weights of the blur along each axis, an odd number.
   const std::vector<float>& kernel() const { return kernel_; }
   /// Writes row y to `out`, which must have row_padding elements past its end.
-  void row(const ImageView<std::uint8_t>& picture, int y, Scratch& scratch, float* out) const;
+  void row(const ImageView<std::uint8_t>& image, int y, Scratch& scratch, float* out) const;
 
  private:
   bool full_size_;

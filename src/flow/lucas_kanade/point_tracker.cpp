@@ -69,21 +69,21 @@ std::uint64_t PointTracker::Blocks::columns() const {
   return std::accumulate(rows_.begin(), rows_.end(), std::uint64_t{0}, std::bit_or());
 }
 
-void PointTracker::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads,
+void PointTracker::push(const ImageView<std::uint8_t>& image, ThreadPool& threads,
                         std::span<const std::uint8_t> is_black) {
   std::swap(last_, next_);
-  next_.build(picture, threads, is_black);
+  next_.build(image, threads, is_black);
 }
 
 std::span<const Track> PointTracker::track(std::span<const Point> points, ThreadPool& threads) {
   tracks_.resize(points.size());
   if (points.empty()) return tracks_;
-  const auto& picture = last_.levels()[0];
-  find_rows(points, picture.height());
+  const auto& image = last_.levels()[0];
+  find_rows(points, image.height());
   const int side = block_side_ * region_side;
   while (static_cast<int>(regions_.size()) < threads.threads()) regions_.emplace_back(side);
-  const int across = (picture.width() + side - 1) / side;
-  const int down = (picture.height() + side - 1) / side;
+  const int across = (image.width() + side - 1) / side;
+  const int down = (image.height() + side - 1) / side;
   threads.for_each(across * down, [&](int i, int thread) {
     follow(points, i % across * side, i / across * side,
            regions_[static_cast<std::size_t>(thread)]);

@@ -39,9 +39,9 @@ class PointTracker {
   /// `block_side` is 1 or 2. Blocks of 2x2 pixels take a quarter of the time.
   explicit PointTracker(int block_side) : block_side_(block_side) {}
 
-  /// Makes `picture` the image tracked to, and the previous one the image tracked from.
+  /// Makes `image` the image tracked to, and the previous one the image tracked from.
   /// `is_black`, if not empty, is 1 for each row that is known to be 0.
-  void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads,
+  void push(const ImageView<std::uint8_t>& image, ThreadPool& threads,
             std::span<const std::uint8_t> is_black = {});
 
   /// Tracks points of the last image, unique and in raster order, into the next. Needs two push()

@@ -23,13 +23,13 @@ constexpr int max_row = 16384 + 64;
 // wrote; lanes beyond that are not used.
 /// Computes row y of the next level from the rows around row 2y of this one. Writes up to a vector
 /// past the end.
-void halve_row(const Image<std::uint8_t>& picture, int y, std::uint8_t* out, int width) {
+void halve_row(const Image<std::uint8_t>& image, int y, std::uint8_t* out, int width) {
   const Words words;
   const Bytes bytes;
   const int lanes = static_cast<int>(hn::Lanes(words));
   HWY_ALIGN std::uint16_t blurred[max_row];
   const auto load = [&](int row, int x) {
-    return hn::PromoteTo(words, hn::LoadU(bytes, picture.row(row) + x));
+    return hn::PromoteTo(words, hn::LoadU(bytes, image.row(row) + x));
   };
   constexpr int before = 2;
   const int columns = before + 2 * width + 2;
@@ -82,9 +82,9 @@ int reflected(int p, int size) {
   return std::min(q, period - q);
 }
 
-void reflect_sides(Image<std::uint8_t>& picture, int y) {
-  std::uint8_t* row = picture.row(y);
-  const int width = picture.width();
+void reflect_sides(Image<std::uint8_t>& image, int y) {
+  std::uint8_t* row = image.row(y);
+  const int width = image.width();
   if (width > Pyramid::margin) {  // without the divisions of reflected()
     for (int i = 1; i <= Pyramid::margin; ++i) {
       row[-i] = row[i];
@@ -97,11 +97,11 @@ void reflect_sides(Image<std::uint8_t>& picture, int y) {
 }
 
 /// Copies row y, with its margin, to the rows above and below the image that it is reflected to.
-void reflect_row(Image<std::uint8_t>& picture, int y) {
-  const int height = picture.height();
+void reflect_row(Image<std::uint8_t>& image, int y) {
+  const int height = image.height();
   constexpr int margin = Pyramid::margin;
   const auto copy_to = [&](int to) {
-    std::copy_n(picture.row(y) - margin, picture.width() + 2 * margin, picture.row(to) - margin);
+    std::copy_n(image.row(y) - margin, image.width() + 2 * margin, image.row(to) - margin);
   };
   if (y > margin && y < height - 1 - margin) return;
   for (int i = 1; i <= margin; ++i) {
@@ -128,25 +128,25 @@ void Pyramid::shape(int width, int height) {
 /// is.
 template <class MakeRow>
 void Pyramid::build_level(std::size_t level, ThreadPool& threads, const MakeRow& make_row) {
-  auto& picture = levels_[level];
+  auto& image = levels_[level];
   auto& is_black = is_black_[level];
-  for_each_row(threads, picture.height(), [&](int y) {
+  for_each_row(threads, image.height(), [&](int y) {
     auto& was_black = is_black[static_cast<std::size_t>(y)];
     const bool black = make_row(y);
     if (black && was_black != 0) return;
     was_black = black ? 1 : 0;
-    if (black) std::fill_n(picture.row(y), picture.width(), std::uint8_t{0});
-    reflect_sides(picture, y);
-    reflect_row(picture, y);
+    if (black) std::fill_n(image.row(y), image.width(), std::uint8_t{0});
+    reflect_sides(image, y);
+    reflect_row(image, y);
   });
 }
 
-void Pyramid::build(const ImageView<std::uint8_t>& picture, ThreadPool& threads,
+void Pyramid::build(const ImageView<std::uint8_t>& image, ThreadPool& threads,
                     std::span<const std::uint8_t> is_black) {
-  shape(picture.width, picture.height);
+  shape(image.width, image.height);
   build_level(0, threads, [&](int y) {
     if (!is_black.empty() && is_black[static_cast<std::size_t>(y)] != 0) return true;
-    levels_[0].assign_row(y, picture.row(y));
+    levels_[0].assign_row(y, image.row(y));
     return false;
   });
   for (std::size_t level = 1; level < levels_.size(); ++level) {

@@ -22,7 +22,7 @@ class Pyramid {
   /// Computes the levels of an image of any size; reuses the memory of the last one if the size is
   /// the same. `is_black`, if not empty, is 1 for each row that is known to be 0; what these leave
   /// black on any level takes no time.
-  void build(const ImageView<std::uint8_t>& picture, ThreadPool& threads,
+  void build(const ImageView<std::uint8_t>& image, ThreadPool& threads,
              std::span<const std::uint8_t> is_black = {});
 
   const std::vector<Image<std::uint8_t>>& levels() const { return levels_; }

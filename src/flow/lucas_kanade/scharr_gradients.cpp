@@ -17,16 +17,16 @@ using Values = hn::CappedTag<std::int16_t, 16>;
 using Bytes = hn::Rebind<std::uint8_t, Values>;
 
 /// Computes columns left ... right - 1 of a row of both gradients, and up to a vector more.
-void gradient_row(const Image<std::uint8_t>& picture, int y, int left, int right,
-                  std::int16_t* out_x, std::int16_t* out_y) {
+void gradient_row(const Image<std::uint8_t>& image, int y, int left, int right, std::int16_t* out_x,
+                  std::int16_t* out_y) {
   const Values values;
   const int lanes = static_cast<int>(hn::Lanes(values));
   const auto ten = hn::Set(values, 10);
   const auto three = hn::Set(values, 3);
-  const auto width = hn::Set(values, static_cast<std::int16_t>(picture.width()));
+  const auto width = hn::Set(values, static_cast<std::int16_t>(image.width()));
   for (int x = left; x < right; x += lanes) {
     const auto load = [&](int row, int column) {
-      return hn::PromoteTo(values, hn::LoadU(Bytes(), picture.row(row) + column));
+      return hn::PromoteTo(values, hn::LoadU(Bytes(), image.row(row) + column));
     };
     const auto weigh = [&](auto outer, auto middle) {
       return hn::Add(hn::Mul(outer, three), hn::Mul(middle, ten));
@@ -53,14 +53,14 @@ namespace eventcamera {
 
 HWY_EXPORT(gradient_row);
 
-void ScharrGradients::compute(const Image<std::uint8_t>& picture, const Box& box) {
+void ScharrGradients::compute(const Image<std::uint8_t>& image, const Box& box) {
   box_ = box;
-  const int right = std::min(box.right, picture.width() + margin);
+  const int right = std::min(box.right, image.width() + margin);
   for (int y = box.top; y < box.bottom; ++y) {
     auto* out_x = x_.row(y - box.top);
     auto* out_y = y_.row(y - box.top);
-    if (y >= 0 && y < picture.height()) {
-      HWY_DYNAMIC_DISPATCH(gradient_row)(picture, y, box.left, right, out_x, out_y);
+    if (y >= 0 && y < image.height()) {
+      HWY_DYNAMIC_DISPATCH(gradient_row)(image, y, box.left, right, out_x, out_y);
     } else {
       std::fill_n(out_x, box.width(), std::int16_t{0});
       std::fill_n(out_y, box.width(), std::int16_t{0});

@@ -16,7 +16,7 @@ class ScharrGradients {
 
   /// Computes the gradients in `box`, except columns more than `margin` pixels past the right
   /// border. The image must be reflected at its border.
-  void compute(const Image<std::uint8_t>& picture, const Box& box);
+  void compute(const Image<std::uint8_t>& image, const Box& box);
 
   /// Row y of the image.
   const std::int16_t* x(int y) const { return x_.row(y - box_.top) - box_.left; }

@@ -48,7 +48,7 @@ constexpr int corners = 4;
 
 /// Smaller eigenvalue of the mean gradient matrix over a window, from its sums.
 template <class Floats, class Value = hn::Vec<Floats>>
-HWY_INLINE Value least_eigenvalue(Floats floats, Value xx, Value xy, Value yy) {
+HWY_INLINE Value min_eigenvalue(Floats floats, Value xx, Value xy, Value yy) {
   const auto difference = hn::Sub(xx, yy);
   const auto root = hn::Sqrt(
       hn::Add(hn::Mul(difference, difference), hn::Mul(hn::Set(floats, 4.0F), hn::Mul(xy, xy))));
@@ -299,7 +299,7 @@ class Blocks {
       const auto yy = hn::Mul(hn::Load(floats, yy_ + i), scale);
       const auto determinant = hn::Sub(hn::Mul(xx, yy), hn::Mul(xy, xy));
       const auto followed =
-          hn::And(hn::Ge(least_eigenvalue(floats, xx, xy, yy), hn::Set(floats, min_texture)),
+          hn::And(hn::Ge(min_eigenvalue(floats, xx, xy, yy), hn::Set(floats, min_texture)),
                   hn::Ge(determinant, hn::Set(floats, std::numeric_limits<float>::epsilon())));
       const auto present =
           hn::FirstN(floats, static_cast<std::size_t>(std::min(lanes, count_ - i)));
@@ -321,7 +321,7 @@ class Blocks {
       locate(i, active, hn::Load(floats, flow_x_ + i), hn::Load(floats, flow_y_ + i));
     }
     for (int round = 0; round < max_moves; ++round) {
-      look();
+      update_sums();
       bool any = false;
       for (int i = 0; i < count_; i += lanes) {
         const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
@@ -384,13 +384,13 @@ class Blocks {
     }
   }
 
-  /// Gets the sums of gradient * there of blocks that entered another pixel.
-  void look() {
+  /// Updates the sums of gradient * there of blocks that entered another pixel.
+  void update_sums() {
     if (shared_) {
       take_shared();
       if (shared_->share(moved(), displacement_)) take_shared();
     }
-    for (const auto i : moved()) look(i);
+    for (const auto i : moved()) sum_around(i);
     moved_count_ = 0;
   }
 
@@ -419,7 +419,7 @@ class Blocks {
 
   /// Computes the sums of gradient * there with the window at each of the four pixels around its
   /// position in the other image.
-  void look(int i) {
+  void sum_around(int i) {
     const Values values;
     const int lanes = static_cast<int>(hn::Lanes(values));
     const auto stride = to_.stride();
@@ -470,10 +470,10 @@ class Blocks {
     const auto cell_y = hn::Floor(flow_y);
     const auto x = hn::Add(cell_x, hn::Load(floats, left_ + i));
     const auto y = hn::Add(cell_y, hn::Load(floats, top_ + i));
-    const auto least = hn::Set(floats, -static_cast<float>(Tile::window));
+    const auto min = hn::Set(floats, -static_cast<float>(Tile::window));
     const auto inside = hn::And(
-        hn::And(hn::Ge(x, least), hn::Lt(x, hn::Set(floats, static_cast<float>(to_.width())))),
-        hn::And(hn::Ge(y, least), hn::Lt(y, hn::Set(floats, static_cast<float>(to_.height())))));
+        hn::And(hn::Ge(x, min), hn::Lt(x, hn::Set(floats, static_cast<float>(to_.width())))),
+        hn::And(hn::Ge(y, min), hn::Lt(y, hn::Set(floats, static_cast<float>(to_.height())))));
     active = hn::And(active, inside);
     const Ints ints;
     const auto stride = hn::Set(ints, static_cast<std::int32_t>(to_.stride()));

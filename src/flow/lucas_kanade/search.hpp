@@ -26,7 +26,7 @@ struct Tile {
 
 /// Search for a block of a tile on the same level of another image.
 struct Search {
-  int x;  ///< its place among the blocks of the tile
+  int x;  ///< position among the blocks of the tile
   int y;
   Flow flow;   ///< in: start of the search; out: its result, if found
   bool found;  ///< out: false if the window has too little texture or left the image
@@ -40,8 +40,8 @@ struct Search {
 /// The window sum that determines a move is bilinear in the window's position, so it is
 /// interpolated between the integer sums at the four pixels around it. The window is summed once
 /// per pixel that a search visits, not once per move, and results are the same on every processor.
-/// Where several blocks have moved alike, the windows of all blocks of the tile are summed
-/// together.
+/// Where several blocks have the same displacement, the windows of all blocks of the tile are
+/// summed together.
 void search_tile(const Image<std::uint8_t>& from, const ScharrGradients& gradients,
                  const Image<std::uint8_t>& to, const Tile& tile, std::span<Search> searches);
 
