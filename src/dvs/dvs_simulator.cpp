@@ -44,10 +44,10 @@ bool have_same_response(const DvsSettings& a, const DvsSettings& b) {
          a.overexposed_light == b.overexposed_light;
 }
 
-/// A state begins with this; the last one is the version of its format.
+/// A state begins with this; the last character is the version of its format.
 constexpr std::array<char, 8> state_magic{'D', 'V', 'S', 'S', 'T', 'A', 'T', '2'};
 
-/// Hash of all settings, whose number the compiler checks.
+/// Hash of all settings. Does not compile unless it lists each of them.
 std::uint64_t hash_of(const DvsSettings& settings) {
   const auto& [denoise, linear_light, exposure_compensation, response, log_eps, overexposed_light,
                upsampling, max_interpolated_frames, cutoff_frequency, dark_light,
@@ -81,7 +81,7 @@ struct alignas(64) Scratch {
   std::vector<std::uint16_t> moving;  ///< a run for each blended frame, padded
 };
 
-/// Longest run of pixels that move, so that all its blended frames stay in a cache.
+/// Maximum width of a run of pixels that move: all its blended frames stay in a cache.
 constexpr int max_moving = 8 * MotionTiles::width;
 
 /// Elements from one row of Scratch::moving to the next.
@@ -100,29 +100,29 @@ class PixelSimulator final : public DvsSimulator {
 
   std::vector<std::uint8_t> state() override {
     StateWriter writer;
-    pass_origin(writer, current_);
-    pass(writer);
+    serialize_origin(writer, current_);
+    serialize(writer);
     return writer.finish();
   }
 
   void restore(std::span<const std::uint8_t> state) override {
     last_time_.reset();
     StateReader reader(state);
-    pass_origin(reader, settings_);
+    serialize_origin(reader, settings_);
     adopt(settings_, true);
-    pass(reader);
+    serialize(reader);
     reader.finish();
     responses_ = responses_to_luma(current_);
     frame_flow_.forget();
   }
 
  private:
-  /// Passes what a state belongs to.
-  template <class State>
-  void pass_origin(State& state, const DvsSettings& settings) const {
+  /// Writes what a state belongs to, or reads it and throws if it is something else.
+  template <class Archive>
+  void serialize_origin(Archive& archive, const DvsSettings& settings) const {
     const auto expect = [&](auto expected, const char* fault) {
       auto value = expected;
-      state.value(value, is_anything);
+      archive.value(value, is_anything);
       if (value != expected) throw std::runtime_error(fault);
     };
     expect(state_magic, "it is not a state that this version writes");
@@ -132,32 +132,33 @@ class PixelSimulator final : public DvsSimulator {
     expect(hash_of(settings), "it is of other properties");
   }
 
-  /// Passes everything else. What is derived from settings, gain and frames is not in a state.
-  template <class State>
-  void pass(State& state) {
+  /// Writes or reads everything else. What is derived from settings, gain and frames is not in a
+  /// state.
+  template <class Archive>
+  void serialize(Archive& archive) {
     Nanoseconds time = last_time_.value_or(0);
-    state.value(time, is_within<Nanoseconds>(0, std::numeric_limits<Nanoseconds>::max()));
-    state.value(sub_interval_count_, is_anything);
-    state.value(clock_, is_within(0.0, max_state_clock));
-    state.value(gain_, is_within(1 / max_total_gain, max_total_gain));
-    state.image(last_, is_anything);
-    pulse_.pass(state);
-    pixels_.pass(state);
-    fired_.pass(state, format().width, format().height);
+    archive.value(time, is_within<Nanoseconds>(0, std::numeric_limits<Nanoseconds>::max()));
+    archive.value(sub_interval_count_, is_anything);
+    archive.value(clock_, is_within(0.0, max_state_clock));
+    archive.value(gain_, is_within(1 / max_total_gain, max_total_gain));
+    archive.image(last_, is_anything);
+    pulse_.serialize(archive);
+    pixels_.serialize(archive);
+    fired_.serialize(archive, format().width, format().height);
     std::uint8_t has_readout = readout_ ? 1 : 0;
-    state.value(has_readout, is_within<std::uint8_t>(0, 1));
-    if constexpr (State::is_reading) {
+    archive.value(has_readout, is_within<std::uint8_t>(0, 1));
+    if constexpr (Archive::is_reading) {
       readout_.reset();
       if (has_readout == 1) readout_.emplace(format().width, format().height);
       last_time_ = time;
     }
-    if (readout_) readout_->pass(state);
+    if (readout_) readout_->serialize(archive);
   }
 
   bool needs_flow() const override { return settings_.upsampling == Upsampling::motion; }
 
   void start(const LumaView& frame) override {
-    keep(frame, last_);
+    copy_luma(frame, last_);
     frame_flow_.forget();
     sub_interval_count_ = 0;
     clock_ = 0;
@@ -171,7 +172,7 @@ class PixelSimulator final : public DvsSimulator {
 
   void simulate(const LumaView& frame, const StepTimes& interval, const Settings&,
                 EventBuckets& events) override {
-    keep(frame, now_);
+    copy_luma(frame, now_);
     const double duration = begin(interval, events);
     if (current_.exposure_compensation) compensate_exposure();
     if (current_.upsampling == Upsampling::motion)
@@ -192,7 +193,8 @@ class PixelSimulator final : public DvsSimulator {
 
   void label(const LabelledEvents& events) override { separate_causes(events); }
 
-  void keep(const LumaView& frame, Image<Pixel>& kept) {
+  /// Copies the luma of a frame, denoised.
+  void copy_luma(const LumaView& frame, Image<Pixel>& out) {
     if (frame.is_narrow != is_narrow_) {
       is_narrow_ = frame.is_narrow;
       if (!responses_.empty()) responses_ = responses_to_luma(current_);
@@ -200,9 +202,9 @@ class PixelSimulator final : public DvsSimulator {
     const int white = (1 << format().bits) - 1;
     const int limit = static_cast<int>(std::lround(settings_.denoise / 255 * white));
     if (limit > 0)
-      denoise(frame.as<Pixel>(), limit, threads(), kept);
+      denoise(frame.as<Pixel>(), limit, threads(), out);
     else
-      kept.assign(frame.as<Pixel>());
+      out.assign(frame.as<Pixel>());
   }
 
   /// Divides out the gain of the exposure from the last frame to this one.
@@ -216,7 +218,7 @@ class PixelSimulator final : public DvsSimulator {
     responses_ = responses_to_luma(current_);
     if (current_.upsampling == Upsampling::linear) return;
     expose(last_, format().bits, current_.linear_light, gain, threads());
-    frame_flow_.forget();  // knows it as it was
+    frame_flow_.forget();  // its copy has the old exposure
   }
 
   /// Returns the duration of the interval in microseconds.
@@ -230,7 +232,7 @@ class PixelSimulator final : public DvsSimulator {
     return duration;
   }
 
-  /// Begins or ends to find causes.
+  /// Starts or stops finding the causes of events.
   void keep_causes() {
     if (has_labels() == pixels_.keeps_causes()) return;
     pixels_.keep_causes(has_labels());
@@ -252,7 +254,7 @@ class PixelSimulator final : public DvsSimulator {
 
   /// Advances all pixels with linear interpolation.
   void advance_straight(double duration, bool is_exposed) {
-    frame_flow_.forget();  // it is not told of this frame
+    frame_flow_.forget();  // does not see this frame
     begin_plans(duration, 1, is_exposed);
     const bool is_widened = luma_bits(current_) != format().bits;
     for_each_band([&](const BandRows& rows, Scratch& scratch, const IntervalEvents::Band& events) {
@@ -293,11 +295,11 @@ class PixelSimulator final : public DvsSimulator {
           for (int left = 0; left < format().width; left += MotionTiles::width) {
             const auto& tile = tile_at(left);
             const int right = std::min(left + MotionTiles::width, format().width);
-            const bool is_resting = rest({y, left, right}, pixels, tile, scratch);
+            const bool is_skipped = try_skip({y, left, right}, pixels, tile, scratch);
             const bool is_full = steps > 1 && run.width() == max_moving;
-            if (is_resting || is_full || tile.steps != steps) {
+            if (is_skipped || is_full || tile.steps != steps) {
               advance_moving(run, pixels, steps, flow, scratch, events);
-              run.first = is_resting ? right : left;
+              run.first = is_skipped ? right : left;
               steps = tile.steps;
             }
             run.last = right;
@@ -310,11 +312,11 @@ class PixelSimulator final : public DvsSimulator {
 
   /// Advances a run of a tile that moves through the interval if none of its pixels can fire.
   /// Otherwise returns false.
-  bool rest(const Run& run, const PixelRow& pixels, const MotionTiles::Tile& tile,
-            const Scratch& scratch) const {
+  bool try_skip(const Run& run, const PixelRow& pixels, const MotionTiles::Tile& tile,
+                const Scratch& scratch) const {
     if (tile.steps == 1 || current_.cutoff_frequency > 0 || gain_ != 1) return false;
     const void* now = scratch.luma.data() + run.first;
-    return rest_run(filter_of(whole_, *whole_tables_), range_of(tile), {now, now}, pixels, run);
+    return try_skip_run(filter_of(whole_, *whole_tables_), range_of(tile), {now, now}, pixels, run);
   }
 
   /// Advances a run of tiles with these steps through the interval.
@@ -434,7 +436,7 @@ class PixelSimulator final : public DvsSimulator {
     return responses(settings, luma_bits(settings), is_narrow_, gain_);
   }
 
-  /// Factor from the luma of frames to that.
+  /// Factor from the luma of frames to that of luma_bits().
   int widening(const DvsSettings& settings) const {
     return luma_bits(settings) == format().bits ? 1 : 257;
   }

@@ -17,8 +17,8 @@
 //   motion_tiles.cpp      number of steps between two frames for each tile
 //   sub_intervals.cpp     divides the interval into steps, and where exposure pulses begin and end
 //   moving_light.cpp      luma of moving pixels at each step; light_response.hpp: its response
-//   row_filter.cpp        advances pixels that cannot fire, which are most; the others, candidates,
-//                         are solved: they get the exact times of their events
+//   row_filter.cpp        advances pixels that cannot fire, usually most of them; the others,
+//                         candidates, are solved: they get the exact times of their events
 //   pixel_solver.cpp      solves one at a time, with crossings (trajectory.cpp), adaptation.hpp,
 //                         shot_noise.hpp, latency and refractory period; chooses the solver
 //   line_solver.cpp       the same for many straight lines at a time, without latency
@@ -49,8 +49,8 @@ class DvsSimulator : public Simulator {
   }
 
   /// Continues after the last frame of a simulator whose state() this is. Throws std::runtime_error
-  /// with the reason if that had frames of another format or other settings, or if these are no
-  /// such bytes; then only reset(), restore() and the destructor may be called.
+  /// with the reason if that had frames of another format or other settings, or if these bytes are
+  /// not a state; then only reset(), restore() and the destructor may be called.
   virtual void restore(std::span<const std::uint8_t> state) = 0;
 
  protected:

@@ -39,17 +39,18 @@ class IntervalEvents {
   /// Drops the deferred events.
   void reset() { deferred_.clear(); }
 
-  /// Passes the deferred events of a sensor of this size to a StateWriter or StateReader.
-  template <class State>
-  void pass(State& state, int width, int height) {
+  /// Writes the deferred events of a sensor of this size to a StateWriter, or reads them from a
+  /// StateReader.
+  template <class Archive>
+  void serialize(Archive& archive, int width, int height) {
     deferred_.resize(static_cast<std::size_t>(band_count(height)));
     for (int band = 0; band < band_count(height); ++band) {
       const BandRows rows(band, height);
       auto& deferred = deferred_[static_cast<std::size_t>(band)];
-      deferred.resize(state.count(deferred.size(), sizeof(double) + sizeof(Event)));
+      deferred.resize(archive.count(deferred.size(), sizeof(double) + sizeof(Event)));
       for (auto& [t, event] : deferred) {
-        state.value(t, is_within(0.0, max_state_time));
-        state.value(event, is_event_within({0, rows.first, width, rows.last}));
+        archive.value(t, is_within(0.0, max_state_time));
+        archive.value(event, is_event_within({0, rows.first, width, rows.last}));
       }
     }
   }

@@ -302,10 +302,10 @@ class VaryingThresholds {
     const auto on_wait = wait(value, slope_, positive_, growth);
     const auto off_wait = wait(hn::Neg(value), hn::Neg(slope_), negative_, growth);
     const auto is_on = hn::Le(on_wait, off_wait);
-    const auto least = hn::IfThenElse(is_on, on_wait, off_wait);
-    crosses_ = hn::And(crosses_, hn::Lt(least, hn::Inf(doubles)));
+    const auto wait_time = hn::IfThenElse(is_on, on_wait, off_wait);
+    crosses_ = hn::And(crosses_, hn::Lt(wait_time, hn::Inf(doubles)));
     if (hn::AllFalse(doubles, crosses_)) return false;
-    t_ = hn::IfThenElse(crosses_, hn::Add(t_, least), t_);
+    t_ = hn::IfThenElse(crosses_, hn::Add(t_, wait_time), t_);
     const auto threshold = hn::IfThenElse(is_on, positive_, hn::Neg(negative_));
     const auto growth_here = hn::Mul(rate, hn::Max(hn::Sub(growth_end_, t_), all(0)));
     const auto level = hn::Add(reference_, hn::Mul(threshold, hn::Add(all(1), growth_here)));

@@ -20,7 +20,7 @@ namespace {
 
 constexpr int columns_at_once = 64;
 
-/// Finds the least and largest luma of each cell of `side` columns, in these rows of a frame.
+/// Finds the minimum and maximum luma of each cell of `side` columns, in these rows of a frame.
 template <class Pixel>
 void find_ranges(const ImageView<Pixel>& frame, int top, int bottom, int side,
                  std::uint16_t* darkest, std::uint16_t* brightest) {
@@ -75,16 +75,16 @@ HWY_EXPORT(find_ranges_16);
 
 namespace {
 
-/// Longest motion for which the luma on the way is worth looking up, in pixels.
-constexpr float far = 64;
+/// Maximum motion along which looking up the luma is worth its time, in pixels.
+constexpr float max_looked_up = 64;
 
-/// Steps of a tile whose longest motion is this many pixels. Between steps the luma is a straight
-/// line; where it bends, events err by a time in proportion to the motion, and to the inverse
-/// square of the steps. So from `fine` pixels on, steps grow with the square root of the motion,
-/// and the error stays the same.
-int steps_for(float longest, int max_steps) {
+/// Steps of a tile in which pixels move by up to `max_motion` pixels. Between steps the luma is a
+/// straight line; where it bends, events err by a time in proportion to the motion, and to the
+/// inverse square of the steps. So from `fine` pixels on, steps grow with the square root of the
+/// motion, and the error stays the same.
+int steps_for(float max_motion, int max_steps) {
   constexpr float fine = 4;
-  const float steps = longest <= fine ? longest : std::sqrt(fine * longest);
+  const float steps = max_motion <= fine ? max_motion : std::sqrt(fine * max_motion);
   return std::clamp(static_cast<int>(std::ceil(steps)), 1, max_steps);
 }
 
@@ -137,10 +137,10 @@ void MotionTiles::measure(const ImageView<Pixel>& last, const ImageView<Pixel>& 
       const Box box{column * width, row * height, std::min((column + 1) * width, flow.width),
                     std::min((row + 1) * height, flow.height)};
       const auto range = flow_range(flow, box);
-      const auto longest = std::min(range.max_length(), static_cast<float>(max_side));
+      const auto max_motion = std::min(range.max_length(), static_cast<float>(max_side));
       auto& tile = tiles[column];
-      tile = {steps_for(longest, max_steps), std::numeric_limits<Pixel>::max(), 0};
-      if (longest > far) {
+      tile = {steps_for(max_motion, max_steps), std::numeric_limits<Pixel>::max(), 0};
+      if (max_motion > max_looked_up) {
         std::swap(tile.darkest, tile.brightest);
         continue;
       }

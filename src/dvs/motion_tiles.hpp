@@ -20,8 +20,8 @@ class MotionTiles {
 
   struct Tile {
     int steps;      ///< between two frames, of a pixel along an axis; longer where much moves
-    int darkest;    ///< least luma on the way of any pixel, in both frames
-    int brightest;  ///< largest luma on that way
+    int darkest;    ///< minimum luma along the way of any pixel, in both frames
+    int brightest;  ///< maximum luma along that way
   };
 
   /// Measures the motion between two frames of the same size. A tile has at most `max_steps` steps.
@@ -37,7 +37,7 @@ class MotionTiles {
   }
 
  private:
-  /// Least and largest luma of each cell of a frame.
+  /// Minimum and maximum luma of each cell of a frame.
   struct Cells {
     static constexpr int side = 8;
     Image<std::uint16_t> darkest;

@@ -42,28 +42,28 @@ struct AxisMotion {
     const Words4 words;
     for (std::ptrdiff_t i = 0; i < blocks; ++i) {
       const Motion* here = of + i * block;
-      auto least = hn::Load(words, here);
-      auto most = least;
+      auto min_motion = hn::Load(words, here);
+      auto max_motion = min_motion;
       for (std::size_t k = hn::Lanes(words); k < block; k += hn::Lanes(words)) {
-        least = hn::Min(least, hn::Load(words, here + k));
-        most = hn::Max(most, hn::Load(words, here + k));
+        min_motion = hn::Min(min_motion, hn::Load(words, here + k));
+        max_motion = hn::Max(max_motion, hn::Load(words, here + k));
       }
       block_start[i] = start[i * block];
-      min[i] = hn::GetLane(hn::MinOfLanes(words, least));
-      max[i] = hn::GetLane(hn::MaxOfLanes(words, most));
+      min[i] = hn::GetLane(hn::MinOfLanes(words, min_motion));
+      max[i] = hn::GetLane(hn::MaxOfLanes(words, max_motion));
     }
   }
 
   /// Whether the pixels of each block stay less than a block apart for `steps` steps.
-  bool stay_alike(int blocks, int steps) const {
-    std::int64_t widest = 0;
+  bool stay_close(int blocks, int steps) const {
+    std::int64_t max_difference = 0;
     for (int i = 0; i < blocks; ++i)
-      widest = std::max(widest, std::int64_t{max[i]} - std::int64_t{min[i]});
-    return widest * steps <= (block - 1) << 16;
+      max_difference = std::max(max_difference, std::int64_t{max[i]} - std::int64_t{min[i]});
+    return max_difference * steps <= (block - 1) << 16;
   }
 
   /// Whether those of the first block are less than a block apart after k steps.
-  bool are_alike(int k) const {
+  bool are_close(int k) const {
     const auto pixel = [&](Motion motion) { return (k * motion + 512) >> 16; };
     return std::abs(pixel(max[0]) - pixel(min[0])) < block;
   }
@@ -81,10 +81,10 @@ struct BlockMotions {
     HWY_ALIGN Flow flows[max_pixels];
     std::copy_n(flow, count, flows);
     std::fill(flows + count, flows + std::ptrdiff_t{blocks} * block, flow[0]);
-    const auto longest = hn::Set(floats, static_cast<float>(max_side));
+    const auto limit = hn::Set(floats, static_cast<float>(max_side));
     const auto scale = hn::Set(floats, 65536.0F / static_cast<float>(steps));
     const auto per_step = [&](hn::Vec<decltype(floats)> motion) {  // motion_per_step()
-      const auto clamped = hn::Max(hn::Min(motion, longest), hn::Neg(longest));
+      const auto clamped = hn::Max(hn::Min(motion, limit), hn::Neg(limit));
       return hn::NearestInt(hn::IfThenElseZero(hn::Eq(motion, motion), hn::Mul(clamped, scale)));
     };
     const auto first_x = hn::Set(words, (left << 16) + 512);
@@ -102,10 +102,10 @@ struct BlockMotions {
     y.find_ranges(blocks);
   }
 
-  bool stay_alike(int blocks, int steps) const {
-    return x.stay_alike(blocks, steps) && y.stay_alike(blocks, steps);
+  bool stay_close(int blocks, int steps) const {
+    return x.stay_close(blocks, steps) && y.stay_close(blocks, steps);
   }
-  bool are_alike(int k) const { return x.are_alike(k) && y.are_alike(k); }
+  bool are_close(int k) const { return x.are_close(k) && y.are_close(k); }
 };
 
 /// 16-bit luma of two samples of 8-bit frames, in 1/4096 of a grey level; `weight` is that of the
@@ -119,8 +119,8 @@ std::uint16_t blended_luma(std::int32_t earlier, std::int32_t later, int weight)
 /// Blends a block of pixels one by one.
 void blend_apart(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
                  std::uint16_t* out) {
-  const auto sample_of = [&](const ImageView<std::uint8_t>& picture, int i, int k) {
-    return sample(picture, motions.x.start[i] - 512 + k * motions.x.of[i],
+  const auto sample_of = [&](const ImageView<std::uint8_t>& frame, int i, int k) {
+    return sample(frame, motions.x.start[i] - 512 + k * motions.x.of[i],
                   motions.y.start[i] - 512 + k * motions.y.of[i]);
   };
   for (int i = 0; i < block; ++i)
@@ -138,8 +138,8 @@ void blend_blocks(const Warp<std::uint8_t>& warp, const BlockMotions& motions, i
 
 #else
 
-/// Bilinear samples, the same as those of sample() in warp.hpp, of blocks whose pixels are alike:
-/// those of a block are in the same 16 bytes of a few rows.
+/// Bilinear samples, the same as those of sample() in warp.hpp, of blocks whose pixels are close
+/// together: those of a block are in the same 16 bytes of a few rows.
 template <int blocks>
 class Sampler {
  public:
@@ -154,7 +154,7 @@ class Sampler {
     hn::Vec<Words> high;
   };
 
-  explicit Sampler(const ImageView<std::uint8_t>& picture) : picture_(picture) {}
+  explicit Sampler(const ImageView<std::uint8_t>& frame) : frame_(frame) {}
 
   /// Samples after k steps, in 1/4096 of a grey level.
   HWY_INLINE Values at(const BlockMotions& motions, int k) const {
@@ -162,10 +162,10 @@ class Sampler {
     const auto fraction = hn::Set(shorts, 63);
     HWY_ALIGN std::int32_t first_x[4];
     HWY_ALIGN std::int32_t first_y[4];
-    const auto left = first_pixels(motions.x, k, picture_.width, first_x);
-    const auto top = first_pixels(motions.y, k, picture_.height, first_y);
-    const auto x = positions(motions.x, k, picture_.width, first_x);
-    const auto y = positions(motions.y, k, picture_.height, first_y);
+    const auto left = first_pixels(motions.x, k, frame_.width, first_x);
+    const auto top = first_pixels(motions.y, k, frame_.height, first_y);
+    const auto x = positions(motions.x, k, frame_.width, first_x);
+    const auto y = positions(motions.y, k, frame_.height, first_y);
 
     // Bytes of the left and right neighbours.
     const auto column = hn::ShiftRight<6>(x);
@@ -242,8 +242,8 @@ class Sampler {
   /// 16 bytes of each block, `row` rows below its first one.
   HWY_INLINE hn::Vec<Bytes> pixels_at(hn::Vec<Words4> left, hn::Vec<Words4> top, int row) const {
     const Words4 words;
-    const auto last = hn::Set(words, picture_.height - 1);
-    const auto stride = hn::Set(words, static_cast<std::int32_t>(picture_.stride));
+    const auto last = hn::Set(words, frame_.height - 1);
+    const auto stride = hn::Set(words, static_cast<std::int32_t>(frame_.stride));
     HWY_ALIGN std::int32_t places[4];
     hn::Store(hn::Add(hn::Mul(hn::Min(hn::Add(top, hn::Set(words, row)), last), stride), left),
               words, places);
@@ -255,7 +255,7 @@ class Sampler {
   HWY_INLINE hn::Vec<Tag> gather(Tag tag, const std::int32_t* places) const {
     constexpr std::size_t count = hn::MaxLanes(Tag()) / 16;
     if constexpr (count == 1) {
-      return hn::LoadU(tag, picture_.row(0) + *places);
+      return hn::LoadU(tag, frame_.row(0) + *places);
     } else {
       const hn::Half<Tag> half;
       return hn::Combine(tag, gather(half, places + count / 2), gather(half, places));
@@ -273,7 +273,7 @@ class Sampler {
     return table;
   }();
 
-  const ImageView<std::uint8_t>& picture_;
+  const ImageView<std::uint8_t>& frame_;
 };
 
 /// Vector version of blended_luma().
@@ -286,25 +286,25 @@ HWY_INLINE hn::Vec<Words> blended(Words words, hn::Vec<Words> earlier, hn::Vec<W
       hn::Add(hn::Add(hn::ShiftLeft<8>(grey), grey), hn::Set(words, 1 << 11)));
 }
 
-/// Blends blocks whose pixels are alike.
+/// Blends blocks whose pixels are close together.
 template <int blocks>
 void blend_blocks(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
                   std::uint16_t* out) {
-  using Picture = Sampler<blocks>;
-  const typename Picture::Words words;
-  const typename Picture::Bytes bytes;
+  using FrameSampler = Sampler<blocks>;
+  const typename FrameSampler::Words words;
+  const typename FrameSampler::Bytes bytes;
   const auto weight = hn::Set(words, blend_weight(j, warp.steps));
-  const auto earlier = Picture(warp.last).at(motions, -j);
-  const auto later = Picture(warp.now).at(motions, warp.steps - j);
+  const auto earlier = FrameSampler(warp.last).at(motions, -j);
+  const auto later = FrameSampler(warp.now).at(motions, warp.steps - j);
   const auto low = blended(words, earlier.low, later.low, weight);
   const auto high = blended(words, earlier.high, later.high, weight);
   // The first four pixels of a block are in the lower halves of words, the others in the upper.
   HWY_ALIGN static constexpr std::uint8_t in_order[16] = {0, 1, 4, 5, 8,  9,  12, 13,
                                                           2, 3, 6, 7, 10, 11, 14, 15};
   const auto both = hn::BitCast(bytes, hn::Or(low, hn::ShiftLeft<16>(high)));
-  hn::StoreU(hn::BitCast(typename Picture::Shades(),
+  hn::StoreU(hn::BitCast(typename FrameSampler::Shades(),
                          hn::TableLookupBytes(both, hn::LoadDup128(bytes, in_order))),
-             typename Picture::Shades(), out);
+             typename FrameSampler::Shades(), out);
 }
 
 #endif
@@ -314,7 +314,7 @@ template <int blocks>
 void move_blocks(const Warp<std::uint8_t>& warp, const Flow* flow, int left, int y, int count,
                  std::uint16_t* out, std::ptrdiff_t stride) {
   const BlockMotions motions(flow, left, y, count, blocks, warp.steps);
-  if (motions.stay_alike(blocks, warp.steps - 1)) {
+  if (motions.stay_close(blocks, warp.steps - 1)) {
     for (int j = 1; j < warp.steps; ++j, out += stride) blend_blocks<blocks>(warp, motions, j, out);
     return;
   }
@@ -323,7 +323,7 @@ void move_blocks(const Warp<std::uint8_t>& warp, const Flow* flow, int left, int
       move_blocks<1>(warp, flow + i, left + i, y, block, out + i, stride);
   } else {
     for (int j = 1; j < warp.steps; ++j, out += stride) {
-      if (motions.are_alike(-j) && motions.are_alike(warp.steps - j))
+      if (motions.are_close(-j) && motions.are_close(warp.steps - j))
         blend_blocks<1>(warp, motions, j, out);
       else
         blend_apart(warp, motions, j, out);

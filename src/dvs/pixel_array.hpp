@@ -99,7 +99,7 @@ class PixelArray {
   int width() const { return target_.width(); }
   PixelRow row(int y);
 
-  /// Begins or ends to keep the causes of events, for labels.
+  /// Starts or stops storing the cause of each pixel's last event, for labels.
   void keep_causes(bool are_kept);
   bool keeps_causes() const { return last_cause_.has_value(); }
 
@@ -113,9 +113,10 @@ class PixelArray {
   /// budgets.
   void settle(int y, const DvsSettings& settings, const Random& random);
 
-  /// Passes all pixels to a StateWriter or StateReader, except the leak, which is drawn.
-  template <class State>
-  void pass(State& state);
+  /// Writes all pixels to a StateWriter, or reads them from a StateReader; without the leak, which
+  /// is drawn again.
+  template <class Archive>
+  void serialize(Archive& archive);
 
  private:
   Image<float> target_;
@@ -130,25 +131,25 @@ class PixelArray {
   std::optional<Image<Cause>> last_cause_;
 };
 
-template <class State>
-void PixelArray::pass(State& state) {
+template <class Archive>
+void PixelArray::serialize(Archive& archive) {
   constexpr auto max_level = static_cast<float>(max_state_level);
   constexpr auto is_level = is_within(-max_level, max_level);
   constexpr auto is_threshold = [](float threshold) {
     return std::isinf(threshold) ? threshold > 0 : is_within(1e-4F, max_level)(threshold);
   };
   std::uint8_t has_causes = keeps_causes() ? 1 : 0;
-  state.value(has_causes, is_within<std::uint8_t>(0, 1));
-  if constexpr (State::is_reading) keep_causes(has_causes == 1);
-  state.image(target_, is_level);
-  state.image(signal_, is_level);
-  state.image(reference_, is_level);
-  state.image(positive_, is_threshold);
-  state.image(negative_, is_threshold);
-  state.image(refractory_left_, is_within(0.0F, static_cast<float>(max_state_time)));
-  state.image(noise_budget_, is_anything);
-  state.image(growth_end_, is_within(0.0, max_state_clock));
-  if (last_cause_) state.image(*last_cause_, is_within(Cause::unknown, Cause::exposure_pulse));
+  archive.value(has_causes, is_within<std::uint8_t>(0, 1));
+  if constexpr (Archive::is_reading) keep_causes(has_causes == 1);
+  archive.image(target_, is_level);
+  archive.image(signal_, is_level);
+  archive.image(reference_, is_level);
+  archive.image(positive_, is_threshold);
+  archive.image(negative_, is_threshold);
+  archive.image(refractory_left_, is_within(0.0F, static_cast<float>(max_state_time)));
+  archive.image(noise_budget_, is_anything);
+  archive.image(growth_end_, is_within(0.0, max_state_clock));
+  if (last_cause_) archive.image(*last_cause_, is_within(Cause::unknown, Cause::exposure_pulse));
 }
 
 }  // namespace eventcamera

@@ -11,7 +11,7 @@
 
 namespace eventcamera {
 
-/// Arbiter of the readout: reads one row at a time, the longest waiting row first, at a limited
+/// Arbiter of the readout: reads one row at a time, first come, first served, at a limited
 /// event rate. The events of a row take the time of its readout. A waiting pixel drops further
 /// events, so events beyond the readout rate are lost, and at most one event per pixel waits.
 class Readout {
@@ -31,9 +31,9 @@ class Readout {
   void read(std::span<const Event> in, double duration, double events_per_second,
             EventBuckets& out);
 
-  /// Passes the waiting events to a StateWriter or StateReader.
-  template <class State>
-  void pass(State& state);
+  /// Writes the waiting events to a StateWriter, or reads them from a StateReader.
+  template <class Archive>
+  void serialize(Archive& archive);
 
  private:
   /// Event of a pixel that waits; 0 if none. The time is that of the readout, and not kept.
@@ -70,20 +70,20 @@ class Readout {
   double idle_from_ = 0;  ///< microseconds after the start of the interval
 };
 
-template <class State>
-void Readout::pass(State& state) {
-  if constexpr (State::is_reading) reset();
-  state.value(idle_from_, is_within(0.0, max_state_time));
+template <class Archive>
+void Readout::serialize(Archive& archive) {
+  if constexpr (Archive::is_reading) reset();
+  archive.value(idle_from_, is_within(0.0, max_state_time));
   // In the order in which they are read, which admits them again.
   std::vector<Event> events;
   for (std::size_t i = 0; i < queue_count_; ++i) {
     const int row = row_queue_[(queue_first_ + i) % row_queue_.size()];
     append(row, 0, events);
   }
-  events.resize(state.count(events.size(), sizeof(Event)));
+  events.resize(archive.count(events.size(), sizeof(Event)));
   for (auto& event : events)
-    state.value(event, is_event_within({0, 0, width_, static_cast<int>(rows_.size())}));
-  if constexpr (State::is_reading)
+    archive.value(event, is_event_within({0, 0, width_, static_cast<int>(rows_.size())}));
+  if constexpr (Archive::is_reading)
     for (const auto& event : events) admit(event);
 }
 

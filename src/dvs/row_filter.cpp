@@ -165,8 +165,8 @@ void filter_luma(const RowFilter& row_filter, const RunLuma& luma, const PixelRo
 }
 
 template <class Pixel>
-bool rest(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
-          const PixelRow& pixels, const Run& run) {
+bool try_skip(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
+              const PixelRow& pixels, const Run& run) {
   const Floats floats;
   const Words words;
   const Counts counts;
@@ -222,10 +222,10 @@ bool rest(const RowFilter& row_filter, const LightRange& range, const RunLuma& l
   return true;
 }
 
-bool rest_luma(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
-               const PixelRow& pixels, const Run& run) {
-  return row_filter.luma_bits == 8 ? rest<std::uint8_t>(row_filter, range, luma, pixels, run)
-                                   : rest<std::uint16_t>(row_filter, range, luma, pixels, run);
+bool try_skip_luma(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
+                   const PixelRow& pixels, const Run& run) {
+  return row_filter.luma_bits == 8 ? try_skip<std::uint8_t>(row_filter, range, luma, pixels, run)
+                                   : try_skip<std::uint16_t>(row_filter, range, luma, pixels, run);
 }
 
 }  // namespace
@@ -236,16 +236,16 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 
 HWY_EXPORT(filter_luma);
-HWY_EXPORT(rest_luma);
+HWY_EXPORT(try_skip_luma);
 
 void filter_run(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
                 const Run& run, Candidates& candidates) {
   HWY_DYNAMIC_DISPATCH(filter_luma)(row_filter, luma, pixels, run, candidates);
 }
 
-bool rest_run(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
-              const PixelRow& pixels, const Run& run) {
-  return HWY_DYNAMIC_DISPATCH(rest_luma)(row_filter, range, luma, pixels, run);
+bool try_skip_run(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
+                  const PixelRow& pixels, const Run& run) {
+  return HWY_DYNAMIC_DISPATCH(try_skip_luma)(row_filter, range, luma, pixels, run);
 }
 
 }  // namespace eventcamera

@@ -15,7 +15,7 @@ namespace eventcamera {
 /// Maximum vector length in floats; rows of luma values are padded by this.
 inline constexpr int max_lanes = 16;
 
-/// Pixels of a row in which something may happen.
+/// Pixels of a row in which an event may fire or a refractory period end.
 class Candidates {
  public:
   /// Values of each of them: of the sub-interval, and, like those of PixelRow, at its start.
@@ -79,13 +79,13 @@ struct RunLuma {
 };
 
 /// Advances a run of pixels through a sub-interval: targets, and with bandwidth signals, of all
-/// pixels; references and noise budgets of those that cannot fire, which are most. The others
+/// pixels; references and noise budgets of those that cannot fire, usually most of them. The others
 /// become `candidates`. The decision has a margin for float rounding, and is the same on every
 /// processor. A run that does not end with the row must be a multiple of max_lanes pixels wide.
 void filter_run(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
                 const Run& run, Candidates& candidates);
 
-/// What light does at most during an interval, in units of the response.
+/// Bounds of the light during an interval, in units of the response.
 struct LightRange {
   float darkest;
   float brightest;
@@ -96,7 +96,7 @@ struct LightRange {
 /// Advances a run of pixels without bandwidth through a whole interval, for which `row_filter` and
 /// `luma` are, if none of them can fire in it, whatever the light does within its range. Otherwise
 /// returns false, and leaves them as they are.
-bool rest_run(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
-              const PixelRow& pixels, const Run& run);
+bool try_skip_run(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
+                  const PixelRow& pixels, const Run& run);
 
 }  // namespace eventcamera

@@ -14,8 +14,8 @@
 #include "src/core/label.hpp"
 
 /// The state of a simulator as bytes: values without gaps, in the byte order of the machine, and
-/// their checksum. Whatever has a state passes its values, one after another, to a StateWriter or a
-/// StateReader, in one function for both.
+/// their checksum. A function serialize(archive) writes the values of an object to a StateWriter,
+/// one after another, or reads them from a StateReader.
 
 namespace eventcamera {
 

@@ -35,11 +35,11 @@ class ExposurePulse {
   /// Aborts the current pulse.
   void reset() { height_ = 0; }
 
-  /// Passes the current pulse to a StateWriter or StateReader.
-  template <class State>
-  void pass(State& state) {
-    state.value(height_, is_within(0.0, max_state_level));
-    state.value(falls_in_, is_within(0.0, max_state_time));
+  /// Writes the current pulse to a StateWriter, or reads it from a StateReader.
+  template <class Archive>
+  void serialize(Archive& archive) {
+    archive.value(height_, is_within(0.0, max_state_level));
+    archive.value(falls_in_, is_within(0.0, max_state_time));
   }
 
  private:
