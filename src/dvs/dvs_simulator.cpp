@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -16,6 +15,7 @@
 #include "src/dvs/denoise.hpp"
 #include "src/dvs/exposure_gain.hpp"
 #include "src/dvs/interval_events.hpp"
+#include "src/dvs/interval_plans.hpp"
 #include "src/dvs/line_solver.hpp"
 #include "src/dvs/motion_tiles.hpp"
 #include "src/dvs/moving_light.hpp"
@@ -87,12 +87,6 @@ constexpr int max_moving = 8 * MotionTiles::width;
 /// Elements from one row of Scratch::moving to the next.
 constexpr int moving_stride = max_moving + max_lanes;
 
-/// An interval in a number of steps.
-struct Plan {
-  std::vector<SubInterval> sub_intervals;  ///< in order of time
-  std::vector<const ShadeTables*> tables;  ///< of each of them
-};
-
 template <class Pixel>
 class PixelSimulator final : public DvsSimulator {
  public:
@@ -138,7 +132,7 @@ class PixelSimulator final : public DvsSimulator {
   void serialize(Archive& archive) {
     Nanoseconds time = last_time_.value_or(0);
     archive.value(time, is_within<Nanoseconds>(0, std::numeric_limits<Nanoseconds>::max()));
-    archive.value(sub_interval_count_, is_anything);
+    plans_.serialize(archive);
     archive.value(clock_, is_within(0.0, max_state_clock));
     archive.value(gain_, is_within(1 / max_total_gain, max_total_gain));
     archive.image(last_, is_anything);
@@ -160,7 +154,7 @@ class PixelSimulator final : public DvsSimulator {
   void start(const LumaView& frame) override {
     copy_luma(frame, last_);
     frame_flow_.forget();
-    sub_interval_count_ = 0;
+    plans_.restart();
     clock_ = 0;
     fired_.reset();
     if (readout_) readout_->reset();
@@ -214,7 +208,7 @@ class PixelSimulator final : public DvsSimulator {
     const double total = gain_ * gain;
     if (gain == 1 || std::max(total, 1 / total) > max_total_gain) return;
     gain_ = total;
-    tables_.clear();
+    plans_.clear_tables();
     responses_ = responses_to_luma(current_);
     if (current_.upsampling == Upsampling::linear) return;
     expose(last_, format().bits, current_.linear_light, gain, threads());
@@ -242,7 +236,7 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   void finish(double duration, EventBuckets& events) {
-    sub_interval_count_ += max_sub_intervals_;
+    plans_.end();
     clock_ += duration;
     if (!readout_) return;
     const bool is_limited = current_.max_rate > 0;
@@ -266,8 +260,8 @@ class PixelSimulator final : public DvsSimulator {
         }
         const Run run{y, 0, format().width};
         const PixelRow pixels = pixels_.row(y);
-        for (std::size_t i = 0; i < plans_[1].sub_intervals.size(); ++i)
-          advance_run({luma, luma}, run, pixels, plans_[1], i, scratch, events);
+        for (std::size_t i = 0; i < plans_.at(1).sub_intervals.size(); ++i)
+          advance_run({luma, luma}, run, pixels, plans_.at(1), i, scratch, events);
       }
     });
   }
@@ -279,7 +273,7 @@ class PixelSimulator final : public DvsSimulator {
     begin_plans(duration, max_steps, true);
     for (int row = 0; row < tiles_.rows(); ++row)
       for (int column = 0; column < tiles_.columns(); ++column)
-        make_plan(tiles_.at(column, row).steps);
+        plans_.make(tiles_.at(column, row).steps);
     for_each_band([&](const BandRows& rows, Scratch& scratch, const IntervalEvents::Band& events) {
       scratch.moving.resize(static_cast<std::size_t>(max_steps) * moving_stride);
       for (int top = rows.first; top < rows.last; top += MotionTiles::height) {
@@ -316,7 +310,8 @@ class PixelSimulator final : public DvsSimulator {
                 const Scratch& scratch) const {
     if (tile.steps == 1 || current_.cutoff_frequency > 0 || gain_ != 1) return false;
     const void* now = scratch.luma.data() + run.first;
-    return try_skip_run(filter_of(whole_, *whole_tables_), range_of(tile), {now, now}, pixels, run);
+    return try_skip_run(filter_of(plans_.whole(), plans_.whole_tables()), range_of(tile),
+                        {now, now}, pixels, run);
   }
 
   /// Advances a run of tiles with these steps through the interval.
@@ -329,7 +324,7 @@ class PixelSimulator final : public DvsSimulator {
                  moving_stride);
     const void* now = scratch.luma.data() + run.first;
     const bool has_bandwidth = current_.cutoff_frequency > 0;
-    const Plan& plan = plans_[static_cast<std::size_t>(steps)];
+    const IntervalPlan& plan = plans_.at(steps);
     for (std::size_t i = 0; i < plan.sub_intervals.size(); ++i) {
       const int step = plan.sub_intervals[i].step;
       const void* luma =
@@ -343,43 +338,11 @@ class PixelSimulator final : public DvsSimulator {
       const int white = static_cast<int>(responses_.size()) - 1;
       return responses_[static_cast<std::size_t>(std::min(luma * widening(current_), white))];
     };
-    return {response(tile.darkest), response(tile.brightest), max_rise_, max_fall_};
+    return {response(tile.darkest), response(tile.brightest), plans_.max_rise(), plans_.max_fall()};
   }
 
-  /// Prepares plans of up to `max_steps` steps for the next interval.
   void begin_plans(double duration, int max_steps, bool is_exposed) {
-    edges_ = pulse_.next(current_, duration, is_exposed);
-    whole_ = {0, duration, 1, 1, 0, sub_interval_count_};
-    max_rise_ = max_fall_ = 0;
-    for (const auto& edge : edges_) {
-      max_rise_ += std::max(0.0F, static_cast<float>(edge.rise));
-      max_fall_ -= std::min(0.0F, static_cast<float>(edge.rise));
-    }
-    constexpr std::size_t max_tables = 1000;  // of varying frame times
-    if (tables_.size() > max_tables) tables_.clear();
-    whole_tables_ = tables_of(duration);
-    max_sub_intervals_ = 0;
-    plans_.resize(static_cast<std::size_t>(max_steps) + 1);
-    for (auto& plan : plans_) plan.sub_intervals.clear();
-    make_plan(1);
-    for (const auto& sub_interval : plans_[1].sub_intervals) whole_.rise += sub_interval.rise;
-  }
-
-  void make_plan(int steps) {
-    auto& plan = plans_[static_cast<std::size_t>(steps)];
-    if (!plan.sub_intervals.empty()) return;
-    divide_interval(whole_.duration, steps, edges_, sub_interval_count_, plan.sub_intervals);
-    plan.tables.clear();
-    for (const auto& sub_interval : plan.sub_intervals)
-      plan.tables.push_back(tables_of(sub_interval.duration));
-    max_sub_intervals_ = std::max(max_sub_intervals_, plan.sub_intervals.size());
-  }
-
-  const ShadeTables* tables_of(double duration) {
-    const bool are_needed = current_.cutoff_frequency > 0 || current_.shot_noise_rate > 0;
-    const auto [place, is_new] =
-        tables_.try_emplace(are_needed ? duration : 1, current_, duration, gain_);
-    return &place->second;
+    plans_.begin(current_, gain_, duration, pulse_.next(current_, duration, is_exposed), max_steps);
   }
 
   ImageView<Flow> find_flow() {
@@ -402,8 +365,9 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   /// Advances a run of pixels through sub-interval i of a plan.
-  void advance_run(const RunLuma& luma, const Run& run, const PixelRow& pixels, const Plan& plan,
-                   std::size_t i, Scratch& scratch, const IntervalEvents::Band& events) {
+  void advance_run(const RunLuma& luma, const Run& run, const PixelRow& pixels,
+                   const IntervalPlan& plan, std::size_t i, Scratch& scratch,
+                   const IntervalEvents::Band& events) {
     const SubInterval& sub_interval = plan.sub_intervals[i];
     const ShadeTables& tables = *plan.tables[i];
     auto& candidates = scratch.candidates;
@@ -450,7 +414,7 @@ class PixelSimulator final : public DvsSimulator {
     }
     if (starts_over || settings.upsampling != current_.upsampling)
       responses_ = responses_to_luma(settings);
-    tables_.clear();
+    plans_.clear_tables();
     random_ = Random(settings.seed);
     // Thresholds that events have drawn stay until time or the jitter ends.
     const bool had_jitter = current_.threshold_jitter > 0;
@@ -520,16 +484,8 @@ class PixelSimulator final : public DvsSimulator {
   bool is_narrow_ = false;        ///< range of luma
   std::vector<float> responses_;  ///< by luma value
   ExposurePulse pulse_;
-  std::vector<PulseEdge> edges_;  ///< of pulses within the current interval
-  SubInterval whole_{};           ///< the current interval
-  const ShadeTables* whole_tables_ = nullptr;
-  float max_rise_ = 0;  ///< of pulses within it
-  float max_fall_ = 0;
-  std::map<double, ShadeTables> tables_;  ///< by duration, microseconds
-  std::vector<Plan> plans_;               ///< by number of steps
-  std::size_t max_sub_intervals_ = 0;     ///< of a plan
-  std::uint64_t sub_interval_count_ = 0;  ///< before this interval
-  double clock_ = 0;                      ///< its start, microseconds since the first frame
+  IntervalPlans plans_;
+  double clock_ = 0;  ///< start of this interval, microseconds since the first frame
   IntervalEvents fired_;
   EventBuckets unread_;        ///< events that go to the readout
   std::vector<Event> sorted_;  ///< the same, sorted
