@@ -11,7 +11,7 @@ import sys
 
 from page import replace_tables, run_on
 
-# Benchmark names without their verbs, and the names in the table.
+# Benchmark names without read or write, and the names in the table.
 FORMATS = {
     "edges/evt2": "EVT2",
     "edges/evt21": "EVT2.1",
@@ -39,23 +39,14 @@ FORMATS = {
     "metavision": "Metavision HDF5",
     "ecf": "ECF without HDF5",
 }
-VERBS = {"decode": "read", "encode": "write"}
 
 
 def results_of(run):
     """(million events per second, memcpys) by (format, read or write)."""
     results = {}
-    benchmarks = [each for each in run["benchmarks"] if not each.get("error_occurred")]
-    memcpy = [each for each in benchmarks if each["name"] == "memcpy"]
-    for each in benchmarks:
-        name, what = each["name"], None
-        if "memcpys" in each:
-            name, what = name.rsplit("/", 1)
-            results[name, what] = each["Mevents/s"], each["memcpys"]
-        elif "_" in name and memcpy:
-            verb, name = name.split("_", 1)
-            rate = each["items_per_second"]
-            results[name, VERBS[verb]] = rate / 1e6, memcpy[0]["items_per_second"] / rate
+    for each in run["benchmarks"]:
+        if not each.get("error_occurred"):
+            results[tuple(each["name"].rsplit("/", 1))] = each["Mevents/s"], each["memcpys"]
     return results
 
 

@@ -4,8 +4,11 @@
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <ctime>
+#include <span>
 #include <vector>
 
 #include "src/core/event.hpp"
@@ -49,6 +52,17 @@ void measure(benchmark::State& state, const std::vector<eventcamera::AbsoluteEve
   seconds /= static_cast<double>(state.iterations());
   state.counters["Mevents/s"] = static_cast<double>(events.size()) / seconds / 1e6;
   state.counters["memcpys"] = seconds / memcpy_seconds(events);
+}
+
+/// Calls take() with pieces of the bytes of a file, as a file source reads them.
+template <class Take>
+void for_each_piece(std::span<const std::uint8_t> bytes, const Take& take) {
+  constexpr std::size_t max_size = std::size_t{1} << 20;
+  while (!bytes.empty()) {
+    const auto piece = bytes.first(std::min(max_size, bytes.size()));
+    take(piece);
+    bytes = bytes.subspan(piece.size());
+  }
 }
 
 }  // namespace bench

@@ -97,7 +97,6 @@ void register_mcap(const Recording& recording, BagCompression compression, const
         ->Unit(benchmark::kMillisecond);
   };
   add("read", [&recording, write](benchmark::State& state) {
-    constexpr std::size_t max_piece = std::size_t{1} << 20;
     std::vector<std::uint8_t> bytes;
     write(bytes);
     std::size_t decoded = 0;
@@ -108,12 +107,10 @@ void register_mcap(const Recording& recording, BagCompression compression, const
         while (const auto item = decoder.next())
           decoded += std::get<EventItem>(*item).events.size();
       };
-      for (std::span<const std::uint8_t> rest = bytes; !rest.empty();) {
-        const auto piece = rest.first(std::min(max_piece, rest.size()));
-        rest = rest.subspan(piece.size());
+      bench::for_each_piece(bytes, [&](auto piece) {
         decoder.push(piece);
         take();
-      }
+      });
       decoder.finish();
       take();
     });

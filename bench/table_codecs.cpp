@@ -31,7 +31,6 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr SensorSize size{1280, 720};
 constexpr std::size_t count = 1 << 20;
-constexpr std::size_t piece = 1 << 20;  // bytes per decode call
 
 /// Ten events per microsecond: some in runs along rows, some at random pixels.
 Events make_events() {
@@ -75,8 +74,7 @@ void add(const std::string& name, const MakeEncoder& make_encoder,
     bench::measure(state, events(), [&] {
       out.events.clear();
       auto decoder = make_decoder();
-      for (std::size_t at = 0; at < bytes.size(); at += piece)
-        decoder.decode(std::span(bytes).subspan(at, std::min(piece, bytes.size() - at)), out);
+      bench::for_each_piece(bytes, [&](auto piece) { decoder.decode(piece, out); });
       decoder.finish(out);
     });
     if (out.events.size() != count) state.SkipWithError("events are missing");
