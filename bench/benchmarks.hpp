@@ -16,7 +16,7 @@ void register_flows(const Scene& scene);
 /// SCENE/STEP/FORMULATION/threads:1.
 void register_events(const Scene& scene);
 
-/// All optimized methods on growing pictures of the driving scene, two threads, until one takes
+/// All optimized methods on growing frames of the driving scene, two threads, until one takes
 /// longer than a thirtieth of a second: sizes/METHOD/SIZE.
 void register_sizes(bool few_frames);
 

@@ -127,7 +127,7 @@ class FedElement {
     return pad;
   }
 
-  static GstBuffer* wrapped(const bench::Picture& frame) {
+  static GstBuffer* wrapped(const bench::Frame& frame) {
     gsize offsets[GST_VIDEO_MAX_PLANES] = {};
     gint strides[GST_VIDEO_MAX_PLANES] = {static_cast<gint>(frame.stride())};
     const auto size = static_cast<gsize>(frame.stride()) * static_cast<gsize>(frame.height());

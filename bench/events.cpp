@@ -25,7 +25,7 @@ Intervals intervals_of(const Scene& scene) {
   for (const auto& clip : scene.clips) {
     const LumaFormat format{clip[0].width(), clip[0].height(), 8};
     const auto simulator = dis_hq_method.ours(format);
-    const auto push = [&](const Picture& frame, Nanoseconds time) {
+    const auto push = [&](const Frame& frame, Nanoseconds time) {
       return simulator->push({format, frame.row(0), frame.stride()}, time, settings);
     };
     push(clip[0], 0);
@@ -82,7 +82,7 @@ void time_copying_picture(benchmark::State& state, const Intervals& intervals, s
                  [&](const Interval&) { std::memcpy(out.data(), in.data(), bytes); });
 }
 
-void time_drawing(benchmark::State& state, const Intervals& intervals, const Picture& frame,
+void time_drawing(benchmark::State& state, const Intervals& intervals, const Frame& frame,
                   const PixelLayout& layout) {
   const auto stride = static_cast<std::ptrdiff_t>(frame.width()) * layout.bytes;
   std::vector<std::byte> out(static_cast<std::size_t>(stride * frame.height()));

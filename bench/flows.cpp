@@ -7,11 +7,11 @@ namespace {
 
 class OurFlow {
  public:
-  OurFlow(FlowMethod method, const Picture& first, int threads) : flow_(make_dense_flow(method)) {
+  OurFlow(FlowMethod method, const Frame& first, int threads) : flow_(make_dense_flow(method)) {
     threads_.set_threads(threads);
     flow_->push(first.view(), threads_);
   }
-  void find(const Picture& /*last*/, const Picture& now) {
+  void find(const Frame& /*last*/, const Frame& now) {
     flow_->push(now.view(), threads_);
     flow_->flow(threads_);
   }
@@ -23,11 +23,9 @@ class OurFlow {
 
 class OpenCvFlow {
  public:
-  OpenCvFlow(FlowMethod method, const Picture& first, int threads)
+  OpenCvFlow(FlowMethod method, const Frame& first, int threads)
       : flow_(method, first.width(), first.height()), threads_(threads) {}
-  void find(const Picture& last, const Picture& now) {
-    flow_.find(last.view(), now.view(), threads_);
-  }
+  void find(const Frame& last, const Frame& now) { flow_.find(last.view(), now.view(), threads_); }
 
  private:
   plain::OpenCvFlow flow_;

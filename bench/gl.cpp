@@ -25,7 +25,7 @@ namespace {
 
 using namespace eventcamera;
 using bench::Clip;
-using bench::Picture;
+using bench::Frame;
 
 using Clock = std::chrono::steady_clock;
 
@@ -46,9 +46,9 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// The picture at another size, by bilinear interpolation.
-Picture scaled(const Picture& from, int width, int height) {
-  Picture to(width, height);
+/// The frame at another size, by bilinear interpolation.
+Frame scaled(const Frame& from, int width, int height) {
+  Frame to(width, height);
   for (int y = 0; y < height; ++y) {
     const double v = (from.height() - 1.0) * y / std::max(height - 1, 1);
     const int top = std::min(static_cast<int>(v), from.height() - 2);
@@ -231,7 +231,7 @@ double element_cost_of(const Method& method, const Clip& clip, const Settings& s
 void print_row(const gl::Context& context, const bench::Scene& scene, const Method& method,
                int width, int height) {
   Clip clip;
-  for (const auto& picture : scene.clips[0]) clip.push_back(scaled(picture, width, height));
+  for (const auto& frame : scene.clips[0]) clip.push_back(scaled(frame, width, height));
   const Settings settings{method.cpu.threshold, method.cpu.threshold, scene.interpolated_frames, 0};
   const auto gpu = costs_of(context, method, clip, settings);
   char kernels[32] = "not counted";
@@ -262,7 +262,7 @@ int main(int argc, char** argv) {
     int width = 0;
     int height = 0;
     if (std::sscanf(size.c_str(), "%dx%d", &width, &height) != 2 || width < 1 || height < 1) {
-      std::fprintf(stderr, "gl_bench: '%s' is no size; give WIDTHxHEIGHT\n", size.c_str());
+      std::fprintf(stderr, "gl_bench: '%s' is not a size; give WIDTHxHEIGHT\n", size.c_str());
       return 2;
     }
     for (const auto& scene : scenes)

@@ -17,7 +17,7 @@ struct Setup {
 constexpr int frame_count = 3;
 
 /// Fraction of pixels that differ between two frames.
-double changed_share(const Picture& a, const Picture& b) {
+double changed_share(const Frame& a, const Frame& b) {
   int changed = 0;
   for (int y = 0; y < a.height(); ++y)
     for (int x = 0; x < a.width(); ++x)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What the scripts here share: the pages of docs/ whose tables they renew."""
+"""Replaces the tables in pages of docs/; shared by the scripts here."""
 import re
 import sys
 
@@ -17,7 +17,7 @@ def replace_tables(path, source, text):
 
 
 def run_on(context):
-    """When and on what a run of Google Benchmark was made."""
+    """Date and machine of a run of Google Benchmark."""
     return (f"Run on {context['date'][:10]} on {context['num_cpus']} CPUs at"
             f" {context['mhz_per_cpu']} MHz; initial load average"
             f" {context['load_avg'][0]:.1f}.\n")

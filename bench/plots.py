@@ -197,7 +197,7 @@ def scale_growth(axes, runs, axis):
 
 def draw_growth(runs, path):
     columns = [
-        ("pixels", "pixels", "size of the picture (by its pixels)", "A tenth moves, n = 10"),
+        ("pixels", "pixels", "frame size (by number of pixels)", "A tenth moves, n = 10"),
         ("n", "n", "n, interpolated frames", "A tenth of 640x480 moves"),
         ("changed", "changed", "share of changed pixels", "640x480, n = 10"),
         ("events", "events", "events a frame, by the thresholds", "A third of 640x480 moves, n = 10"),

@@ -46,7 +46,7 @@ std::optional<Scene> read(Video video, bool few_frames) {
   const char* shared = std::getenv("SHARED_DATA");
   const auto path = std::string(shared != nullptr ? shared : "") + "/video/" + video.file;
   if (!std::filesystem::exists(path)) {
-    std::fprintf(stderr, "no %s: %s is left out\n", path.c_str(), video.name.c_str());
+    std::fprintf(stderr, "%s not found: leaving out %s\n", path.c_str(), video.name.c_str());
     return {};
   }
   if (few_frames) video.spans = {{video.spans.front().first, 3}};
@@ -72,10 +72,10 @@ Clip ball(int count) {
   const auto ground = scene::texture<std::uint8_t>(1280, 720, 8, 0, 0);
   Clip clip;
   for (int i = 0; i < count; ++i) {
-    auto& picture = clip.emplace_back(ground);
+    auto& frame = clip.emplace_back(ground);
     for (int y = -radius; y < radius; ++y)
       for (int x = -radius; x < radius; ++x)
-        if (x * x + y * y < radius * radius) picture.at(200 + 30 * i + x, 300 + 8 * i + y) = 240;
+        if (x * x + y * y < radius * radius) frame.at(200 + 30 * i + x, 300 + 8 * i + y) = 240;
   }
   return clip;
 }
@@ -112,9 +112,9 @@ Clip moving_patch(int width, int height, double share, int count) {
     const auto patch = scene::texture<std::uint8_t>(
         patch_width, patch_height, 8, 1000 + (left == width - patch_width ? -4.0 * i : 0.0),
         500 + (top == height - patch_height ? -2.0 * i : 0.0));
-    auto& picture = clip.emplace_back(ground);
+    auto& frame = clip.emplace_back(ground);
     for (int y = 0; y < patch_height; ++y)
-      std::copy_n(patch.row(y), patch_width, picture.row(top + y) + left);
+      std::copy_n(patch.row(y), patch_width, frame.row(top + y) + left);
   }
   return clip;
 }

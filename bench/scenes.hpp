@@ -12,9 +12,9 @@
 /// Videos for timing the methods.
 namespace bench {
 
-using Picture = eventcamera::Image<std::uint8_t>;
+using Frame = eventcamera::Image<std::uint8_t>;
 /// Consecutive frames.
-using Clip = std::vector<Picture>;
+using Clip = std::vector<Frame>;
 
 inline constexpr eventcamera::Nanoseconds frame_time = 40'000'000;
 
@@ -39,8 +39,8 @@ Clip ball(int count);
 Clip moving_patch(int width, int height, double share, int count);
 
 /// Frame i of a clip played forwards and backwards forever.
-template <class Frame>
-const Frame& back_and_forth(const std::vector<Frame>& clip, std::int64_t i) {
+template <class AnyFrame>
+const AnyFrame& back_and_forth(const std::vector<AnyFrame>& clip, std::int64_t i) {
   const auto period = 2 * (static_cast<std::int64_t>(clip.size()) - 1);
   const auto at = i % period;
   return clip[static_cast<std::size_t>(std::min(at, period - at))];

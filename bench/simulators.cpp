@@ -8,8 +8,8 @@ namespace {
 
 /// Two frames and the flow between them.
 struct Pair {
-  const Picture* last;
-  const Picture* now;
+  const Frame* last;
+  const Frame* now;
   std::vector<Flow> flow;
 
   ImageView<Flow> flow_view() const {

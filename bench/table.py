@@ -60,7 +60,7 @@ def times_of(run):
 
 
 def sizes_of(run):
-    """Milliseconds of each method at growing sizes of the picture."""
+    """Milliseconds of each method at growing frame sizes."""
     sizes = {}
     for benchmark in run["benchmarks"]:
         parts = benchmark["name"].split("/")

@@ -15,7 +15,7 @@ class DenseInterpolation {
         dy_(width, height),
         between_{Image<std::uint8_t>(width, height), Image<std::uint8_t>(width, height)} {}
 
-  void fire(const Picture& last, const Picture& now, const ImageView<Flow>& flow,
+  void fire(const FrameView& last, const FrameView& now, const ImageView<Flow>& flow,
             const StepTimes& steps, const Thresholds& thresholds, ThreadPool& threads,
             EventBuckets& events) {
     const int m = steps.count();

@@ -18,9 +18,9 @@ class DiffSimulator final : public Simulator {
 
  private:
   /// One polarity of the difference frame as an image, 0 where nothing fires.
-  struct Part {
+  struct PolarityImage {
     int sign;
-    Image<std::uint8_t> picture;
+    Image<std::uint8_t> image;
     OpenCvTracker tracker;
   };
 
@@ -49,34 +49,35 @@ class DiffSimulator final : public Simulator {
         const bool fires = change > thresholds.positive || -change > thresholds.negative;
         const int difference = fires ? change : 0;
         difference_.at(x, y) = difference;
-        for (auto& part : parts_)
-          part.picture.at(x, y) = static_cast<std::uint8_t>(std::max(0, part.sign * difference));
+        for (auto& polarity : polarities_)
+          polarity.image.at(x, y) =
+              static_cast<std::uint8_t>(std::max(0, polarity.sign * difference));
       }
     });
     moving_.clear();
-    for (auto& part : parts_) {
-      part.tracker.push(part.picture.view(), threads().threads());
-      if (m > 1) follow(part, m);
+    for (auto& polarity : polarities_) {
+      polarity.tracker.push(polarity.image.view(), threads().threads());
+      if (m > 1) follow(polarity, m);
     }
     fire_between(steps, events);
     copy(now, last_, threads());
   }
 
   /// Moves the pixels of one polarity that end next to a pixel of that polarity.
-  void follow(Part& part, int steps) {
+  void follow(PolarityImage& polarity, int steps) {
     points_.clear();
     for (int y = 0; y < before_.height(); ++y)
       for (int x = 0; x < before_.width(); ++x)
-        if (part.sign * before_.at(x, y) > 0)
+        if (polarity.sign * before_.at(x, y) > 0)
           points_.emplace_back(static_cast<float>(x), static_cast<float>(y));
     const auto arrives = [&](int end_x, int end_y) {
-      const auto& picture = part.picture;
-      for (int y = std::max(end_y - 1, 0); y <= std::min(end_y + 1, picture.height() - 1); ++y)
-        for (int x = std::max(end_x - 1, 0); x <= std::min(end_x + 1, picture.width() - 1); ++x)
-          if (picture.at(x, y) != 0) return true;
+      const auto& image = polarity.image;
+      for (int y = std::max(end_y - 1, 0); y <= std::min(end_y + 1, image.height() - 1); ++y)
+        for (int x = std::max(end_x - 1, 0); x <= std::min(end_x + 1, image.width() - 1); ++x)
+          if (image.at(x, y) != 0) return true;
       return false;
     };
-    for_each_moving(points_, part.tracker.track(points_, threads().threads()), steps, format(),
+    for_each_moving(points_, polarity.tracker.track(points_, threads().threads()), steps, format(),
                     [&](const MovingPoint& point) {
                       if (arrives(point.x_at(steps), point.y_at(steps)))
                         moving_.push_back({point, before_.at(point.x, point.y)});
@@ -110,8 +111,8 @@ class DiffSimulator final : public Simulator {
   Image<std::uint8_t> last_{format().width, format().height};
   Image<int> before_{format().width, format().height};
   Image<int> difference_{format().width, format().height};
-  Part parts_[2] = {{1, {format().width, format().height}, {}},
-                    {-1, {format().width, format().height}, {}}};
+  PolarityImage polarities_[2] = {{1, {format().width, format().height}, {}},
+                                  {-1, {format().width, format().height}, {}}};
   std::vector<cv::Point2f> points_;
   std::vector<MovingDifference> moving_;
   std::vector<Image<int>> frames_;  ///< by thread; 0 where nothing fires

@@ -62,15 +62,15 @@ class DvsPixels {
       random_.emplace_back(static_cast<unsigned>(band));
   }
 
-  void start(const Picture& frame) {
+  void start(const FrameView& frame) {
     for (int y = 0; y < frame.height; ++y)
       for (int x = 0; x < frame.width; ++x)
         filtered_.at(x, y) = reference_.at(x, y) = lin_log(frame.row(y)[x]);
   }
 
-  /// One step from `begin` to `end`, seconds; its buckets are those of `step`.
-  void pass(const Picture& frame, double begin, double end, int step, ThreadPool& threads,
-            EventBuckets& events) {
+  /// Advances the pixels from `begin` to `end`, seconds; events go to the buckets of `step`.
+  void advance(const FrameView& frame, double begin, double end, int step, ThreadPool& threads,
+               EventBuckets& events) {
     const auto duration = static_cast<float>(end - begin);
     max_counts_.assign(random_.size(), 0);
     threads.for_each(band_count(frame.height),
@@ -101,7 +101,7 @@ class DvsPixels {
   static float brightness(float grey) { return (grey + 20) / 275; }
 
   /// Counts the events of each pixel.
-  void count(const Picture& frame, float duration, int band) {
+  void count(const FrameView& frame, float duration, int band) {
     const BandRows rows(band, frame.height);
     const auto bandwidth =
         static_cast<float>(2 * std::numbers::pi * settings_.cutoff_frequency) * duration;
@@ -129,7 +129,7 @@ class DvsPixels {
     max_counts_[static_cast<std::size_t>(band)] = max_count;
   }
 
-  void add_noise(const Picture& frame, float duration, double end, int band,
+  void add_noise(const FrameView& frame, float duration, double end, int band,
                  std::vector<Event>& out) {
     const BandRows rows(band, frame.height);
     auto& random = random_[static_cast<std::size_t>(band)];
@@ -159,7 +159,7 @@ class DvsPixels {
 };
 
 /// Events between frames or, with motion, between interpolated frames, whose number is the length
-/// of the longest flow in pixels.
+/// of the maximum flow in pixels.
 class DvsSimulator final : public Simulator {
  public:
   DvsSimulator(const LumaFormat& format, const DvsSettings& settings)
@@ -193,11 +193,11 @@ class DvsSimulator final : public Simulator {
     int steps = 1;
     if (flow_) {
       flow = flow_->find(last_.view(), now, threads().threads());
-      float longest = 0;
+      float max_length = 0;
       for (int y = 0; y < now.height; ++y)
         for (int x = 0; x < now.width; ++x)
-          longest = std::max(longest, std::hypot(flow.row(y)[x].x, flow.row(y)[x].y));
-      steps = std::clamp(static_cast<int>(std::ceil(longest)), 1,
+          max_length = std::max(max_length, std::hypot(flow.row(y)[x].x, flow.row(y)[x].y));
+      steps = std::clamp(static_cast<int>(std::ceil(max_length)), 1,
                          settings_.max_interpolated_frames + 1);
     }
     events.reset(steps, band_count(now.height));
@@ -211,8 +211,8 @@ class DvsSimulator final : public Simulator {
                                               motion_per_step(flow.row(y)[x].y, steps), j);
         });
       }
-      pixels_.pass(j < steps ? between_.view() : now, duration * (j - 1) / steps,
-                   duration * j / steps, j, threads(), events);
+      pixels_.advance(j < steps ? between_.view() : now, duration * (j - 1) / steps,
+                      duration * j / steps, j, threads(), events);
     }
     copy(now, last_, threads());
   }

@@ -14,10 +14,10 @@
 namespace plain {
 
 using namespace eventcamera;
-using Picture = ImageView<std::uint8_t>;
+using FrameView = ImageView<std::uint8_t>;
 
 /// Fires where the difference of two frames exceeds the thresholds.
-inline void fire(const Picture& before, const Picture& now, int step, std::uint32_t t,
+inline void fire(const FrameView& before, const FrameView& now, int step, std::uint32_t t,
                  const Thresholds& thresholds, ThreadPool& threads, EventBuckets& events) {
   threads.for_each(band_count(now.height), [&](int band, int) {
     auto& out = events.bucket(step, band);
@@ -37,7 +37,7 @@ inline void fire(const Picture& before, const Picture& now, int step, std::uint3
 }
 
 /// Copies an image of the same size.
-inline void copy(const Picture& from, Image<std::uint8_t>& to, ThreadPool& threads) {
+inline void copy(const FrameView& from, Image<std::uint8_t>& to, ThreadPool& threads) {
   threads.for_each(band_count(from.height), [&](int band, int) {
     const BandRows rows(band, from.height);
     for (int y = rows.first; y < rows.last; ++y)

@@ -10,17 +10,13 @@
 
 #include "src/core/luma.hpp"
 #include "src/flow/dense_flow.hpp"
+#include "src/flow/opencv.hpp"
 #include "src/simulate/motion.hpp"
 
 /// OpenCV's optical flow with the parameters of the simulators.
 namespace plain {
 
 using namespace eventcamera;
-
-inline cv::Mat opencv_picture(const ImageView<std::uint8_t>& picture) {
-  return {picture.height, picture.width, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
-          static_cast<std::size_t>(picture.stride)};
-}
 
 inline void set_opencv_threads(int threads) {
   if (cv::getNumThreads() != threads) cv::setNumThreads(threads);
@@ -46,13 +42,13 @@ class OpenCvFlow {
                        int threads) {
     set_opencv_threads(threads);
     if (method_ == FlowMethod::farneback) {
-      cv::calcOpticalFlowFarneback(opencv_picture(from), opencv_picture(to), flow_, 0.5, 3, 15, 3,
-                                   5, 1.2, 0);
+      cv::calcOpticalFlowFarneback(opencv_image(from), opencv_image(to), flow_, 0.5, 3, 15, 3, 5,
+                                   1.2, 0);
     } else {
       flow_.release();  // otherwise the search would start from the last flow
       // OpenCV's DIS requires contiguous rows.
-      opencv_picture(from).copyTo(from_);
-      opencv_picture(to).copyTo(to_);
+      opencv_image(from).copyTo(from_);
+      opencv_image(to).copyTo(to_);
       dis_->calc(from_, to_, flow_);
     }
     return {flow_.ptr<Flow>(), static_cast<std::ptrdiff_t>(flow_.step[0]), from.width, from.height};
@@ -82,10 +78,10 @@ struct Tracks {
 /// Pyramidal Lucas-Kanade from the last frame to the next.
 class OpenCvTracker {
  public:
-  void push(const ImageView<std::uint8_t>& picture, int threads) {
+  void push(const ImageView<std::uint8_t>& image, int threads) {
     set_opencv_threads(threads);
     std::swap(last_, next_);
-    cv::buildOpticalFlowPyramid(opencv_picture(picture), next_, window, coarsest_level, true,
+    cv::buildOpticalFlowPyramid(opencv_image(image), next_, window, coarsest_level, true,
                                 cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
   }
 

@@ -49,7 +49,7 @@ class SparseSimulator final : public Simulator {
   }
 
   /// The pixels whose change exceeds `threshold`, in raster order.
-  void find_changed(const Picture& now, int threshold) {
+  void find_changed(const FrameView& now, int threshold) {
     threads().for_each(band_count(now.height), [&](int band, int) {
       auto& changed = changed_in_band_[static_cast<std::size_t>(band)];
       changed.clear();
@@ -65,7 +65,7 @@ class SparseSimulator final : public Simulator {
   }
 
   /// The interpolated frame of step j.
-  void interpolate(const Picture& now, int j, Image<std::uint8_t>& between) {
+  void interpolate(const FrameView& now, int j, Image<std::uint8_t>& between) {
     copy(last_.view(), between, threads());
     for (const auto& point : points_)
       if (point.x_at(j) != point.x || point.y_at(j) != point.y)
