@@ -9,8 +9,8 @@ with open(config["jobs"], encoding="utf-8") as file:
 
 
 def clips_of(name):
-    joints = videos[name]["joints"]
-    return [f"{config['clips']}/{name}.d/{number}.json" for number in range(len(joints) + 1 if joints else 0)]
+    cuts = videos[name]["cuts"]
+    return [f"{config['clips']}/{name}.d/{number}.json" for number in range(len(cuts) + 1 if cuts else 0)]
 
 
 def clip_before(wildcards):
@@ -20,8 +20,8 @@ def clip_before(wildcards):
 
 def arguments(wildcards):
     """The file, and where it is cut."""
-    path, joints = (videos[wildcards.name][key] for key in ("path", "joints"))
-    return [f"--file={path}", *(["--joints", *map(str, joints)] if joints else [])]
+    path, cuts = (videos[wildcards.name][key] for key in ("path", "cuts"))
+    return [f"--file={path}", *(["--cuts", *map(str, cuts)] if cuts else [])]
 
 
 rule all:

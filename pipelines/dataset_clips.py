@@ -53,7 +53,7 @@ def has_state(video):
     return _simulator(video) in WITH_STATE
 
 
-def joints_of(video, length):
+def cuts_of(video, length):
     """Returns where to cut a video into clips of this length in seconds; nowhere if it has fewer than two, or fails."""
     if length == 0 or video.recipe.window or os.path.isdir(video.path):
         return []
@@ -81,18 +81,18 @@ def _simulator(video):
     return video.recipe.simulator.split()[0]
 
 
-def remove_others(video, folder, joints):
+def remove_others(video, folder, cuts):
     """Removes clips that were made of another input or in another way."""
     with contextlib.suppress(FileNotFoundError):
         for file in os.listdir(folder):
-            if file.endswith(".json") and _read(os.path.join(folder, file))["of"] != _origin(video, joints):
+            if file.endswith(".json") and _read(os.path.join(folder, file))["of"] != _origin(video, cuts):
                 shutil.rmtree(folder)
                 return
 
 
-def _origin(video, joints):
+def _origin(video, cuts):
     """What the clips of a video are made from."""
-    return {"making": making_of(video), "state": state_of(video.path), "joints": joints, "versions": versions()}
+    return {"making": making_of(video), "state": state_of(video.path), "cuts": cuts, "versions": versions()}
 
 
 def _read(path):
@@ -172,13 +172,13 @@ class ClipFrames(Frames):
         return hashlib.sha256(rows.tobytes()).hexdigest()
 
 
-def make_clip(video, folder, joints, number):
+def make_clip(video, folder, cuts, number):
     """Writes the events of a clip, and then its record."""
     os.makedirs(folder, exist_ok=True)
-    start = joints[number - 1] * SECOND if number > 0 else 0
-    end = joints[number] * SECOND if number < len(joints) else None
+    start = cuts[number - 1] * SECOND if number > 0 else 0
+    end = cuts[number] * SECOND if number < len(cuts) else None
     frames = ClipFrames(start, end)
-    record = {"of": _origin(video, joints)}
+    record = {"of": _origin(video, cuts)}
     with tempfile.NamedTemporaryFile(dir=folder, suffix=".events", delete=False) as file:
         try:
             record |= _simulate(video, folder, number, frames, file)
@@ -237,11 +237,11 @@ def _write(file, buffer, is_discontinuous):
 class Clips:
     """All clips of a video, joined. Raises Doubt if they are not those of the whole."""
 
-    def __init__(self, video, folder, joints):
+    def __init__(self, video, folder, cuts):
         self._video = video
-        self._paths = [os.path.join(folder, f"{number}.events") for number in range(len(joints) + 1)]
-        self._records = [_read(os.path.join(folder, f"{number}.json")) for number in range(len(joints) + 1)]
-        self._check(_origin(video, joints))
+        self._paths = [os.path.join(folder, f"{number}.events") for number in range(len(cuts) + 1)]
+        self._records = [_read(os.path.join(folder, f"{number}.json")) for number in range(len(cuts) + 1)]
+        self._check(_origin(video, cuts))
         self.duration = self._records[0]["duration"]
         self.decoders = set().union(*(record["decoders"] for record in self._records))
         self.frames = Frames()

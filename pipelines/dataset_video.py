@@ -44,7 +44,7 @@ class NpyFile:
         self._count += 1
 
     def _write_header(self):
-        # NumPy leaves room for larger numbers in the first axis.
+        # NumPy pads the header, so that the first axis may grow.
         np.lib.format.write_array_header_1_0(self._file, {
             "descr": np.lib.format.dtype_to_descr(self._first.dtype), "fortran_order": False,
             "shape": (self._count, *self._first.shape)})

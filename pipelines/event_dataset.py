@@ -80,21 +80,21 @@ def options():
                         help="the manifest that verify compares with (default: that of the folder)")
     parser.add_argument("--video", metavar="NAME", help="make one video only, as the jobs do; needs --file")
     parser.add_argument("--file", help="the file of that video")
-    parser.add_argument("--joints", nargs="+", type=int, default=[], help=argparse.SUPPRESS)
+    parser.add_argument("--cuts", nargs="+", type=int, default=[], help=argparse.SUPPRESS)
     parser.add_argument("--clip-number", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
                         help="print the version and exit")
-    chosen = parser.parse_args()
-    chosen.verify = chosen.words[0] == "verify" and len(chosen.words) > 1
-    if len(chosen.words) != 1 + chosen.verify:
-        parser.error(f"give one recipe, not {' '.join(chosen.words)}")
-    if (chosen.video is None) != (chosen.file is None):
+    args = parser.parse_args()
+    args.verify = args.words[0] == "verify" and len(args.words) > 1
+    if len(args.words) != 1 + args.verify:
+        parser.error(f"give one recipe, not {' '.join(args.words)}")
+    if (args.video is None) != (args.file is None):
         parser.error("--video and --file need each other")
-    if chosen.cores < 1 or chosen.retries < 0 or chosen.clip_duration < 0:
+    if args.cores < 1 or args.retries < 0 or args.clip_duration < 0:
         parser.error("--cores is at least 1, --retries and --clip-duration at least 0")
-    chosen.recipe = chosen.words[-1]
-    chosen.output = os.path.abspath(chosen.output or os.path.splitext(chosen.recipe)[0])
-    return chosen
+    args.recipe = args.words[-1]
+    args.output = os.path.abspath(args.output or os.path.splitext(args.recipe)[0])
+    return args
 
 
 def part_of_all(text):
@@ -172,40 +172,40 @@ def profile_options(profile):
     return ["--profile", own, "--cluster-status", shlex.quote(os.path.join(own, "status"))]
 
 
-def clips_root(chosen):
-    return "verified-clips" if chosen.verify else "clips"
+def clips_root(args):
+    return "verified-clips" if args.verify else "clips"
 
 
-def clips_folder(chosen, name):
-    return dataset_clips.folder_of(chosen.output, clips_root(chosen), name)
+def clips_folder(args, name):
+    return dataset_clips.folder_of(args.output, clips_root(args), name)
 
 
-def job_of(chosen, video):
+def job_of(args, video):
     """What the workflow has to know of a video. Clips of another input or recipe are removed."""
-    joints = dataset_clips.joints_of(video, chosen.clip_duration)
-    if joints and (hindrance := dataset_clips.hindrance(video)):
+    cuts = dataset_clips.cuts_of(video, args.clip_duration)
+    if cuts and (hindrance := dataset_clips.hindrance(video)):
         print(f"{video.name}: in one job, not in clips: {hindrance}", file=sys.stderr)
-        joints = []
-    dataset_clips.remove_others(video, clips_folder(chosen, video.name), joints)
-    return {"path": os.path.abspath(video.path), "joints": joints, "in-order": dataset_clips.has_state(video)}
+        cuts = []
+    dataset_clips.remove_others(video, clips_folder(args, video.name), cuts)
+    return {"path": os.path.abspath(video.path), "cuts": cuts, "in-order": dataset_clips.has_state(video)}
 
 
-def make(chosen, videos, lock):
+def make(args, videos, lock):
     """Runs a job for each video, or for each of its clips and then one that joins them. Those that fail
     leave no record."""
-    output, command = chosen.output, [os.path.realpath(__file__)]
-    jobs = os.path.join(output, ".jobs-{}-of-{}.json".format(*chosen.part))
-    with concurrent.futures.ThreadPoolExecutor(chosen.cores) as pool, open(jobs, "w", encoding="utf-8") as file:
-        found = pool.map(lambda video: job_of(chosen, video), videos)
+    output, command = args.output, [os.path.realpath(__file__)]
+    jobs = os.path.join(output, ".jobs-{}-of-{}.json".format(*args.part))
+    with concurrent.futures.ThreadPoolExecutor(args.cores) as pool, open(jobs, "w", encoding="utf-8") as file:
+        found = pool.map(lambda video: job_of(args, video), videos)
         json.dump({video.name: job for video, job in zip(videos, found)}, file)
-    command += ["verify"] * chosen.verify + [os.path.abspath(chosen.recipe), "--output", output]
-    where = profile_options(chosen.profile) if chosen.profile else ["--cores", str(chosen.cores)]
+    command += ["verify"] * args.verify + [os.path.abspath(args.recipe), "--output", output]
+    where = profile_options(args.profile) if args.profile else ["--cores", str(args.cores)]
     snakemake = subprocess.Popen(
         ["snakemake", "--snakefile", os.path.join(HERE, "dataset.smk"), "--directory", output, *where,
-         "--nolock", "--keep-going", "--rerun-incomplete", "--retries", str(chosen.retries), "--nocolor",
+         "--nolock", "--keep-going", "--rerun-incomplete", "--retries", str(args.retries), "--nocolor",
          "--rerun-triggers", "mtime", "--drop-metadata", "--scheduler", "greedy",
-         "--config", f"jobs={jobs}", f"records={records_folder(chosen)}",
-         f"clips={clips_root(chosen)}", f"command={shlex.join(command)}"],
+         "--config", f"jobs={jobs}", f"records={records_folder(args)}",
+         f"clips={clips_root(args)}", f"command={shlex.join(command)}"],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", pass_fds=[lock.fileno()])
     progress = VideosDone(len(videos))
     try:
@@ -223,14 +223,14 @@ def make(chosen, videos, lock):
     return snakemake.returncode
 
 
-def records_folder(chosen):
-    return "verified" if chosen.verify else "records"
+def records_folder(args):
+    return "verified" if args.verify else "records"
 
 
-def failure_of(chosen, name):
+def failure_of(args, name):
     """The last line that the jobs of a video wrote."""
-    logs = glob.glob(glob.escape(clips_folder(chosen, name)) + "/*.log")
-    for path in [*sorted(logs), os.path.join(chosen.output, "logs", f"{name}.log")]:
+    logs = glob.glob(glob.escape(clips_folder(args, name)) + "/*.log")
+    for path in [*sorted(logs), os.path.join(args.output, "logs", f"{name}.log")]:
         with contextlib.suppress(FileNotFoundError), open(path, encoding="utf-8", errors="replace") as file:
             if lines := file.read().strip().splitlines():
                 return lines[-1]
@@ -244,8 +244,8 @@ def tell(kind, lines):
         print(f"{kind}: and {len(lines) - MAX_TOLD} more")
 
 
-def records_of(chosen, videos):
-    found = {video.name: read_json(os.path.join(chosen.output, records_folder(chosen), f"{video.name}.json"))
+def records_of(args, videos):
+    found = {video.name: read_json(os.path.join(args.output, records_folder(args), f"{video.name}.json"))
              for video in videos}
     return {name: record if is_record(record) else None for name, record in found.items()}
 
@@ -264,34 +264,34 @@ def is_record(record):
 # the commands
 
 
-def make_one(chosen, recipe):
-    name = chosen.video
-    video = ec.DatasetVideo(recipe, name, chosen.file)
-    folder, clips, notes = clips_folder(chosen, name), None, {}
-    if chosen.clip_number is not None:
-        dataset_clips.make_clip(video, folder, chosen.joints, chosen.clip_number)
+def make_one(args, recipe):
+    name = args.video
+    video = ec.DatasetVideo(recipe, name, args.file)
+    folder, clips, notes = clips_folder(args, name), None, {}
+    if args.clip_number is not None:
+        dataset_clips.make_clip(video, folder, args.cuts, args.clip_number)
         return
-    if chosen.joints:
+    if args.cuts:
         try:
-            clips = dataset_clips.Clips(video, folder, chosen.joints)
+            clips = dataset_clips.Clips(video, folder, args.cuts)
         except dataset_clips.Doubt as doubt:
             notes = {"whole": f"made as a whole, not in clips: {doubt}"}
-    record = record_of(video, chosen.output, keep=not chosen.verify, clips=clips)
-    write_record(path_in(chosen.output, records_folder(chosen), name, "json"), record | notes)
+    record = record_of(video, args.output, keep=not args.verify, clips=clips)
+    write_record(path_in(args.output, records_folder(args), name, "json"), record | notes)
     shutil.rmtree(folder, ignore_errors=True)
 
 
-def remove_clips(chosen, videos):
+def remove_clips(args, videos):
     """Of videos that are made, in case a job was killed before it did so."""
     for video in videos:
-        folder = clips_folder(chosen, video.name)
+        folder = clips_folder(args, video.name)
         shutil.rmtree(folder, ignore_errors=True)
         with contextlib.suppress(OSError):  # other clips are there, or none have been
             os.removedirs(os.path.dirname(folder))
 
 
-def selected(chosen, videos):
-    number, count = chosen.part
+def selected(args, videos):
+    number, count = args.part
     return [video for video in videos if int(uniform_number(video.name, "part") * count) == number - 1]
 
 
@@ -303,20 +303,20 @@ def expect_own_folder(output, videos):
             raise RuntimeError(f"{output} has {video.path}, a video of the recipe; choose another folder with --output")
 
 
-def make_all(chosen, recipe):
+def make_all(args, recipe):
     """The exit status."""
     videos = list(ec.Dataset(recipe))
-    expect_own_folder(chosen.output, videos)
-    os.makedirs(chosen.output, exist_ok=True)
-    with locked(chosen.output, chosen.part) as lock:
-        if chosen.part == (1, 1):
-            shutil.rmtree(os.path.join(chosen.output, "unfinished"), ignore_errors=True)
-        mine = selected(chosen, videos)
-        stale = stale_videos(mine, records_of(chosen, mine), chosen.output)
-        status = make(chosen, stale, lock) if stale else 0
-        records = records_of(chosen, videos)
-        remove_clips(chosen, [video for video in mine if records[video.name]])
-        write_reports(chosen.output, recipe, videos, records)
+    expect_own_folder(args.output, videos)
+    os.makedirs(args.output, exist_ok=True)
+    with locked(args.output, args.part) as lock:
+        if args.part == (1, 1):
+            shutil.rmtree(os.path.join(args.output, "unfinished"), ignore_errors=True)
+        mine = selected(args, videos)
+        stale = stale_videos(mine, records_of(args, mine), args.output)
+        status = make(args, stale, lock) if stale else 0
+        records = records_of(args, videos)
+        remove_clips(args, [video for video in mine if records[video.name]])
+        write_reports(args.output, recipe, videos, records)
     refused = [f"{name}: {record['refused']}" for name, record in records.items() if record and "refused" in record]
     failed = [video.name for video in stale if not records[video.name]]
     tell("warning", [f"{name}: {warning}" for name, record in records.items() if record
@@ -324,41 +324,41 @@ def make_all(chosen, recipe):
     tell("note", [f"{video.name}: {records[video.name]['whole']}" for video in stale
                   if "whole" in (records[video.name] or {})])
     tell("refused", refused)
-    tell("failed", [f"{name}: {failure_of(chosen, name)}" for name in failed])
+    tell("failed", [f"{name}: {failure_of(args, name)}" for name in failed])
     made = sum(1 for video in stale if records[video.name] and "written" in records[video.name])
     absent = sum(1 for record in records.values() if not record) - len(failed)
     print(f"{len(videos)} videos: {made} made, {len(mine) - len(stale)} unchanged, {len(refused)} refused,"
-          f" {len(failed)} failed, {absent} not made yet; {chosen.output}")
+          f" {len(failed)} failed, {absent} not made yet; {args.output}")
     if status != 0 and not failed:
-        raise RuntimeError(f"Snakemake ended with status {status}; see {chosen.output}/snakemake.log")
+        raise RuntimeError(f"Snakemake ended with status {status}; see {args.output}/snakemake.log")
     return 1 if refused or failed else 0
 
 
-def verify_all(chosen, recipe):
+def verify_all(args, recipe):
     """The exit status."""
-    manifest = read_json(chosen.manifest or os.path.join(chosen.output, "manifest.json"))
+    manifest = read_json(args.manifest or os.path.join(args.output, "manifest.json"))
     if (not isinstance(manifest, dict) or not isinstance(manifest.get("videos"), list)
             or not all(map(is_record, manifest["videos"])) or not isinstance(manifest.get("refused", {}), dict)):
-        raise RuntimeError(f"{chosen.manifest or chosen.output}: no manifest; make the data set first, or give one"
+        raise RuntimeError(f"{args.manifest or args.output}: no manifest; make the data set first, or give one"
                            " with --manifest")
     expected = {one["name"]: one for one in manifest["videos"]}
-    videos = selected(chosen, ec.Dataset(recipe))
+    videos = selected(args, ec.Dataset(recipe))
     present = [video for video in videos if video.name in expected]
-    expect_own_folder(chosen.output, videos)
-    os.makedirs(chosen.output, exist_ok=True)
-    with locked(chosen.output, chosen.part) as lock:
-        for folder in records_folder(chosen), clips_root(chosen):
-            shutil.rmtree(os.path.join(chosen.output, folder), ignore_errors=True)
+    expect_own_folder(args.output, videos)
+    os.makedirs(args.output, exist_ok=True)
+    with locked(args.output, args.part) as lock:
+        for folder in records_folder(args), clips_root(args):
+            shutil.rmtree(os.path.join(args.output, folder), ignore_errors=True)
         if present:
-            make(chosen, present, lock)
-        records = records_of(chosen, present)
-        remove_clips(chosen, [video for video in present if records[video.name]])
+            make(args, present, lock)
+        records = records_of(args, present)
+        remove_clips(args, [video for video in present if records[video.name]])
     differences = [f"{name}: not among the videos" for name in expected
-                   if chosen.part == (1, 1) and name not in records]
+                   if args.part == (1, 1) and name not in records]
     differences += [f"{video.name}: not in the manifest" for video in videos
                     if video.name not in expected and video.name not in manifest.get("refused", {})]
     for name, record in records.items():
-        difference = difference_of(expected[name], record) if record else failure_of(chosen, name)
+        difference = difference_of(expected[name], record) if record else failure_of(args, name)
         if difference:
             differences.append(f"{name}: {difference}")
     tell("different", differences)
@@ -382,15 +382,15 @@ def difference_of(expected, record):
 
 
 def main():
-    chosen = options()
+    args = options()
     find_plugins()
-    recipe = ec.Recipe.load(chosen.recipe)
-    if chosen.video:
-        make_one(chosen, recipe)
+    recipe = ec.Recipe.load(args.recipe)
+    if args.video:
+        make_one(args, recipe)
         return 0
     if not shutil.which("snakemake"):
         raise RuntimeError("Snakemake is missing; on Debian, install: snakemake")
-    return verify_all(chosen, recipe) if chosen.verify else make_all(chosen, recipe)
+    return verify_all(args, recipe) if args.verify else make_all(args, recipe)
 
 
 if __name__ == "__main__":

@@ -46,8 +46,8 @@ class Row:
 
 
 def counts_per_pixel(sensor, events):
-    place = events["y"].astype(np.int64) * sensor.width + events["x"]
-    return np.bincount(place, minlength=sensor.width * sensor.height).reshape(sensor.height, sensor.width)
+    counts = np.bincount(sensor.pixels_of(events), minlength=sensor.width * sensor.height)
+    return counts.reshape(sensor.height, sensor.width)
 
 
 def spread_by_chance(sensor, events):
@@ -119,9 +119,9 @@ def print_table(real, simulated, rows):
 # the page
 
 
-def picture(counts, most):
+def map_of(counts, max_count):
     """A map of events per pixel as a PNG in a data URI; the square root of the count is the brightness."""
-    encoded = png_of(255 * np.sqrt(np.minimum(counts / most, 1)))
+    encoded = png_of(255 * np.sqrt(np.minimum(counts / max_count, 1)))
     return "data:image/png;base64," + base64.b64encode(encoded).decode()
 
 
@@ -165,9 +165,9 @@ def chart(title, x_title, y_title, curves, logarithmic=(False, False)):
 
 def intervals_of(sensor, events):
     """The times between successive events of a pixel, at least half a microsecond."""
-    place = events["y"].astype(np.int64) * sensor.width + events["x"]
-    order = np.argsort(place, kind="stable")
-    same = np.diff(place[order]) == 0
+    pixels = sensor.pixels_of(events)
+    order = np.argsort(pixels, kind="stable")
+    same = np.diff(pixels[order]) == 0
     return np.maximum(np.diff(events["t"][order])[same], 0.5)
 
 
@@ -246,7 +246,7 @@ svg rect { fill: none; stroke: #8888 } polyline { fill: none; stroke-width: 2 }
 def page_of(sensor, real, simulated, rows, charts):
     streams = [real] + simulated
     maps = [counts_per_pixel(sensor, stream.events) for stream in streams]
-    most = max(np.quantile(maps[0], 0.999), 1)
+    max_count = max(np.quantile(maps[0], 0.999), 1)
     names = [html.escape(stream.name) for stream in streams]
     header = "".join(f'<th style="border-bottom: 3px solid {COLOURS[i % len(COLOURS)]}">{name}</th>'
                      for i, name in enumerate([f"{names[0]}, ceiling"] + names[1:]))
@@ -254,7 +254,7 @@ def page_of(sensor, real, simulated, rows, charts):
         f"<tr><th>{row.title}</th><td>{row.ceiling}</td>"
         + "".join(f'<td class="beyond">{cell} *</td>' if beyond else f"<td>{cell}</td>"
                   for cell, beyond in zip(row.cells, row.beyond)) + "</tr>" for row in rows)
-    figures = "".join(f'<figure><figcaption>{name}</figcaption><img alt="events per pixel" src="{picture(each, most)}">'
+    figures = "".join(f'<figure><figcaption>{name}</figcaption><img alt="events per pixel" src="{map_of(each, max_count)}">'
                       "</figure>" for name, each in zip(names, maps))
     return ('<!DOCTYPE html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
             f"<title>Realism of {', '.join(names[1:])}</title><style>{STYLE}</style><h1>Beside {names[0]}</h1>"
@@ -300,33 +300,33 @@ def span_of(streams, start, end):
 
 def main():
     Gst.init(None)
-    chosen = options()
+    args = options()
     find_plugins()
-    if chosen.html:
-        expect_writable(chosen.html, filter(None, [chosen.real, *chosen.simulated, chosen.mask]))
+    if args.html:
+        expect_writable(args.html, filter(None, [args.real, *args.simulated, args.mask]))
     sensor = Sensor()
     streams = []
-    for path in [chosen.real] + chosen.simulated:
+    for path in [args.real] + args.simulated:
         streams.append(Stream(os.path.basename(path), read_recording(path, sensor)))
-        if len(streams) == 1 and chosen.mask:
-            sensor.mask = read_mask(chosen.mask, sensor)
+        if len(streams) == 1 and args.mask:
+            sensor.mask = read_mask(args.mask, sensor)
         streams[-1].events = sensor.of_camera(streams[-1].events)
         if len(streams[-1].events) == 0:
-            raise RuntimeError(f"{path}: no events" + (" where the mask is white" if chosen.mask else ""))
-    span = span_of(streams, getattr(chosen, "from"), chosen.to)
+            raise RuntimeError(f"{path}: no events" + (" where the mask is white" if args.mask else ""))
+    span = span_of(streams, getattr(args, "from"), args.to)
     for stream in streams:
         stream.events = span.of(stream.events)
     real, *simulated = streams
     if len(real.events) == 0:
-        raise RuntimeError(f"{chosen.real}: no events in the compared time")
-    travels = travels_of(chosen.video, sensor, span) if chosen.html and chosen.video else None
+        raise RuntimeError(f"{args.real}: no events in the compared time")
+    travels = travels_of(args.video, sensor, span) if args.html and args.video else None
     for stream in simulated:
         stream.figures = compare(sensor, real.events, stream.events, span)
     rows = table_of(sensor, real, simulated)
     print_table(real, simulated, rows)
-    if chosen.html:
+    if args.html:
         page = page_of(sensor, real, simulated, rows, charts_of(sensor, real, simulated, travels))
-        with open(chosen.html, "w", encoding="utf-8") as file:
+        with open(args.html, "w", encoding="utf-8") as file:
             file.write(page)
 
 

@@ -50,6 +50,10 @@ class Sensor:
             return events
         return events[self.mask[events["y"], events["x"]]]
 
+    def pixels_of(self, events):
+        """The pixel of each event, numbered in raster order."""
+        return events["y"].astype(np.int64) * self.width + events["x"]
+
 
 @dataclass
 class Video(Sensor):

@@ -113,17 +113,17 @@ def main():
     parser.add_argument("--password", help="password of that user")
     parser.add_argument("--certificate", metavar="PEM",
                         help="TLS certificate and its private key, in one file")
-    chosen = parser.parse_args()
-    if (chosen.user is None) != (chosen.password is None):
+    args = parser.parse_args()
+    if (args.user is None) != (args.password is None):
         parser.error("--user and --password need each other")
-    if chosen.user == "":
+    if args.user == "":
         parser.error("--user is empty")
     Gst.init(None)
     find_elements(ELEMENTS, "gstreamer1.0-plugins-good")
-    server = Server(chosen.device, chosen.simulator)
-    if chosen.user is not None or chosen.certificate:
-        server.protect(chosen.user, chosen.password, chosen.certificate)
-    server.run(chosen.address, chosen.port, "rtsps" if chosen.certificate else "rtsp")
+    server = Server(args.device, args.simulator)
+    if args.user is not None or args.certificate:
+        server.protect(args.user, args.password, args.certificate)
+    server.run(args.address, args.port, "rtsps" if args.certificate else "rtsp")
 
 
 if __name__ == "__main__":

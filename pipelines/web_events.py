@@ -169,7 +169,7 @@ class Viewer:
             self._websocket.close(Soup.WebsocketCloseCode.BAD_DATA, reason[:100])
 
     def _fail(self, _, message):
-        print(f"A viewer is disconnected: {message.parse_error()[0].message}", file=sys.stderr)
+        print(f"Disconnected a viewer: {message.parse_error()[0].message}", file=sys.stderr)
         self._offered()
         self.close()
 
@@ -219,8 +219,8 @@ class Server:
             self._http.disconnect()
 
     def _check(self, message):
-        """Rejects requests that cannot be parsed, and those for or from another site: a page of a stranger
-        may have any name resolve to this machine, but not an IP address."""
+        """Rejects requests that cannot be parsed, and those for or from another site, against DNS rebinding: an
+        attacker's host name may resolve to this machine, but an IP address or a known name is not theirs."""
         headers = message.get_request_headers()
         host = headers.get_one("Host")
         message.get_response_headers().replace("Connection", "close")  # libsoup keeps closed ones otherwise
@@ -230,12 +230,12 @@ class Server:
             if host is None or name is None:
                 raise ValueError("no Host")
             origin = headers.get_one("Origin")
-            is_strange = origin is not None and urlsplit(origin).netloc != host
+            is_cross_origin = origin is not None and urlsplit(origin).netloc != host
         except ValueError as cause:
-            print(f"A bad request is refused: {cause}", file=sys.stderr)
+            print(f"Refused a malformed request: {cause}", file=sys.stderr)
             message.set_status(Soup.Status.BAD_REQUEST, None)
             return
-        if is_strange or not (name in self._hosts or is_address(name)):
+        if is_cross_origin or not (name in self._hosts or is_address(name)):
             message.set_status(Soup.Status.FORBIDDEN, None)
 
     def _serve_page(self, _, message, path, query):
@@ -268,10 +268,10 @@ def main():
     parser.add_argument("--host", action="append", default=[],
                         help="name by which browsers may call this machine, besides localhost, its host name and"
                         " IP addresses; may be repeated")
-    chosen = parser.parse_args()
+    args = parser.parse_args()
     Gst.init(None)
     find_elements(ELEMENTS, "gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-nice")
-    Server(chosen.device, chosen.simulator, chosen.host).run(chosen.address, chosen.port)
+    Server(args.device, args.simulator, args.host).run(args.address, args.port)
 
 
 if __name__ == "__main__":

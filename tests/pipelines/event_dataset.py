@@ -310,7 +310,7 @@ class Outputs(unittest.TestCase):
 class Clips(unittest.TestCase):
     """Videos of four seconds, in clips of one."""
 
-    JOINTS = [1, 2, 3]
+    CUTS = [1, 2, 3]
 
     def make_video(self, folder, framerate=25):
         path = path_of(f"{folder}/videos/coded.mp4")
@@ -323,8 +323,8 @@ class Clips(unittest.TestCase):
         """The folder of the clips of a video, all of which are made."""
         folder = dataset_clips.folder_of(path_of("clips/made"), "clips", video.name)
         shutil.rmtree(folder, ignore_errors=True)
-        for number in range(len(self.JOINTS) + 1):
-            dataset_clips.make_clip(video, folder, self.JOINTS, number)
+        for number in range(len(self.CUTS) + 1):
+            dataset_clips.make_clip(video, folder, self.CUTS, number)
         return folder
 
     def video(self, text, framerate=25):
@@ -342,9 +342,9 @@ class Clips(unittest.TestCase):
         }.items():
             with self.subTest(simulator):
                 video = self.video(f"simulator: {simulator}\noutput: {output}")
-                self.assertEqual(dataset_clips.joints_of(video, 1), self.JOINTS)
+                self.assertEqual(dataset_clips.cuts_of(video, 1), self.CUTS)
                 self.assertEqual(dataset_clips.hindrance(video), "")
-                clips = dataset_clips.Clips(video, self.folder_of_clips(video), self.JOINTS)
+                clips = dataset_clips.Clips(video, self.folder_of_clips(video), self.CUTS)
                 joined = record_of(video, path_of("clips/made"), clips=clips)
                 self.assertEqual(joined, record_of(video, path_of("clips/whole")))
                 self.assertGreater(joined["figures"]["events"], 1000)
@@ -374,7 +374,7 @@ class Clips(unittest.TestCase):
         with open(f"{folder}/2.json", "w", encoding="utf-8") as file:
             json.dump(record, file)
         event_dataset(video.recipe.path, "--output", path_of("clips/made"), "--video", video.name, "--file", video.path,
-                      "--joints", *map(str, self.JOINTS))
+                      "--cuts", *map(str, self.CUTS))
         with open(path_of("clips/made/records/coded.json"), encoding="utf-8") as file:
             made = json.load(file)
         self.assertEqual(made.pop("whole"), "made as a whole, not in clips: a seek leads to other frames")
@@ -386,7 +386,7 @@ class Clips(unittest.TestCase):
         for spoil in (lambda path: os.truncate(path, 100), os.remove):
             spoil(f"{folder}/1.events")
             with self.assertRaisesRegex(dataset_clips.Doubt, "the events of clip 1 are missing or cut off"):
-                dataset_clips.Clips(video, folder, self.JOINTS)
+                dataset_clips.Clips(video, folder, self.CUTS)
 
     def test_are_not_made_where_they_could_differ(self):
         for text, reason in {
@@ -397,9 +397,9 @@ class Clips(unittest.TestCase):
             self.assertEqual(dataset_clips.hindrance(self.video(text)), reason)
         video = self.video("simulator: eventsim-dvs", framerate=3)
         with self.assertRaisesRegex(dataset_clips.Doubt, "a second of it has fewer than 4 frames"):
-            dataset_clips.Clips(video, self.folder_of_clips(video), self.JOINTS)
-        self.assertEqual(dataset_clips.joints_of(video, 300), [])
-        self.assertEqual(dataset_clips.joints_of(video, 0), [])
+            dataset_clips.Clips(video, self.folder_of_clips(video), self.CUTS)
+        self.assertEqual(dataset_clips.cuts_of(video, 300), [])
+        self.assertEqual(dataset_clips.cuts_of(video, 0), [])
 
 
 class Recipes(unittest.TestCase):
