@@ -17,24 +17,15 @@ import functools
 import os
 import sys
 import time
-from dataclasses import dataclass, field
 
 # First, since it says which packages are missing.
-from event_streams import (GLib, Gst, Span, compare, counts, delayed, expect_writable, read_mask, read_recording,
+from event_streams import (GLib, Gst, Span, compare, delayed, expect_writable, read_mask, read_recording,
                            read_video, seconds, simulate, until)
 import numpy as np
 from plugins import find_plugins
 from progress import Progress
+from threshold_search import ROUGH_PRECISION, Setting, find_thresholds
 
-# Thresholds are found when the event counts are this close, relatively; those that only rate other
-# properties, when they are roughly. Where none are, because frames have whole grey levels, the search
-# restarts at most MAX_ROUNDS times.
-PRECISION = 1e-3
-ROUGH_PRECISION = 1e-2
-MAX_ROUNDS = 3
-MAX_TRIALS = 60
-# How fast event counts change with thresholds at first, in a log-log plot.
-USUAL_SLOPE = -1.5
 # Parts of the calibrated time for cross-validation.
 PARTS = 4
 # Values tried for eventsim-dvs: the response to the frames, with the offset of a logarithmic one as a share of white;
@@ -68,124 +59,6 @@ MIN_GAIN = 0.002
 MAX_BALANCE = 1.1
 # The element whose settings a profile holds.
 PROFILED = "eventsim-dvs"
-
-
-@dataclass
-class Setting:
-    """An element with its properties, but for its thresholds and those that are shares of their mean."""
-
-    element: str
-    shares: dict = field(default_factory=dict)
-
-    def __str__(self):
-        return " ".join([self.element] + [f"{name}={share:g}*threshold" for name, share in self.shares.items()])
-
-    def with_thresholds(self, thresholds):
-        values = {name: share * np.mean(thresholds) for name, share in self.shares.items()}
-        values |= {"positive-threshold": thresholds[0], "negative-threshold": thresholds[1]}
-        return " ".join([self.element] + [f"{name}={value:.6g}" for name, value in values.items()])
-
-
-def threshold_limits(element):
-    """The minimum, maximum and default of an element's thresholds."""
-    made = Gst.ElementFactory.make(element.split()[0])
-    if made is None:
-        raise RuntimeError(f"there is no element \"{element.split()[0]}\"")
-    spec = made.find_property("positive-threshold")
-    if spec is None:
-        raise RuntimeError(f"\"{element}\" has no thresholds")
-    return spec.minimum, spec.maximum, spec.default_value
-
-
-class ThresholdSearch:
-    """Finds the thresholds at which a simulator generates as many ON and OFF events as there are in `goal`, both
-    at once, from the values `first`: secant steps in a log-log plot as long as they at least halve the error,
-    else bisection."""
-
-    def __init__(self, goal, limits, first, precision):
-        minimum, self.maximum, default = limits
-        self.minimum = max(minimum, default / 100)
-        self.goal, self.precision = goal, precision
-        self.low, self.high = np.full(2, self.minimum), np.full(2, min(self.maximum, default * 20))
-        self.next = np.sqrt(self.low * self.high) if first is None else first
-        self.trusts_slope = first is not None  # the usual one, after the first trial
-        # The best threshold of each polarity need not be the best pair: an event of one polarity also resets the
-        # reference level for the other.
-        self.each, self.each_error = np.full(2, default), np.full(2, np.inf)
-        self.best, self.best_error = np.full(2, default), np.full(2, np.inf)
-        self.before = None  # thresholds and log ratios of the last trial
-        self.rounds = 0
-
-    def is_closed(self):
-        """True if the bounds leave only the best threshold of each polarity to try."""
-        return (self.high / self.low < 1 + self.precision).all()
-
-    def pair(self):
-        """The thresholds to try next."""
-        return self.each.copy() if self.is_closed() else self.next
-
-    def take(self, made):
-        """Takes the numbers of events at these thresholds. True if the search ends."""
-        thresholds, closed = self.pair(), self.is_closed()
-        log_ratio = np.log(np.maximum(made, 0.5) / self.goal)
-        self._keep(thresholds, np.abs(log_ratio))
-        if np.abs(log_ratio).max() < self.precision:
-            return True
-        if closed:
-            self.rounds += 1
-            if self.best_error.max() < 0.01 or self.rounds == MAX_ROUNDS:
-                return True
-            self._restart()
-        else:
-            more = made > self.goal
-            self.low, self.high = np.where(more, thresholds, self.low), np.where(more, self.high, thresholds)
-        self._step(thresholds, log_ratio)
-        return False
-
-    def _keep(self, thresholds, error):
-        self.each = np.where(error < self.each_error, thresholds, self.each)
-        self.each_error = np.minimum(error, self.each_error)
-        if error.sum() < self.best_error.sum():
-            self.best, self.best_error = thresholds, error
-
-    def _restart(self):
-        """Around the best pair."""
-        self.low, self.high = np.maximum(self.best / 1.3, self.minimum), np.minimum(self.best * 1.3, self.maximum)
-        self.each, self.each_error = self.best, self.best_error
-        self.before = None
-
-    def _step(self, thresholds, log_ratio):
-        slope, converging = np.full(2, USUAL_SLOPE), np.full(2, self.trusts_slope)
-        self.trusts_slope = False
-        if self.before is not None:
-            before, log_before = self.before
-            with np.errstate(divide="ignore", invalid="ignore"):
-                slope = (log_ratio - log_before) / np.log(thresholds / before)
-            converging = (np.abs(log_ratio) < np.abs(log_before) / 2) & (slope > -6) & (slope < -0.3)
-            slope = np.where(converging, slope, USUAL_SLOPE)
-        self.before = thresholds, log_ratio
-        step = thresholds * np.exp(-log_ratio / slope)
-        within = converging & (step > self.low) & (step < self.high)
-        self.next = np.where(within, step, np.sqrt(self.low * self.high))
-
-
-def find_thresholds(simulated_by, recorded, spans, setting, progress, first=None, precision=PRECISION, share=1.0):
-    """The thresholds at which the simulator generates this share of the ON and OFF events that the recording has
-    within the spans."""
-    goal = share * sum(counts(span.of(recorded)) for span in spans)
-    if goal.min() == 0:
-        raise RuntimeError("the recording has no events, or events of only one polarity")
-    search = ThresholdSearch(goal, threshold_limits(setting.element), first, precision)
-    for trial in range(MAX_TRIALS):
-        thresholds = search.pair()
-        simulated = simulated_by(setting.with_thresholds(thresholds))
-        made = sum(counts(span.of(simulated)) for span in spans)
-        progress.tell(f"{setting}: trial {trial + 1}, thresholds {thresholds[0]:.4g} and"
-                      f" {thresholds[1]:.4g}, {made[0] / goal[0]:.3f} of the ON and"
-                      f" {made[1] / goal[1]:.3f} of the OFF events")
-        if search.take(made):
-            break
-    return search.best
 
 
 def likeness(figures):
@@ -372,9 +245,9 @@ def find_exposure_lead(video, recorded, span):
     if not seen:
         return None
     width = 100
-    longest = max(frame - before for before, frame in zip(times, times[1:]))
+    max_interval = max(frame - before for before, frame in zip(times, times[1:]))
     leads = np.concatenate([frame - events for frame, events in seen])
-    heights, edges = np.histogram(leads, np.arange(0, longest + width, width))
+    heights, edges = np.histogram(leads, np.arange(0, max_interval + width, width))
     burst = int(np.argmax(heights))
     if heights[burst] < 50 * len(seen) or heights[burst] < 10 * np.median(heights):
         return None
@@ -390,7 +263,7 @@ def lag_of_polarities(video, recorded):
     times = np.array([frame.time for frame in video.frames]) / 1000
     greys = [np.log(video.luma(frame).ravel() + 10) for frame in video.frames]
     changes = [after - before for before, after in zip(greys, greys[1:])]
-    place = recorded["y"].astype(np.int64) * video.width + recorded["x"]
+    pixels = video.pixels_of(recorded)
     sign = np.where(recorded["p"], 1.0, -1.0)
     spacing = np.median(np.diff(times))
 
@@ -400,7 +273,7 @@ def lag_of_polarities(video, recorded):
             if start < recorded["t"][0] - spacing / 4 or end > recorded["t"][-1] + spacing / 4:
                 continue
             first, last = np.searchsorted(recorded["t"], [start, end], side="right")
-            signs = np.bincount(place[first:last], sign[first:last], len(change))
+            signs = np.bincount(pixels[first:last], sign[first:last], len(change))
             if signs.std() > 0 and change.std() > 0:
                 found.append(np.corrcoef(signs, change)[0, 1])
         return np.mean(found) if found else -1
@@ -529,40 +402,40 @@ def span_of(video, recorded, lag, start, end):
 
 def main():
     Gst.init(None)
-    chosen = options()
+    args = options()
     find_plugins()
-    if chosen.profile and chosen.element.split()[:1] != [PROFILED]:
-        raise RuntimeError(f"only {PROFILED} has profiles, {chosen.element.split()[0]} has none")
-    for path in filter(None, (chosen.profile, chosen.map)):
-        expect_writable(path, filter(None, (chosen.video, chosen.recording, chosen.mask)))
+    if args.profile and args.element.split()[:1] != [PROFILED]:
+        raise RuntimeError(f"only {PROFILED} has profiles, {args.element.split()[0]} has none")
+    for path in filter(None, (args.profile, args.map)):
+        expect_writable(path, filter(None, (args.video, args.recording, args.mask)))
     progress = Progress()
-    start = getattr(chosen, "from")
-    ends = [end for end in (chosen.to, chosen.measure_to) if end is not None]
-    progress.tell(f"reading {chosen.video}")
-    video = read_video(chosen.video, start or 0, max(ends) if len(ends) else float("inf"))
+    start = getattr(args, "from")
+    ends = [end for end in (args.to, args.measure_to) if end is not None]
+    progress.tell(f"reading {args.video}")
+    video = read_video(args.video, start or 0, max(ends) if len(ends) else float("inf"))
     if len(video.frames) < 2:
-        raise RuntimeError(f"{chosen.video}: fewer than two frames")
-    progress.tell(f"reading {chosen.recording}")
-    if chosen.mask:
-        video.mask = read_mask(chosen.mask, video)
-    recorded = video.of_camera(read_recording(chosen.recording, video))
+        raise RuntimeError(f"{args.video}: fewer than two frames")
+    progress.tell(f"reading {args.recording}")
+    if args.mask:
+        video.mask = read_mask(args.mask, video)
+    recorded = video.of_camera(read_recording(args.recording, video))
     if len(recorded) == 0:
-        raise RuntimeError(f"{chosen.recording}: no events" + (" where the mask is white" if chosen.mask else ""))
+        raise RuntimeError(f"{args.recording}: no events" + (" where the mask is white" if args.mask else ""))
     progress.end()
-    if chosen.lag == "find":
-        span = span_of(video, recorded, 0, start, chosen.to)
-        lag = find_lag(until(video, span.end), recorded, span, chosen.element, progress)
+    if args.lag == "find":
+        span = span_of(video, recorded, 0, start, args.to)
+        lag = find_lag(until(video, span.end), recorded, span, args.element, progress)
     else:
-        lag = chosen.lag
+        lag = args.lag
     video = delayed(video, lag)
-    span = span_of(video, recorded, lag, start, chosen.to)
+    span = span_of(video, recorded, lag, start, args.to)
     measured = span
-    if chosen.measure_from is not None or chosen.measure_to is not None:
-        measured = span_of(video, recorded, lag, chosen.measure_from, chosen.measure_to)
+    if args.measure_from is not None or args.measure_to is not None:
+        measured = span_of(video, recorded, lag, args.measure_from, args.measure_to)
     visible = video.visible(recorded)
     hidden = 1 - len(measured.of(visible)) / max(len(measured.of(recorded)), 1)
     recorded = visible
-    element = calibrate(until(video, span.end), recorded, span, chosen.element, progress)
+    element = calibrate(until(video, span.end), recorded, span, args.element, progress)
     progress.end()
     simulated = simulate(video, element)
     figures = compare(video, recorded, simulated, measured)
@@ -572,10 +445,10 @@ def main():
         print(f"{100 * hidden:.0f} % of the recorded events are left out: the frames are overexposed there.")
     print(describe(element, figures), flush=True)
     # After the result, so that it stays if a disk is full.
-    if chosen.profile:
-        write_profile(chosen.profile, element, chosen.video, chosen.recording)
-    if chosen.map:
-        compare(video, recorded, simulated, measured, chosen.map)
+    if args.profile:
+        write_profile(args.profile, element, args.video, args.recording)
+    if args.map:
+        compare(video, recorded, simulated, measured, args.map)
 
 
 if __name__ == "__main__":
