@@ -21,7 +21,7 @@ import numpy
 LAUNCH = os.environ["GST_LAUNCH"]
 THUMBNAIL = os.path.join(os.environ["BUILD"], "pipelines", "event-thumbnail")
 os.environ.pop("MALLOC_PERTURB_", None)  # else all memory is written when it is allocated
-LARGEST = 16384
+MAX_SIDE = 16384
 EVENTS = "application/x-event-camera,format=XYTP"
 CHAINS = {
     "player": "playbin uri={uri} video-sink=fakesink",
@@ -78,7 +78,7 @@ def make_files():
     """Writes the files to the current folder."""
     few = [(1, 10, 10, 1), (2, 16000, 16000, 1), (3, 5, 5, 1)]
     max_guessed = scattered(4096, 2000)
-    wide = scattered(LARGEST, 2000)
+    wide = scattered(MAX_SIDE, 2000)
     at_once = [(0, 5, 5, 1)] * 10_000_000
     write_csv("few.csv", few)
     write_csv("beyond.csv", [(1, 10, 10, 1), (2, 20000, 20000, 1), (3, 5, 5, 1)])
@@ -87,10 +87,10 @@ def make_files():
     numpy.save("guessed.npy", table(max_guessed))
     numpy.savez("few.npz", **columns(few))
     numpy.savez("guessed.npz", **columns(max_guessed))
-    numpy.savez("stated.npz", width=LARGEST, height=LARGEST, **columns(wide))
+    numpy.savez("stated.npz", width=MAX_SIDE, height=MAX_SIDE, **columns(wide))
     numpy.savez_compressed("at-once.npz", **columns(at_once))
-    write_dat("stated.dat", wide, LARGEST)
-    write_hdf5("stated.h5", wide, LARGEST)
+    write_dat("stated.dat", wide, MAX_SIDE)
+    write_hdf5("stated.h5", wide, MAX_SIDE)
     write_hdf5("at-once.h5", at_once, 640)
 
 

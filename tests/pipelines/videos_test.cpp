@@ -129,11 +129,11 @@ Image<std::uint8_t> part(const Image<std::uint8_t>& last, const Image<std::uint8
 
 /// Minimum gradient over all directions around each pixel (15x15, root mean square, grey levels per
 /// pixel).
-cv::Mat min_slopes(const Image<std::uint8_t>& picture) {
+cv::Mat min_slopes(const Image<std::uint8_t>& image) {
   cv::Mat x;
   cv::Mat y;
-  cv::Scharr(opencv_image(picture.view()), x, CV_32F, 1, 0, 1 / 32.0);
-  cv::Scharr(opencv_image(picture.view()), y, CV_32F, 0, 1, 1 / 32.0);
+  cv::Scharr(opencv_image(image.view()), x, CV_32F, 1, 0, 1 / 32.0);
+  cv::Scharr(opencv_image(image.view()), y, CV_32F, 0, 1, 1 / 32.0);
   const auto mean = [](const cv::Mat& products) {
     cv::Mat result;
     cv::boxFilter(products, result, -1, {15, 15});
@@ -216,14 +216,14 @@ TEST(Tracks, FitAsWellAsOpenCvs) {
 }
 
 /// Mean distance between two flows at textured pixels: a gradient of 4 grey levels per pixel.
-double distance(const Image<std::uint8_t>& picture, const ImageView<Flow>& a,
+double distance(const Image<std::uint8_t>& image, const ImageView<Flow>& a,
                 const ImageView<Flow>& b) {
   double sum = 0;
   int count = 0;
-  for (int y = 1; y < picture.height() - 1; ++y) {
-    for (int x = 1; x < picture.width() - 1; ++x) {
-      if (std::hypot(picture.at(x + 1, y) - picture.at(x - 1, y),
-                     picture.at(x, y + 1) - picture.at(x, y - 1)) < 8)
+  for (int y = 1; y < image.height() - 1; ++y) {
+    for (int x = 1; x < image.width() - 1; ++x) {
+      if (std::hypot(image.at(x + 1, y) - image.at(x - 1, y),
+                     image.at(x, y + 1) - image.at(x, y - 1)) < 8)
         continue;
       sum += std::hypot(a.row(y)[x].x - b.row(y)[x].x, a.row(y)[x].y - b.row(y)[x].y);
       ++count;
@@ -281,9 +281,9 @@ TEST(Dis, IsWhatOpenCvFinds) {
 }
 
 /// Fraction of events with a match in another set: same polarity, within one pixel and one step.
-class Partners {
+class Matches {
  public:
-  Partners(const std::vector<Event>& events, int width, int height, const StepTimes& steps)
+  Matches(const std::vector<Event>& events, int width, int height, const StepTimes& steps)
       : width_(width), height_(height), steps_(steps) {
     fired_.resize(static_cast<std::size_t>(steps.count()) * width * height);
     for (const auto& event : events) fired_[place(event.x, event.y(), step(event))] |= bit(event);
@@ -291,7 +291,7 @@ class Partners {
 
   double share(const std::vector<Event>& events) const {
     const auto found = std::count_if(events.begin(), events.end(),
-                                     [this](const Event& event) { return has_partner(event); });
+                                     [this](const Event& event) { return has_match(event); });
     return static_cast<double>(found) /
            static_cast<double>(std::max<std::size_t>(1, events.size()));
   }
@@ -306,7 +306,7 @@ class Partners {
   std::size_t place(int x, int y, int j) const {
     return (static_cast<std::size_t>(j - 1) * height_ + y) * width_ + x;
   }
-  bool has_partner(const Event& event) const {
+  bool has_match(const Event& event) const {
     const int at = step(event);
     for (int j = std::max(1, at - 1); j <= std::min(steps_.count(), at + 1); ++j)
       for (int y = std::max(0, event.y() - 1); y <= std::min(height_ - 1, event.y() + 1); ++y)
@@ -343,11 +343,11 @@ std::vector<Event> events_of(Simulator& simulator,
 }
 
 /// Implementations that replace OpenCV's: nearly all events have a match, in both directions.
-void expect_partners(const char* name, const std::vector<Event>& ours,
-                     const std::vector<Event>& theirs, int width, int height,
-                     const StepTimes& steps, double share = 0.95) {
-  const double of_ours = Partners(theirs, width, height, steps).share(ours);
-  const double of_theirs = Partners(ours, width, height, steps).share(theirs);
+void expect_matches(const char* name, const std::vector<Event>& ours,
+                    const std::vector<Event>& theirs, int width, int height, const StepTimes& steps,
+                    double share = 0.95) {
+  const double of_ours = Matches(theirs, width, height, steps).share(ours);
+  const double of_theirs = Matches(ours, width, height, steps).share(theirs);
   std::printf("%s: %zu events, %.2f %% of them among OpenCV's %zu, of which %.2f %% are ours\n",
               name, ours.size(), 100 * of_ours, theirs.size(), 100 * of_theirs);
   EXPECT_GE(of_ours, share) << name;
@@ -370,7 +370,7 @@ TEST(Events, AreThoseOfOpenCvsFlows) {
     const auto& last = frames[i];
     const auto& now = frames[i + 1];
     const auto points = reference::changed(last, now, 6);
-    expect_partners(
+    expect_matches(
         "sparse", events_of(*make_sparse_simulator(format), {&last, &now}, 6, n),
         reference::sparse(last, now, points, opencv_tracks(last, now, points), steps, {6, 6}), 640,
         480, steps, ended_tracks);
@@ -382,26 +382,26 @@ TEST(Events, AreThoseOfOpenCvsFlows) {
       return reference::Tracked{kept,
                                 opencv_tracks(from, reference::part_of(d_now, sign, 8), kept)};
     };
-    expect_partners("diff", events_of(*make_diff_simulator(format), {&before, &last, &now}, 19, n),
-                    reference::diff(d_last, d_now, tracked(1), tracked(-1), steps), 640, 480, steps,
-                    other_tracks);
+    expect_matches("diff", events_of(*make_diff_simulator(format), {&before, &last, &now}, 19, n),
+                   reference::diff(d_last, d_now, tracked(1), tracked(-1), steps), 640, 480, steps,
+                   other_tracks);
     const auto dense = make_dense_simulator(format);
     dense->set_flow(FlowMethod::farneback);
-    expect_partners("farneback", events_of(*dense, {&last, &now}, 3, n),
-                    reference::dense(last, now, opencv_farneback(last, now).view(),
-                                     Interpolation::forward, steps, {3, 3}),
-                    640, 480, steps, other_flow);
-    const auto hold_dis = [&](const char* name, FlowMethod method,
-                              const DisFlow::Quality& quality) {
+    expect_matches("farneback", events_of(*dense, {&last, &now}, 3, n),
+                   reference::dense(last, now, opencv_farneback(last, now).view(),
+                                    Interpolation::forward, steps, {3, 3}),
+                   640, 480, steps, other_flow);
+    const auto expect_dis = [&](const char* name, FlowMethod method,
+                                const DisFlow::Quality& quality) {
       const auto simulator = make_dense_simulator(format);
       simulator->set_flow(method);
-      expect_partners(name, events_of(*simulator, {&last, &now}, 3, n),
-                      reference::dense(last, now, opencv_dis(last, now, quality).view(),
-                                       Interpolation::forward, steps, {3, 3}),
-                      640, 480, steps, 0.99);
+      expect_matches(name, events_of(*simulator, {&last, &now}, 3, n),
+                     reference::dense(last, now, opencv_dis(last, now, quality).view(),
+                                      Interpolation::forward, steps, {3, 3}),
+                     640, 480, steps, 0.99);
     };
-    hold_dis("dis-lq", FlowMethod::dis_lq, DisFlow::low);
-    hold_dis("dis-hq", FlowMethod::dis_hq, DisFlow::high);
+    expect_dis("dis-lq", FlowMethod::dis_lq, DisFlow::low);
+    expect_dis("dis-hq", FlowMethod::dis_hq, DisFlow::high);
   }
 }
 
@@ -438,8 +438,8 @@ TEST(Events, AreThoseOfTheFlowOfTheWhole) {
       const auto b = events(whole);
       part_events += static_cast<double>(a.size());
       whole_events += static_cast<double>(b.size());
-      of_part += Partners(b, 640, 360, steps).share(a) * static_cast<double>(a.size());
-      of_whole += Partners(a, 640, 360, steps).share(b) * static_cast<double>(b.size());
+      of_part += Matches(b, 640, 360, steps).share(a) * static_cast<double>(a.size());
+      of_whole += Matches(a, 640, 360, steps).share(b) * static_cast<double>(b.size());
     }
     std::printf(
         "bottles, flow %d: of %.0f events %.2f %% are among the whole's %.0f, of which %.2f %% are "
