@@ -72,8 +72,9 @@ std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime tim
 /// Sends an event to all sink pads. Returns true if each upstream takes it.
 static gboolean forward(GstAggregator* element, GstEvent* event) {
   bool taken = true;
-  for (const auto& pad : sink_pads(element))
-    taken &= gst_pad_push_event(GST_PAD(pad.get()), gst_event_ref(event)) != FALSE;
+  for_each_sink_pad(element, [&](GstAggregatorPad* pad) {
+    taken &= gst_pad_push_event(GST_PAD(pad), gst_event_ref(event)) != FALSE;
+  });
   gst_event_unref(event);
   return taken ? TRUE : FALSE;
 }
@@ -158,7 +159,8 @@ struct EventAggregatorFunctions {
 
   static GstClockTime get_next_time(GstAggregator* element) {
     auto& self = of(element);
-    return self.segment_ended_ ? GST_CLOCK_TIME_NONE : self.next_time();
+    return self.segment_ended_ ? GST_CLOCK_TIME_NONE
+                               : guard(self, [&] { return self.next_time(); });
   }
 
   static GstFlowReturn update_src_caps(GstAggregator* element, GstCaps*, GstCaps** result) {
@@ -211,8 +213,10 @@ struct EventAggregatorFunctions {
         return FALSE;
       }
     }
-    if (GST_EVENT_TYPE(event) == GST_EVENT_TAG && pad == self.main_pad_)
-      self.tags_.emplace_back(gst_event_ref(event));  // GstAggregator drops it
+    if (GST_EVENT_TYPE(event) == GST_EVENT_TAG && pad == self.main_pad_) {
+      OwnedEvent tags(gst_event_ref(event));  // GstAggregator drops it
+      guard(self, [&] { self.tags_.push_back(std::move(tags)); });
+    }
     if (GST_EVENT_TYPE(event) == GST_EVENT_GAP) take_segment_end(pad, event);
     if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP) forget_segment_end(pad);
     return PARENT_AGGREGATOR_CLASS->sink_event(element, pad, event);
@@ -227,9 +231,13 @@ struct EventAggregatorFunctions {
         return FALSE;
       }
       // GstAggregator flushes before it forwards a seek, and never resumes if that fails.
-      for (const auto& pad : sink_pads(element)) {
-        if (would_seek(GST_PAD(pad.get()), request)) continue;
-        GST_WARNING_OBJECT(pad.get(), "upstream would refuse: refused %" GST_PTR_FORMAT, event);
+      bool all_would = true;
+      for_each_sink_pad(element, [&](GstAggregatorPad* pad) {
+        if (would_seek(GST_PAD(pad), request)) return;
+        GST_WARNING_OBJECT(pad, "upstream would refuse: refused %" GST_PTR_FORMAT, event);
+        all_would = false;
+      });
+      if (!all_would) {
         gst_event_unref(event);
         return FALSE;
       }
@@ -244,18 +252,20 @@ struct EventAggregatorFunctions {
   /// Range of the main pad, or of the first one. GstAggregator would always answer that seeking is
   /// impossible.
   static gboolean answer_seeking(const EventAggregator& self, GstQuery* query) {
-    const auto pads = sink_pads(self.element_);
-    if (pads.empty()) return FALSE;
-    auto* const pad = self.main_pad_ != nullptr ? self.main_pad_ : pads.front().get();
-    if (!gst_pad_peer_query(GST_PAD(pad), query)) return FALSE;
+    bool is_first = true;
+    bool all_can = true;
+    gboolean is_answered = FALSE;
+    for_each_sink_pad(self.element_, [&](GstAggregatorPad* pad) {
+      if (pad == self.main_pad_ || (self.main_pad_ == nullptr && std::exchange(is_first, false)))
+        is_answered = gst_pad_peer_query(GST_PAD(pad), query);
+      all_can = all_can && peer_can_seek(GST_PAD(pad), GST_FORMAT_TIME);
+    });
+    if (!is_answered) return FALSE;
     GstFormat format = GST_FORMAT_UNDEFINED;
     gint64 start = -1;
     gint64 end = -1;
     gst_query_parse_seeking(query, &format, nullptr, &start, &end);
-    const bool all_can =
-        format == GST_FORMAT_TIME && std::ranges::all_of(pads, [](const auto& each) {
-          return peer_can_seek(GST_PAD(each.get()), GST_FORMAT_TIME);
-        });
+    all_can = all_can && format == GST_FORMAT_TIME;
     gst_query_set_seeking(query, format, all_can ? TRUE : FALSE, start, end);
     return TRUE;
   }
