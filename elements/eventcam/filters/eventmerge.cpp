@@ -45,6 +45,7 @@
 #include "elements/eventcam/filters/merged_timeline.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/authors.hpp"
+#include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/event_faults.hpp"
@@ -467,13 +468,19 @@ struct _GstEventMerge {
   GstEventAggregator parent;
 };
 
+static Report failure(const std::exception& error) {
+  return events_report("merge", error);
+}
+
 static guint children_count(GstChildProxy* self) {
-  return static_cast<guint>(numbered_pads(self).size());
+  return guarded(self, failure, [&] { return static_cast<guint>(numbered_pads(self).size()); });
 }
 
 static GObject* child_by_index(GstChildProxy* self, guint index) {
-  auto pads = numbered_pads(self);
-  return index < pads.size() ? G_OBJECT(pads[index].release()) : nullptr;
+  return guarded(self, failure, [&]() -> GObject* {
+    auto pads = numbered_pads(self);
+    return index < pads.size() ? G_OBJECT(pads[index].release()) : nullptr;
+  });
 }
 
 /// Pads as children, so that a launch line can set their properties.
@@ -564,7 +571,8 @@ static void gst_event_merge_class_init(GstEventMergeClass* klass) {
 
   GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
   aggregator_class->update_src_caps = [](GstAggregator* element, GstCaps* caps, GstCaps** result) {
-    return aggregator_impl<EventMerge>(element).choose_caps(caps, result);
+    return guarded(element, failure,
+                   [&] { return aggregator_impl<EventMerge>(element).choose_caps(caps, result); });
   };
   aggregator_class->sink_event = sink_event;
   aggregator_class->src_query = src_query;
