@@ -130,7 +130,7 @@ class EventMerge final : public EventAggregator {
 
   Guarded<Counts> counts_;
   std::atomic<guint32> last_seek_ = GST_SEQNUM_INVALID;
-  Guarded<std::optional<SeekRequest>> sought_;  ///< the seek that the next segment is of
+  Guarded<std::optional<SeekRequest>> sought_;  ///< the latest seek
 
   // Accessed by the source pad's thread only, or while there is none.
   EventMerger merger_;
@@ -233,7 +233,11 @@ void EventMerge::choose_segment(std::span<const OwnedAggregatorPad> pads) {
     if (segment.start < chosen.start) chosen = segment;
   }
   chosen.stop = stop;
-  if (const auto sought = std::exchange(*sought_.lock(), std::nullopt)) {
+  const auto sought = sought_.copy();
+  // A further seek may be on its way.
+  if (sought && std::ranges::any_of(pads, [&](const auto& pad) {
+        return stream_of(pad).segment_seqnum == sought->seqnum();
+      })) {
     const MergedTimeline timeline(GST_ELEMENT(element()));
     if (const auto start = sought->start()) {
       chosen.start = chosen.position = timeline.timestamp_at(*start);
@@ -518,8 +522,11 @@ static void release_pad(GstElement* element, GstPad* pad) {
 
 /// The segment of a stream is reset by a flush, but is needed to seek again before the next one.
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
-  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && segment_of(event).format == GST_FORMAT_TIME)
-    *GST_EVENT_MERGE_PAD(pad)->priv->segment.lock() = segment_of(event);
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && segment_of(event).format == GST_FORMAT_TIME) {
+    auto& stream = *GST_EVENT_MERGE_PAD(pad)->priv;
+    *stream.segment.lock() = segment_of(event);
+    stream.segment_seqnum = gst_event_get_seqnum(event);
+  }
   return PARENT_AGGREGATOR_CLASS->sink_event(aggregator, pad, event);
 }
 

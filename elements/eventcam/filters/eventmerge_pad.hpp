@@ -27,6 +27,7 @@ struct GstEventMergePadPrivate {
   Guarded<GstSegment> segment;       ///< the last one received, also while the pad is flushed
 
   // Accessed by the source pad's thread only, or while there is none.
+  guint32 segment_seqnum = GST_SEQNUM_INVALID;
   eventcamera::SensorSize sensor;  ///< 0x0 before caps
   SensorPosition placed;           ///< position in the negotiated output
   eventcamera::MergeInput input;
