@@ -33,7 +33,6 @@
  * ]|
  */
 #include <algorithm>
-#include <atomic>
 #include <map>
 #include <optional>
 #include <span>
@@ -129,7 +128,6 @@ class EventMerge final : public EventAggregator {
   GstFlowReturn push_gap(GstClockTime start, GstClockTime duration);
 
   Guarded<Counts> counts_;
-  std::atomic<guint32> last_seek_ = GST_SEQNUM_INVALID;
   Guarded<std::optional<SeekRequest>> sought_;  ///< the latest seek
 
   // Accessed by the source pad's thread only, or while there is none.
@@ -250,10 +248,9 @@ void EventMerge::choose_segment(std::span<const OwnedAggregatorPad> pads) {
 }
 
 void EventMerge::prepare_seek(const SeekRequest& request) {
-  // A bin sends a seek to each of its sinks.
-  if (last_seek_.exchange(request.seqnum()) == request.seqnum()) return;
+  const auto last = std::exchange(*sought_.lock(), request);
+  if (last && last->seqnum() == request.seqnum()) return;  // a bin sends one to each of its sinks
   MergedTimeline(GST_ELEMENT(element())).translate(request);
-  *sought_.lock() = request;
 }
 
 void EventMerge::count(const MergedInterval& interval) {
