@@ -11,15 +11,20 @@ namespace {
 using namespace harness;
 using namespace aedat_recordings;
 
-/// Waits for the end of the file, and returns what was not pulled before.
-Content rest_of_file(GstHarness* h) {
-  EXPECT_TRUE(next_event(h, GST_EVENT_EOS));
+/// What the buffers hold that were not pulled before.
+Content rest_of(GstHarness* h) {
   Bytes bytes;
   while (const Buffer buffer{gst_harness_try_pull(h)}) {
     const auto piece = bytes_of(buffer.get());
     bytes.insert(bytes.end(), piece.begin(), piece.end());
   }
   return Content(bytes);
+}
+
+/// Waits for the end of the file, and returns what was not pulled before.
+Content rest_of_file(GstHarness* h) {
+  EXPECT_TRUE(next_event(h, GST_EVENT_EOS));
+  return rest_of(h);
 }
 
 /// Pushes a segment in which this timestamp has this running time.
@@ -93,30 +98,36 @@ TEST(AedatMux, WritesTheTimesOfTheStreamInEachSegment) {
   EXPECT_EQ(mux.end().events, expected);
 }
 
+/// aedatmux with events and frames as its two inputs.
+struct EventsAndVideo : TwoInputs {
+  EventsAndVideo() : TwoInputs("aedatmux", "events_0", "video_0") {
+    gst_harness_set_src_caps_str(
+        first.get(), "application/x-event-camera, format=XYTP, width=8, height=4, framerate=0/1");
+    gst_harness_set_src_caps_str(second.get(),
+                                 "video/x-raw, format=GRAY8, width=4, height=4, framerate=0/1");
+  }
+
+  void push_frame(GstClockTime pts) const {
+    GstBuffer* const frame = gst_buffer_new_memdup("0123456789abcdef", 16);
+    GST_BUFFER_PTS(frame) = pts;
+    EXPECT_EQ(gst_harness_push(second.get(), frame), GST_FLOW_OK);
+  }
+};
+
 TEST(AedatMux, WritesFramesWithTheEventsOfTheirRunningTime) {
-  TwoInputs mux("aedatmux", "events_0", "video_0");
+  const EventsAndVideo mux;
   auto* const events = mux.first.get();
   auto* const video = mux.second.get();
-  gst_harness_set_src_caps_str(
-      events, "application/x-event-camera, format=XYTP, width=8, height=4, framerate=0/1");
-  gst_harness_set_src_caps_str(video,
-                               "video/x-raw, format=GRAY8, width=4, height=4, framerate=0/1");
   push_segment(events, 5 * GST_SECOND, 0, 2);
   push_segment(video, GST_SECOND, 0);
-  const auto push_frame = [&](GstClockTime pts) {
-    GstBuffer* const frame = gst_buffer_new_allocate(nullptr, 16, nullptr);
-    gst_buffer_memset(frame, 0, 0, 16);
-    GST_BUFFER_PTS(frame) = pts;
-    EXPECT_EQ(gst_harness_push(video, frame), GST_FLOW_OK);
-  };
   const auto push_events = [&](GstClockTime pts) {
     EXPECT_EQ(gst_harness_push(events, buffer_of(pts, {{0, 1, 2}}, 10 * GST_MSECOND)), GST_FLOW_OK);
   };
   push_events(5 * GST_SECOND);
-  push_frame(GST_SECOND + 4 * GST_MSECOND);
+  mux.push_frame(GST_SECOND + 4 * GST_MSECOND);
   push_segment(events, 5 * GST_SECOND + 10 * GST_MSECOND, 5 * GST_MSECOND);
   push_events(5 * GST_SECOND + 10 * GST_MSECOND);
-  push_frame(GST_SECOND + 7 * GST_MSECOND);
+  mux.push_frame(GST_SECOND + 7 * GST_MSECOND);
   for (auto* h : {events, video}) gst_harness_push_event(h, gst_event_new_eos());
   const auto content = rest_of_file(events);
   ASSERT_EQ(content.pictures.size(), 2U);
@@ -127,18 +138,12 @@ TEST(AedatMux, WritesFramesWithTheEventsOfTheirRunningTime) {
 
 /// At twice the rate, a gap of 40 ms ends before a frame of running time 30 ms.
 TEST(AedatMux, WritesEventsAfterAGapBeforeLaterFrames) {
-  const TwoInputs mux("aedatmux", "events_0", "video_0");
+  const EventsAndVideo mux;
   auto* const events = mux.first.get();
   auto* const video = mux.second.get();
-  gst_harness_set_src_caps_str(
-      events, "application/x-event-camera, format=XYTP, width=8, height=4, framerate=0/1");
-  gst_harness_set_src_caps_str(video,
-                               "video/x-raw, format=GRAY8, width=4, height=4, framerate=0/1");
   push_segment(events, 0, 0, 2);
   gst_harness_push_event(events, gst_event_new_gap(0, 40 * GST_MSECOND));
-  GstBuffer* const frame = gst_buffer_new_memdup("0123456789abcdef", 16);
-  GST_BUFFER_PTS(frame) = 30 * GST_MSECOND;
-  EXPECT_EQ(gst_harness_push(video, frame), GST_FLOW_OK);
+  mux.push_frame(30 * GST_MSECOND);
   push_segment(events, 40 * GST_MSECOND, 20 * GST_MSECOND);
   EXPECT_EQ(gst_harness_push(events, buffer_of(40 * GST_MSECOND, {{0, 1, 2}}, GST_MSECOND)),
             GST_FLOW_OK);
@@ -204,20 +209,14 @@ TEST(AedatMux, WritesAnewAfterAFlush) {
 }
 
 TEST(AedatMux, EndsASegmentOnceBothInputsHave) {
-  const TwoInputs mux("aedatmux", "events_0", "video_0");
+  const EventsAndVideo mux;
   auto* const events = mux.first.get();
   auto* const video = mux.second.get();
-  gst_harness_set_src_caps_str(
-      events, "application/x-event-camera, format=XYTP, width=346, height=260, framerate=0/1");
-  gst_harness_set_src_caps_str(video,
-                               "video/x-raw, format=GRAY8, width=4, height=4, framerate=0/1");
   for (const GstClockTime base : {0 * GST_SECOND, 1 * GST_SECOND}) {
     for (auto* h : {events, video}) push_segment(h, base, base);
     gst_harness_push(events, buffer_of(base, {{7, 1, 2}}, 10 * GST_MSECOND));
     end_segment(events);
-    GstBuffer* const frame = gst_buffer_new_memdup("0123456789abcdef", 16);
-    GST_BUFFER_PTS(frame) = base + 20 * GST_MSECOND;
-    gst_harness_push(video, frame);
+    mux.push_frame(base + 20 * GST_MSECOND);
     end_segment(video);
     ASSERT_TRUE(next_event(events, GST_EVENT_SEGMENT_DONE));
   }
@@ -229,12 +228,7 @@ TEST(AedatMux, EndsASegmentOnceBothInputsHave) {
     last = GST_EVENT_TYPE(event.get());
     EXPECT_NE(last, GST_EVENT_SEGMENT_DONE);
   }
-  Bytes bytes;
-  while (const Buffer buffer{gst_harness_try_pull(events)}) {
-    const auto piece = bytes_of(buffer.get());
-    bytes.insert(bytes.end(), piece.begin(), piece.end());
-  }
-  const Content content(bytes);
+  const auto content = rest_of(events);
   EXPECT_EQ(content.events, (Events{AbsoluteEvent::at(1, 2, 7, Polarity::off),
                                     AbsoluteEvent::at(1, 2, 1'000'007, Polarity::off)}));
   EXPECT_EQ(content.pictures.size(), 2U);

@@ -273,17 +273,6 @@ TEST_F(ClassImages, AreNotSeekedIfTheVideoCannotBe) {
 }
 
 TEST_F(ClassImages, KeepTheVideoFromSeekingIfTheyCannot) {
-  const auto make_seekable = [](GstHarness* h) {
-    gst_pad_set_query_function(
-        h->srcpad, +[](GstPad* pad, GstObject* parent, GstQuery* query) -> gboolean {
-          if (GST_QUERY_TYPE(query) != GST_QUERY_SEEKING)
-            return gst_pad_query_default(pad, parent, query);
-          GstFormat format = GST_FORMAT_UNDEFINED;
-          gst_query_parse_seeking(query, &format, nullptr, nullptr, nullptr);
-          gst_query_set_seeking(query, format, TRUE, 0, GST_SECOND);
-          return TRUE;
-        });
-  };
   const auto is_seekable = [&] {
     GstQuery* const query = gst_query_new_seeking(GST_FORMAT_TIME);
     gboolean seekable = FALSE;

@@ -325,6 +325,19 @@ struct TwoInputs {
   Owned<GstHarness> second;
 };
 
+/// Lets an input answer that it can seek within its first second.
+inline void make_seekable(GstHarness* input) {
+  gst_pad_set_query_function(
+      input->srcpad, +[](GstPad* pad, GstObject* parent, GstQuery* query) -> gboolean {
+        if (GST_QUERY_TYPE(query) != GST_QUERY_SEEKING)
+          return gst_pad_query_default(pad, parent, query);
+        GstFormat format = GST_FORMAT_UNDEFINED;
+        gst_query_parse_seeking(query, &format, nullptr, nullptr, nullptr);
+        gst_query_set_seeking(query, format, TRUE, 0, GST_SECOND);
+        return TRUE;
+      });
+}
+
 /// Flushes all inputs of an element, as a seek does: by events of one number.
 inline void flush(std::initializer_list<GstHarness*> inputs) {
   const auto seqnum = gst_util_seqnum_next();

@@ -258,17 +258,6 @@ TEST_F(MergeTest, GoesOnPastTheEndOfASegmentAfterAFlush) {
 
 /// A seek is forwarded to all streams, or refused.
 TEST_F(MergeTest, IsSeekableWhereAllStreamsAre) {
-  const auto make_seekable = [](GstHarness* input) {
-    gst_pad_set_query_function(
-        input->srcpad, +[](GstPad* pad, GstObject* parent, GstQuery* query) -> gboolean {
-          if (GST_QUERY_TYPE(query) != GST_QUERY_SEEKING)
-            return gst_pad_query_default(pad, parent, query);
-          GstFormat format = GST_FORMAT_UNDEFINED;
-          gst_query_parse_seeking(query, &format, nullptr, nullptr, nullptr);
-          gst_query_set_seeking(query, format, TRUE, 0, GST_SECOND);
-          return TRUE;
-        });
-  };
   const auto is_seekable = [this](GstFormat format) {
     GstQuery* const query = gst_query_new_seeking(format);
     gboolean seekable = FALSE;
