@@ -12,7 +12,8 @@
 // dis/: Kroeger et al., Fast optical flow using dense inverse search, ECCV 2016
 //   pyramid.cpp                   scales and image gradients
 //   inverse_search.cpp            the flow u of a patch that minimises the sum of
-//                                 (J(x + u) - I(x))^2, less the means
+//                                 (J(x + u) - I(x))^2, less the means, from that of a neighbour
+//                                 if it is smaller there
 //   densification.cpp             the mean of the flows of the patches that cover a pixel, weighted
 //                                 by match
 //   variational_refinement.cpp    energy of constant brightness and gradients, and of smoothness:
@@ -46,7 +47,7 @@ enum class FlowMethod {
   dis_hq,      ///< DIS, high quality: patches of 8 at strides of 4, 32 iterations
   farneback,   ///< Farneback: up to 4 levels, window 15, 3 iterations, polynomials of 5 pixels
   opencv_dis,  ///< OpenCV's DIS with the parameters of dis_hq; only in builds with OpenCV
-  dis_mq,      ///< dis_lq with more scales: down to an eighth of the size in large frames
+  dis_mq,      ///< dis_lq with 4 scales or more, to an eighth of the size, and propagation
 };
 
 /// Dense optical flow between 8-bit images of any size. Each image is used twice, first as the

@@ -49,7 +49,7 @@ struct Method {
 
 // A search of DIS may stop a step earlier or later where its error hardly changes.
 constexpr Method methods[] = {{"dis_lq", FlowMethod::dis_lq, 1e-3, 0.05},
-                              {"dis_mq", FlowMethod::dis_mq, 1e-3, 0.05},
+                              {"dis_mq", FlowMethod::dis_mq, 3e-3, 0.05},
                               {"dis_hq", FlowMethod::dis_hq, 1e-3, 0.05},
                               {"farneback", FlowMethod::farneback, 1e-4, 1e-4},
                               {"opencv_dis", FlowMethod::opencv_dis, 0.02, 0.5}};

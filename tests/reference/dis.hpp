@@ -8,12 +8,13 @@
 
 #include "src/core/image.hpp"
 #include "src/flow/dis/dis.hpp"
+#include "src/flow/dis/inverse_search.hpp"
 #include "tests/reference/farneback.hpp"
 
 /// Kroeger et al., "Fast optical flow using dense inverse search" (ECCV 2016), with the pyramid,
-/// step length and mean normalisation of OpenCV and without its spatial propagation. Each level is
-/// refined as by Brox et al., "High accuracy optical flow estimation based on a theory for warping"
-/// (ECCV 2004).
+/// step length and mean normalisation of OpenCV, whose spatial propagation goes on from patch to
+/// patch instead of from all to their neighbours. Each level is refined as by Brox et al., "High
+/// accuracy optical flow estimation based on a theory for warping" (ECCV 2004).
 namespace eventcamera::reference {
 
 using Grey = Image<std::uint8_t>;
@@ -88,54 +89,79 @@ inline Slope sobel(const Grey& picture, int x, int y) {
   return slope;
 }
 
-/// Gradient descent from `start` for the patch with its upper left corner at (x, y).
-inline Flow search(const Grey& from, const Grey& to, const DisFlow::Quality& quality, int x, int y,
-                   const Flow& start) {
-  const double pixels = quality.patch * quality.patch;
-  const auto for_each_pixel = [&](const auto& body) {
-    for (int v = 0; v < quality.patch; ++v)
-      for (int u = 0; u < quality.patch; ++u) body(u, v, sobel(from, x + u, y + v));
-  };
-  double xx = 0;
-  double xy = 0;
-  double yy = 0;
-  Slope mean{};
-  for_each_pixel([&](int, int, const Slope& slope) {
-    xx += slope.x * slope.x;
-    xy += slope.x * slope.y;
-    yy += slope.y * slope.y;
-    mean.x += slope.x / pixels;
-    mean.y += slope.y / pixels;
-  });
-  const double determinant = std::max(1e-3, xx * yy - xy * xy);
-  double flow_x = start.x;
-  double flow_y = start.y;
-  double previous = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < quality.iterations; ++i) {
-    const double left = std::clamp(x + flow_x, 1.0 - quality.patch, to.width() - 1.0);
-    const double top = std::clamp(y + flow_y, 1.0 - quality.patch, to.height() - 1.0);
-    double sum = 0;
-    double squares = 0;
-    double sum_x = 0;
-    double sum_y = 0;
-    for_each_pixel([&](int u, int v, const Slope& slope) {
-      const double difference = between_pixels(to, left + u, top + v) - from.at(x + u, y + v);
-      sum += difference;
-      squares += difference * difference;
-      sum_x += difference * slope.x;
-      sum_y += difference * slope.y;
+/// A patch with its upper left corner at (x, y).
+class Patch {
+ public:
+  Patch(const Grey& from, const Grey& to, int side, int x, int y)
+      : from_(from), to_(to), side_(side), x_(x), y_(y) {
+    for_each_pixel([&](int, int, const Slope& slope) {
+      xx_ += slope.x * slope.x;
+      xy_ += slope.x * slope.y;
+      yy_ += slope.y * slope.y;
+      mean_.x += slope.x / (side * side);
+      mean_.y += slope.y / (side * side);
     });
-    sum_x -= sum * mean.x;
-    sum_y -= sum * mean.y;
-    flow_x -= (yy * sum_x - xy * sum_y) / determinant;
-    flow_y -= (xx * sum_y - xy * sum_x) / determinant;
-    const double error = squares - sum * sum / pixels;
-    if (error >= previous) break;
-    previous = error;
+    determinant_ = std::max(1e-3, xx_ * yy_ - xy_ * xy_);
   }
-  if (std::hypot(flow_x - start.x, flow_y - start.y) > quality.patch) return start;
-  return {static_cast<float>(flow_x), static_cast<float>(flow_y)};
-}
+
+  /// Sum of the squared differences, less their mean.
+  double error(double flow_x, double flow_y) const { return differences(flow_x, flow_y).error; }
+
+  /// Gradient descent from `start`.
+  Flow search(const Flow& start, int iterations) const {
+    double flow_x = start.x;
+    double flow_y = start.y;
+    double previous = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < iterations; ++i) {
+      const auto [error, sum_x, sum_y] = differences(flow_x, flow_y);
+      flow_x -= (yy_ * sum_x - xy_ * sum_y) / determinant_;
+      flow_y -= (xx_ * sum_y - xy_ * sum_x) / determinant_;
+      if (error >= previous) break;
+      previous = error;
+    }
+    if (std::hypot(flow_x - start.x, flow_y - start.y) > side_) return start;
+    return {static_cast<float>(flow_x), static_cast<float>(flow_y)};
+  }
+
+ private:
+  /// Sums over the differences, less their mean: of their squares, and times the slopes.
+  struct Differences {
+    double error, sum_x, sum_y;
+  };
+
+  template <class Body>
+  void for_each_pixel(const Body& body) const {
+    for (int v = 0; v < side_; ++v)
+      for (int u = 0; u < side_; ++u) body(u, v, sobel(from_, x_ + u, y_ + v));
+  }
+
+  Differences differences(double flow_x, double flow_y) const {
+    const double left = std::clamp(x_ + flow_x, 1.0 - side_, to_.width() - 1.0);
+    const double top = std::clamp(y_ + flow_y, 1.0 - side_, to_.height() - 1.0);
+    double sum = 0;
+    Differences all{};
+    for_each_pixel([&](int u, int v, const Slope& slope) {
+      const double difference = between_pixels(to_, left + u, top + v) - from_.at(x_ + u, y_ + v);
+      sum += difference;
+      all.error += difference * difference;
+      all.sum_x += difference * slope.x;
+      all.sum_y += difference * slope.y;
+    });
+    return {all.error - sum * sum / (side_ * side_), all.sum_x - sum * mean_.x,
+            all.sum_y - sum * mean_.y};
+  }
+
+  const Grey& from_;
+  const Grey& to_;
+  int side_;
+  int x_;
+  int y_;
+  double xx_ = 0;
+  double xy_ = 0;
+  double yy_ = 0;
+  double determinant_;
+  Slope mean_{};
+};
 
 /// Flow of each patch, and the mean over the patches at a pixel, weighted by the error there.
 class Patches {
@@ -152,9 +178,11 @@ class Patches {
         const int x = i * quality.stride;
         const int y = j * quality.stride;
         flows_.at(i, j) =
-            search(from, to, quality, x, y, start.at(x + quality.patch / 2, y + quality.patch / 2));
+            Patch(from, to, quality.patch, x, y)
+                .search(start.at(x + quality.patch / 2, y + quality.patch / 2), quality.iterations);
       }
     }
+    for (int round = 0; round < quality.propagations; ++round) propagate();
   }
 
   Flow at(int x, int y) const {
@@ -177,6 +205,27 @@ class Patches {
   }
 
  private:
+  /// Searches again from the best flow of a neighbour where that is better than a patch's own.
+  void propagate() {
+    const auto found = flows_;
+    for (int j = 0; j < found.height(); ++j) {
+      for (int i = 0; i < found.width(); ++i) {
+        const Patch patch(from_, to_, quality_.patch, i * quality_.stride, j * quality_.stride);
+        const Flow* best = nullptr;
+        double lowest = better_share * patch.error(found.at(i, j).x, found.at(i, j).y) - better_by;
+        for (int v = std::max(0, j - 1); v <= std::min(j + 1, found.height() - 1); ++v) {
+          for (int u = std::max(0, i - 1); u <= std::min(i + 1, found.width() - 1); ++u) {
+            const double error = patch.error(found.at(u, v).x, found.at(u, v).y);
+            if (error >= lowest) continue;
+            best = &found.at(u, v);
+            lowest = error;
+          }
+        }
+        if (best != nullptr) flows_.at(i, j) = patch.search(*best, quality_.iterations);
+      }
+    }
+  }
+
   /// The last patch extends to the border.
   bool covers(int patch, int pixel, int count) const {
     const int first = patch * quality_.stride;

@@ -52,6 +52,7 @@ DisFlow::Level::Level(const AreaShrink& shrink_, const Quality& quality)
       gradients(shrink.width(), shrink.height()),
       grid(shrink.width(), shrink.height(), quality.patch, quality.stride),
       flows(grid.columns, grid.rows),
+      found(grid.columns, grid.rows),
       refinement(shrink.width(), shrink.height()) {}
 
 void DisFlow::start(int width, int height) {
@@ -118,6 +119,13 @@ ImageView<Flow> DisFlow::flow(ThreadPool& threads) {
       for (int y = rows.first; y < rows.last; ++y) level.gradients.row(last, y, scratch.slopes);
     });
     threads.for_each(level.grid.rows, [&](int row, int) { search(coarser, level, row); });
+    for (int round = 0; round < quality_.propagations; ++round) {
+      std::swap(level.flows, level.found);
+      threads.for_each(level.grid.rows, [&](int row, int) {
+        propagate_row(level.grid, last, level.gradients, next, row, quality_.iterations,
+                      level.found, level.flows.row(row));
+      });
+    }
     for_each_band(last.height(), threads, [&](const BandRows& rows, Scratch& scratch) {
       auto& field = level.refinement.start();
       spread_patches(level.grid, last, next, level.flows, rows.first, rows.last, scratch.sums,

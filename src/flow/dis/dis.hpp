@@ -20,8 +20,9 @@ class DisFlow final : public DenseFlow {
     int patch;   ///< side, 4 or 8 pixels
     int stride;  ///< patch * (1 - overlap), rounded down
     int iterations;
-    int scales;      ///< minimum number of pyramid levels
-    int max_finest;  ///< limit of finest_scale()
+    int scales;        ///< minimum number of pyramid levels
+    int max_finest;    ///< limit of finest_scale()
+    int propagations;  ///< rounds in which patches take over flows of their neighbours
 
     /// Number of times an image is halved for the coarsest level. There, the largest displacement
     /// to be found, a quarter of the longer side, is about one patch, and the shorter side at least
@@ -30,9 +31,9 @@ class DisFlow final : public DenseFlow {
     /// Number of times an image is halved for the finest level.
     int finest_scale(int width, int height) const;
   };
-  static constexpr Quality low = {4, 3, 8, 3, 31};
-  static constexpr Quality medium = {4, 3, 8, 3, 3};
-  static constexpr Quality high = {8, 4, 32, 1, 1};
+  static constexpr Quality low = {4, 3, 8, 3, 31, 0};
+  static constexpr Quality medium = {4, 3, 8, 4, 3, 2};
+  static constexpr Quality high = {8, 4, 32, 1, 1, 0};
 
   /// Smaller images are padded, by replicating their border, to this width and height.
   static constexpr int min_side = 64;
@@ -52,6 +53,7 @@ class DisFlow final : public DenseFlow {
     Gradients gradients;  ///< of `last`
     PatchGrid grid;
     Image<Flow> flows;  ///< of patches
+    Image<Flow> found;  ///< before a round of propagation
     VariationalRefinement refinement;
   };
 

@@ -102,7 +102,6 @@ class Search {
       previous_[i] = std::numeric_limits<float>::infinity();
       cell_x_[i] = cell_y_[i] = std::numeric_limits<float>::max();
       active_[i] = 1;
-      read_gradients(i);
     }
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     for (int i = count; i < (count + lanes - 1) / lanes * lanes; ++i) {
@@ -110,15 +109,53 @@ class Search {
     }
   }
 
+  /// Starts patches from the best of their neighbours' flows, and stops those whose own is hardly
+  /// worse.
+  void take_over(const Image<Flow>& found, int row) {
+    const Floats floats;
+    const int lanes = static_cast<int>(hn::Lanes(floats));
+    move_to(flow_x_, flow_y_);
+    for (int i = 0; i < count_; i += lanes)
+      hn::Store(hn::Sub(hn::Mul(hn::Set(floats, better_share), Cell(*this, i).error()),
+                        hn::Set(floats, better_by)),
+                floats, previous_ + i);
+    const int first = left_ / stride_;
+    for (int y = std::max(row - 1, 0); y <= std::min(row + 1, found.height() - 1); ++y) {
+      for (int offset = -1; offset <= 1; ++offset) {
+        if (y == row && offset == 0) continue;
+        HWY_ALIGN float flow_x[capacity] = {};
+        HWY_ALIGN float flow_y[capacity] = {};
+        for (int i = 0; i < count_; ++i) {
+          const Flow& flow = found.at(std::clamp(first + i + offset, 0, found.width() - 1), y);
+          flow_x[i] = flow.x;
+          flow_y[i] = flow.y;
+        }
+        move_to(flow_x, flow_y);
+        for (int i = 0; i < count_; i += lanes) {
+          const auto error = Cell(*this, i).error();
+          const auto is_better = hn::Lt(error, hn::Load(floats, previous_ + i));
+          hn::BlendedStore(error, is_better, floats, previous_ + i);
+          hn::BlendedStore(hn::Load(floats, flow_x + i), is_better, floats, flow_x_ + i);
+          hn::BlendedStore(hn::Load(floats, flow_y + i), is_better, floats, flow_y_ + i);
+        }
+      }
+    }
+    for (int i = 0; i < count_; ++i) {
+      active_[i] = flow_x_[i] == start_x_[i] && flow_y_[i] == start_y_[i] ? 0 : 1;
+      start_x_[i] = flow_x_[i];
+      start_y_[i] = flow_y_[i];
+      previous_[i] = std::numeric_limits<float>::infinity();
+    }
+  }
+
   void run(int iterations) {
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
-    for (int i = 0; i < count_; i += lanes)
-      locate(i, hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats)),
-             hn::Load(floats, flow_x_ + i), hn::Load(floats, flow_y_ + i));
+    for (int i = 0; i < count_; ++i)
+      if (active_[i] != 0) read_gradients(i);
+    move_to(flow_x_, flow_y_);
     for (int iteration = 0; iteration < iterations; ++iteration) {
-      for (int k = 0; k < moved_count_; ++k) read_cell(moved_[k]);
-      moved_count_ = 0;
+      read_moved();
       bool any = false;
       for (int i = 0; i < count_; i += lanes) {
         const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
@@ -134,7 +171,8 @@ class Search {
     for (int i = 0; i < count_; ++i) {
       const float x = flow_x_[i] - start_x_[i];
       const float y = flow_y_[i] - start_y_[i];
-      if (x * x + y * y <= float{side * side}) flows[i] = {flow_x_[i], flow_y_[i]};
+      flows[i] = x * x + y * y <= float{side * side} ? Flow{flow_x_[i], flow_y_[i]}
+                                                     : Flow{start_x_[i], start_y_[i]};
     }
   }
 
@@ -267,40 +305,84 @@ class Search {
       moved_[moved_count_++] = static_cast<std::int16_t>(i + std::countr_zero(bits));
   }
 
+  /// Moves active patches to these flows.
+  void move_to(const float* flow_x, const float* flow_y) {
+    const Floats floats;
+    const int lanes = static_cast<int>(hn::Lanes(floats));
+    for (int i = 0; i < count_; i += lanes)
+      locate(i, hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats)),
+             hn::Load(floats, flow_x + i), hn::Load(floats, flow_y + i));
+    read_moved();
+  }
+
+  void read_moved() {
+    for (int k = 0; k < moved_count_; ++k) read_cell(moved_[k]);
+    moved_count_ = 0;
+  }
+
+  /// Where in their cells a vector of patches are.
+  class Cell {
+   public:
+    HWY_INLINE Cell(const Search& search, int i) : search_(search), i_(i) {
+      const auto one = hn::Set(Floats(), 1.0F);
+      const auto right = load(search.right_);
+      const auto down = load(search.down_);
+      const auto left = hn::Sub(one, right);
+      const auto up = hn::Sub(one, down);
+      w0_ = hn::Mul(up, left);
+      w1_ = hn::Mul(up, right);
+      w2_ = hn::Mul(down, left);
+      w3_ = hn::Mul(down, right);
+      all_ = weighted(sum);
+    }
+
+    /// The sum of the differences times a gradient, less its mean.
+    HWY_INLINE Vector along(int k, const float* mean) const {
+      return hn::Sub(weighted(k), hn::Mul(all_, load(mean)));
+    }
+
+    /// The sum of the squared deviations of the differences from their mean.
+    HWY_INLINE Vector error() const {
+      const auto cross0 =
+          hn::Add(hn::Add(hn::Mul(w1_, total(4)), hn::Mul(w2_, total(5))), hn::Mul(w3_, total(6)));
+      const auto cross1 = hn::Add(hn::Mul(w2_, total(7)), hn::Mul(w3_, total(8)));
+      const auto cross2 = hn::Mul(w3_, total(9));
+      const auto part = [&](Vector weight, int square, Vector cross) {
+        return hn::Mul(weight, hn::Add(hn::Mul(weight, total(square)),
+                                       hn::Mul(hn::Set(Floats(), 2.0F), cross)));
+      };
+      const auto squares =
+          hn::Add(hn::Add(part(w0_, 0, cross0), part(w1_, 1, cross1)),
+                  hn::Add(part(w2_, 2, cross2), hn::Mul(w3_, hn::Mul(w3_, total(3)))));
+      return hn::Sub(squares, hn::Mul(all_, hn::Mul(all_, hn::Set(Floats(), 1 / pixels))));
+    }
+
+   private:
+    HWY_INLINE Vector load(const float* values) const { return hn::Load(Floats(), values + i_); }
+    HWY_INLINE Vector total(int k) const { return load(search_.sums_[k]); }
+    HWY_INLINE Vector weighted(int k) const {
+      return hn::Add(hn::Add(hn::Mul(w0_, total(k)), hn::Mul(w1_, total(k + 1))),
+                     hn::Add(hn::Mul(w2_, total(k + 2)), hn::Mul(w3_, total(k + 3))));
+    }
+
+    const Search& search_;
+    int i_;
+    Vector w0_;
+    Vector w1_;
+    Vector w2_;
+    Vector w3_;
+    Vector all_;
+  };
+
   /// Moves a vector of patches by a step, and stops those whose error has not decreased.
   template <class Mask>
   void descend(int i, Mask active) {
     const Floats floats;
     const auto load = [&](const float* values) { return hn::Load(floats, values + i); };
-    const auto total = [&](int k) { return load(sums_[k]); };
-    const auto right = load(right_);
-    const auto down = load(down_);
-    const auto one = hn::Set(floats, 1.0F);
-    const auto two = hn::Set(floats, 2.0F);
-    const auto left = hn::Sub(one, right);
-    const auto up = hn::Sub(one, down);
-    const auto w0 = hn::Mul(up, left);
-    const auto w1 = hn::Mul(up, right);
-    const auto w2 = hn::Mul(down, left);
-    const auto w3 = hn::Mul(down, right);
-    const auto weighted = [&](int k) {
-      return hn::Add(hn::Add(hn::Mul(w0, total(k)), hn::Mul(w1, total(k + 1))),
-                     hn::Add(hn::Mul(w2, total(k + 2)), hn::Mul(w3, total(k + 3))));
-    };
-    const auto all = weighted(sum);
-    const auto along_x = hn::Sub(weighted(sum_x), hn::Mul(all, load(mean_x_)));
-    const auto along_y = hn::Sub(weighted(sum_y), hn::Mul(all, load(mean_y_)));
-    const auto cross0 =
-        hn::Add(hn::Add(hn::Mul(w1, total(4)), hn::Mul(w2, total(5))), hn::Mul(w3, total(6)));
-    const auto cross1 = hn::Add(hn::Mul(w2, total(7)), hn::Mul(w3, total(8)));
-    const auto cross2 = hn::Mul(w3, total(9));
-    const auto part = [&](Vector weight, int square, Vector cross) {
-      return hn::Mul(weight, hn::Add(hn::Mul(weight, total(square)), hn::Mul(two, cross)));
-    };
-    auto error = hn::Add(hn::Add(part(w0, 0, cross0), part(w1, 1, cross1)),
-                         hn::Add(part(w2, 2, cross2), hn::Mul(w3, hn::Mul(w3, total(3)))));
-    error = hn::Sub(error, hn::Mul(all, hn::Mul(all, hn::Set(floats, 1 / pixels))));
-
+    const Cell cell(*this, i);
+    const auto along_x = cell.along(sum_x, mean_x_);
+    const auto along_y = cell.along(sum_y, mean_y_);
+    const auto error = cell.error();
     const auto xx = load(inverse_xx_);
     const auto xy = load(inverse_xy_);
     const auto yy = load(inverse_yy_);
@@ -352,12 +434,16 @@ class Search {
   HWY_ALIGN float sums_[max_sums][capacity];
 };
 
+/// Searches from `found`, of all patches, if there are any, else from `flows`.
 template <int side>
 void search(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradients& gradients,
-            const Image<std::uint8_t>& to, int row, int iterations, Flow* flows) {
+            const Image<std::uint8_t>& to, int row, int iterations, const Image<Flow>* found,
+            Flow* flows) {
+  const Flow* starts = found != nullptr ? found->row(row) : flows;
   for (int first = 0; first < grid.columns; first += Search<side>::capacity) {
     const int count = std::min(grid.columns - first, Search<side>::capacity);
-    Search<side> patches(grid, from, gradients, to, row, first, count, flows + first);
+    Search<side> patches(grid, from, gradients, to, row, first, count, starts + first);
+    if (found != nullptr) patches.take_over(*found, row);
     patches.run(iterations);
     patches.store(flows + first);
   }
@@ -365,11 +451,11 @@ void search(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradie
 
 void search_one_row(const PatchGrid& grid, const Image<std::uint8_t>& from,
                     const Gradients& gradients, const Image<std::uint8_t>& to, int row,
-                    int iterations, Flow* flows) {
+                    int iterations, const Image<Flow>* found, Flow* flows) {
   if (grid.side == 4)
-    search<4>(grid, from, gradients, to, row, iterations, flows);
+    search<4>(grid, from, gradients, to, row, iterations, found, flows);
   else
-    search<8>(grid, from, gradients, to, row, iterations, flows);
+    search<8>(grid, from, gradients, to, row, iterations, found, flows);
 }
 
 }  // namespace
@@ -383,7 +469,13 @@ HWY_EXPORT(search_one_row);
 
 void search_row(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradients& gradients,
                 const Image<std::uint8_t>& to, int row, int iterations, Flow* flows) {
-  HWY_DYNAMIC_DISPATCH(search_one_row)(grid, from, gradients, to, row, iterations, flows);
+  HWY_DYNAMIC_DISPATCH(search_one_row)(grid, from, gradients, to, row, iterations, nullptr, flows);
+}
+
+void propagate_row(const PatchGrid& grid, const Image<std::uint8_t>& from,
+                   const Gradients& gradients, const Image<std::uint8_t>& to, int row,
+                   int iterations, const Image<Flow>& found, Flow* flows) {
+  HWY_DYNAMIC_DISPATCH(search_one_row)(grid, from, gradients, to, row, iterations, &found, flows);
 }
 
 }  // namespace eventcamera
