@@ -159,6 +159,8 @@ def table(result):
     """A row per simulator; the values closest to the real camera are bold."""
     rows = result["rows"]
     real = next(iter(rows.values()))["reference"]
+    ceiling = next(iter(rows.values()))["noise-ceiling"]
+    matches = ", ".join(f"{ceiling['matches'][within]:.2f}" for within in ("within-1ms", "within-5ms", "within-10ms"))
     shares = [(side, within) for side in ("reference", "candidate")
               for within in ("within-1ms", "within-5ms", "within-10ms")]
 
@@ -177,6 +179,8 @@ def table(result):
         " | real events matched within 1, 5, 10 ms | simulated events matched |",
         "|---|---|---|---|---|---|---|---|",
         f"| real events | | {real['mean']:.3f} | {real['std-dev']:.3f} | | | | |",
+        f"| noise ceiling | | | | {ceiling['map-correlation']:.3f} | {ceiling['interval-distance']:.2f}"
+        f" | {matches} | {matches} |",
     ]
     for name, row in rows.items():
         cells = [name, thresholds_of(row["element"])]
