@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Builds the plugins and programs with each feature disabled, beside others that have nothing to do
 # with it, in one directory and in such an order that little is built again: Meson deletes what a
-# configuration does not need. Nothing but one optical flow may need OpenCV.
+# configuration does not need. Starts from a copy of build, if there is one. Nothing but one optical
+# flow may need OpenCV.
 set -eu
 cd "$(dirname "$0")/.."
 scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"' EXIT
-build=$scratch/build
+build=build-options
+trap 'rm -rf "$scratch" "$build"' EXIT
+if [ -f build/build.ninja ]; then cp -a build "$build"; fi
 
 fail() {
   echo "FAILED: $*" >&2
@@ -23,9 +25,9 @@ without() { # FEATURE...
       *) options+=("-D$feature=auto") ;;
     esac
   done
-  if [ -d "$build" ]; then meson configure "$build" "${options[@]}"; fi
-  ./compile "$build" -Dtests=false -Dintrospection=disabled -Dbuildtype=plain -Dwerror=true \
-    --prefix="$scratch/installed" "${options[@]}"
+  options+=(-Dtests=false -Dbenchmarks=false -Dintrospection=disabled -Dwerror=true --prefix="$scratch/installed")
+  if [ -d "$build" ]; then meson setup --reconfigure "$build" "${options[@]}" >/dev/null; fi
+  ./compile "$build" "${options[@]}"
 }
 
 uses_opencv() {
