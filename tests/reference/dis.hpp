@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "src/core/image.hpp"
 #include "src/flow/dis/dis.hpp"
@@ -94,6 +95,8 @@ class Patch {
  public:
   Patch(const Grey& from, const Grey& to, int side, int x, int y)
       : from_(from), to_(to), side_(side), x_(x), y_(y) {
+    for (int v = 0; v < side; ++v)
+      for (int u = 0; u < side; ++u) slopes_.push_back(sobel(from, x + u, y + v));
     for_each_pixel([&](int, int, const Slope& slope) {
       xx_ += slope.x * slope.x;
       xy_ += slope.x * slope.y;
@@ -132,7 +135,7 @@ class Patch {
   template <class Body>
   void for_each_pixel(const Body& body) const {
     for (int v = 0; v < side_; ++v)
-      for (int u = 0; u < side_; ++u) body(u, v, sobel(from_, x_ + u, y_ + v));
+      for (int u = 0; u < side_; ++u) body(u, v, slopes_[static_cast<std::size_t>(v * side_ + u)]);
   }
 
   Differences differences(double flow_x, double flow_y) const {
@@ -156,6 +159,7 @@ class Patch {
   int side_;
   int x_;
   int y_;
+  std::vector<Slope> slopes_;
   double xx_ = 0;
   double xy_ = 0;
   double yy_ = 0;
