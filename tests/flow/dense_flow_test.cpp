@@ -49,7 +49,7 @@ struct Method {
 
 // A search of DIS may stop a step earlier or later where its error hardly changes.
 constexpr Method methods[] = {{"dis_lq", FlowMethod::dis_lq, 1e-3, 0.05},
-                              {"dis_mq", FlowMethod::dis_mq, 3e-3, 0.05},
+                              {"dis_mq", FlowMethod::dis_mq, 1e-3, 0.05},
                               {"dis_hq", FlowMethod::dis_hq, 1e-3, 0.05},
                               {"farneback", FlowMethod::farneback, 1e-4, 1e-4},
                               {"opencv_dis", FlowMethod::opencv_dis, 0.02, 0.5}};
@@ -89,7 +89,10 @@ TEST_P(EveryFlow, EqualsItsReferenceOnEveryTarget) {
   const auto to = pictures.at(1);
   const auto best = flow_of(from, to);
   const auto error = difference(best, method.reference(from, to));
-  EXPECT_LT(error.mean, method.mean_error);
+  // Where a border is replicated, neighbours have equally good flows, and rounding decides.
+  const bool is_tied = method.method == FlowMethod::dis_mq &&
+                       std::min(pictures.width, pictures.height) < DisFlow::min_side;
+  EXPECT_LT(error.mean, is_tied ? 3e-3 : method.mean_error);
   EXPECT_LT(error.max, method.max_error);
   targets::for_each(
       [&](const char* target) { EXPECT_TRUE(equal(flow_of(from, to), best)) << "on " << target; });

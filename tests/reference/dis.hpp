@@ -108,7 +108,7 @@ class Patch {
   }
 
   /// Sum of the squared differences, less their mean.
-  double error(double flow_x, double flow_y) const { return differences(flow_x, flow_y).error; }
+  double error(const Flow& flow) const { return differences(flow.x, flow.y).error; }
 
   /// Gradient descent from `start`.
   Flow search(const Flow& start, int iterations) const {
@@ -216,10 +216,10 @@ class Patches {
       for (int i = 0; i < found.width(); ++i) {
         const Patch patch(from_, to_, quality_.patch, i * quality_.stride, j * quality_.stride);
         const Flow* best = nullptr;
-        double lowest = better_share * patch.error(found.at(i, j).x, found.at(i, j).y) - better_by;
+        double lowest = better_share * patch.error(found.at(i, j)) - better_by;
         for (int v = std::max(0, j - 1); v <= std::min(j + 1, found.height() - 1); ++v) {
           for (int u = std::max(0, i - 1); u <= std::min(i + 1, found.width() - 1); ++u) {
-            const double error = patch.error(found.at(u, v).x, found.at(u, v).y);
+            const double error = patch.error(found.at(u, v));
             if (error >= lowest) continue;
             best = &found.at(u, v);
             lowest = error;

@@ -115,6 +115,7 @@ class Search {
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
     move_to(flow_x_, flow_y_);
+    read_moved();
     for (int i = 0; i < count_; i += lanes)
       hn::Store(hn::Sub(hn::Mul(hn::Set(floats, better_share), Cell(*this, i).error()),
                         hn::Set(floats, better_by)),
@@ -131,6 +132,7 @@ class Search {
           flow_y[i] = flow.y;
         }
         move_to(flow_x, flow_y);
+        read_moved();
         for (int i = 0; i < count_; i += lanes) {
           const auto error = Cell(*this, i).error();
           const auto is_better = hn::Lt(error, hn::Load(floats, previous_ + i));
@@ -312,9 +314,9 @@ class Search {
     for (int i = 0; i < count_; i += lanes)
       locate(i, hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats)),
              hn::Load(floats, flow_x + i), hn::Load(floats, flow_y + i));
-    read_moved();
   }
 
+  /// Reads the cells that patches entered.
   void read_moved() {
     for (int k = 0; k < moved_count_; ++k) read_cell(moved_[k]);
     moved_count_ = 0;
