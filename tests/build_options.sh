@@ -7,9 +7,14 @@
 set -eu
 cd "$(dirname "$0")/.."
 scratch=$(mktemp -d)
-build=build-options
-trap 'rm -rf "$scratch" "$build"' EXIT
-if [ -f build/build.ninja ]; then cp -a build "$build"; fi
+trap 'rm -rf "$scratch"' EXIT
+build=$scratch/build
+if [ -f build/build.ninja ] && [ -w . ]; then
+  build="build-options" # beside build, since paths in it are relative
+  trap 'rm -rf "$scratch" "$build"' EXIT
+  rm -rf "$build"
+  cp -a build "$build"
+fi
 
 fail() {
   echo "FAILED: $*" >&2
@@ -27,7 +32,7 @@ without() { # FEATURE...
   done
   options+=(-Dtests=false -Dbenchmarks=false -Dintrospection=disabled -Dwerror=true --prefix="$scratch/installed")
   if [ -d "$build" ]; then meson setup --reconfigure "$build" "${options[@]}" >/dev/null; fi
-  ./compile "$build" "${options[@]}"
+  ./compile "$build" -Dbuildtype=plain "${options[@]}"
 }
 
 uses_opencv() {
