@@ -51,6 +51,8 @@ PRESETS = {f"`{element}`": element for element in ("eventsim-dvs preset=esim", "
     "`eventsim-dvs`, recommended, straight lines": RECOMMENDED.replace("upsampling=motion", "upsampling=linear"),
 }
 CALIBRATED = "`eventsim-dvs`"
+# Fields of matches.
+WITHIN = ("within-1ms", "within-5ms", "within-10ms")
 # What each stage of the calibrated element contributes: the same without it, with thresholds that fit again.
 WITHOUT = {
     f"{CALIBRATED}, `{change}`": change
@@ -158,11 +160,10 @@ def bold_where(best, text):
 def table(result):
     """A row per simulator; the values closest to the real camera are bold."""
     rows = result["rows"]
-    real = next(iter(rows.values()))["reference"]
-    ceiling = next(iter(rows.values()))["noise-ceiling"]
-    matches = ", ".join(f"{ceiling['matches'][within]:.2f}" for within in ("within-1ms", "within-5ms", "within-10ms"))
-    shares = [(side, within) for side in ("reference", "candidate")
-              for within in ("within-1ms", "within-5ms", "within-10ms")]
+    first = next(iter(rows.values()))
+    real, ceiling = first["reference"], first["noise-ceiling"]
+    matches = ", ".join(f"{ceiling['matches'][within]:.2f}" for within in WITHIN)
+    shares = [(side, within) for side in ("reference", "candidate") for within in WITHIN]
 
     def off(row, field):
         return abs(np.log(max(row["candidate"][field], 1e-9) / real[field]))
@@ -195,7 +196,7 @@ def table(result):
                                 f"{row['interval-distance']:.2f}"))
         for side in ("reference", "candidate"):
             values = []
-            for within in ("within-1ms", "within-5ms", "within-10ms"):
+            for within in WITHIN:
                 value = row[f"{side}-matches"][within]
                 values.append(bold_where(value == best_share[side, within], f"{value:.2f}"))
             cells.append(", ".join(values))

@@ -63,16 +63,17 @@ PROFILED = "eventsim-dvs"
 
 
 def likeness(figures):
-    """Similarity of two streams, from 0 to 1: the mean of the map correlation, twice each of the harmonic means of
-    the shares of recorded and of simulated events that have a match within 1, 5 and 10 ms, the ratio of the variances
-    over the pixels, and the ratio between the times from event to event. A harmonic mean is close to the smaller
-    share, so that neither is bought with the other."""
+    """Similarity of two streams, from 0 to 1: the mean of the map correlation, the harmonic means of the shares of
+    recorded and of simulated events that have a match within 1, 5 and 10 ms, which count twice, the ratio of the
+    variances over the pixels, and the ratio between the times from event to event. A harmonic mean is close to the
+    smaller share, so that neither is bought with the other."""
     def both(limit):
         return harmonic_mean([figures[f"{side}-matches"][f"within-{limit}ms"] for side in ("reference", "candidate")])
 
     deviations = sorted(figures[side]["std-dev"] for side in ("reference", "candidate"))
-    return float(np.mean([figures["map-correlation"], *2 * [both(limit) for limit in (1, 5, 10)],
-                          (deviations[0] / deviations[1]) ** 2, 10 ** -figures["interval-distance"]]))
+    return float(np.average([figures["map-correlation"], both(1), both(5), both(10),
+                             (deviations[0] / deviations[1]) ** 2, 10 ** -figures["interval-distance"]],
+                            weights=[1, 2, 2, 2, 1, 1]))
 
 
 class Choices:
