@@ -270,11 +270,11 @@ static GstFlowReturn encode(GstEventWriter* self, std::span<const AbsoluteEvent>
   return GST_FLOW_OK;
 }
 
-/// Encodes the triggers before `t`, without those that come too late. May throw.
-static void encode_triggers(GstEventWriter* self, Microseconds t) {
+/// Encodes triggers, without those that come too late. May throw.
+static void encode_triggers(GstEventWriter* self, std::span<const Trigger> triggers) {
   auto& priv = priv_of(self);
   auto& state = *priv.state;
-  for (const auto& trigger : state.triggers.take_before(t)) {
+  for (const auto& trigger : triggers) {
     if (trigger.t < state.last || !state.encoder->encode_trigger(trigger, priv.bytes)) {
       GST_LOG_OBJECT(self,
                      "left out a trigger of input %u at %" G_GINT64_FORMAT
@@ -287,14 +287,21 @@ static void encode_triggers(GstEventWriter* self, Microseconds t) {
   }
 }
 
+static void encode_all_triggers(GstEventWriter* self) {
+  encode_triggers(self, priv_of(self).state->triggers.take_before(eventcamera::after_all_items));
+}
+
 /// Encodes events, and the triggers among them. May throw.
 static GstFlowReturn encode_all(GstEventWriter* self, std::span<const AbsoluteEvent> events,
                                 GstClockTime& start) {
-  const auto& triggers = priv_of(self).state->triggers;
+  if (events.empty()) return GST_FLOW_OK;
+  std::span<const Trigger> triggers = priv_of(self).state->triggers.take_before(events.back().t);
   GstFlowReturn result = GST_FLOW_OK;
   while (!events.empty() && result == GST_FLOW_OK) {
-    encode_triggers(self, events.front().t);
-    const auto next = triggers.first().value_or(events.back().t);
+    const auto due = std::ranges::lower_bound(triggers, events.front().t, {}, &Trigger::t);
+    encode_triggers(self, {triggers.begin(), due});
+    triggers = {due, triggers.end()};
+    const auto next = triggers.empty() ? events.back().t : triggers.front().t;
     const auto end = std::ranges::upper_bound(events, next, {}, &AbsoluteEvent::t);
     const auto count = static_cast<std::size_t>(end - events.begin());
     result = encode(self, events.first(count), start);
@@ -381,7 +388,7 @@ static void end_file(GstEventWriter* self) {
   reported(self, [&] {
     GstFlowReturn result = push_header(self, GST_CLOCK_TIME_NONE);
     if (result != GST_FLOW_OK) return result;
-    encode_triggers(self, eventcamera::after_all_items);
+    encode_all_triggers(self);
     for (bool more = true; more && result == GST_FLOW_OK;) {
       more = priv.state->encoder->finish(priv.bytes);
       result = push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
@@ -403,7 +410,7 @@ static GstFlowReturn take_triggers(GstEventWriter* self, std::span<const Trigger
   const auto first = std::max<Microseconds>(*priv.state->triggers.first(), 0);
   const auto start = static_cast<GstClockTime>(first) * GST_USECOND;
   if (const GstFlowReturn result = push_header(self, start); result != GST_FLOW_OK) return result;
-  encode_triggers(self, eventcamera::after_all_items);
+  encode_all_triggers(self);
   priv.writable.reach(priv.state->last);
   return push_bytes(self, start, GST_CLOCK_TIME_NONE);
 }
