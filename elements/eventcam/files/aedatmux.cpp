@@ -352,9 +352,12 @@ static GstFlowReturn aggregate(GstAggregator* aggregator, gboolean /*timeout*/) 
 /// has begun or can begin.
 static GstClockTime get_next_time(GstAggregator* aggregator) {
   auto* self = GST_AEDAT_MUX(aggregator);
-  if (!self->priv->file.has_begun() && !is_known(self)) return GST_CLOCK_TIME_NONE;
   GstClockTime time = GST_CLOCK_TIME_NONE;
-  return earliest_pad(self, &time) ? time : GST_CLOCK_TIME_NONE;
+  reported(self, [&] {
+    if (self->priv->file.has_begun() || is_known(self)) earliest_pad(self, &time);
+    return GST_FLOW_OK;
+  });
+  return time;
 }
 
 /* events, queries, pads */

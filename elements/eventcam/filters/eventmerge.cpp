@@ -503,16 +503,20 @@ static GstPad* request_new_pad(GstElement* element, GstPadTemplate* pad_template
                                const GstCaps* caps) {
   GstPad* const pad = PARENT_ELEMENT_CLASS->request_new_pad(element, pad_template, name, caps);
   if (pad == nullptr) return nullptr;
-  const auto position =
-      aggregator_impl<EventMerge>(element).released.lock()->extract(GST_OBJECT_NAME(pad));
-  if (position) *GST_EVENT_MERGE_PAD(pad)->priv->position.lock() = position.mapped();
+  guarded(element, failure, [&] {
+    const auto position =
+        aggregator_impl<EventMerge>(element).released.lock()->extract(GST_OBJECT_NAME(pad));
+    if (position) *GST_EVENT_MERGE_PAD(pad)->priv->position.lock() = position.mapped();
+  });
   gst_child_proxy_child_added(GST_CHILD_PROXY(element), G_OBJECT(pad), GST_OBJECT_NAME(pad));
   return pad;
 }
 
 static void release_pad(GstElement* element, GstPad* pad) {
-  (*aggregator_impl<EventMerge>(element).released.lock())[GST_OBJECT_NAME(pad)] =
-      GST_EVENT_MERGE_PAD(pad)->priv->position.copy();
+  guarded(element, failure, [&] {
+    (*aggregator_impl<EventMerge>(element).released.lock())[GST_OBJECT_NAME(pad)] =
+        GST_EVENT_MERGE_PAD(pad)->priv->position.copy();
+  });
   gst_child_proxy_child_removed(GST_CHILD_PROXY(element), G_OBJECT(pad), GST_OBJECT_NAME(pad));
   PARENT_ELEMENT_CLASS->release_pad(element, pad);
 }
