@@ -21,7 +21,7 @@ run_lines() { # PAGE...
     line=${line//tcpclientsrc host=camera port=3333 do-timestamp=true/filesrc location=camera.evt3}
     line=${line//v4l2src/$ball}
     line=${line//rtspsrc location=rtsp:\/\/camera\/stream ! decodebin/$ball}
-    line=$(sed -E 's/num-buffers=(90|100|300)/num-buffers=40/; s/(videotestsrc pattern=ball) (!|foreground)/\1 num-buffers=40 \2/' <<<"$line")
+    line=$(sed -E 's/num-buffers=(90|100|300)/num-buffers=40/g; s/(videotestsrc pattern=ball) (!|foreground)/\1 num-buffers=40 \2/' <<<"$line")
     line=${line//autovideosink/fakesink}
     line=${line/#python3 //usr/bin/python3 }
     line=${line//glimagesink/"'video/x-raw(memory:GLMemory)' ! fakesink"}
@@ -34,10 +34,10 @@ run_lines() { # PAGE...
       *rtspsrc*) line=${line/fakesink/fakesink num-buffers=10} ;;
       gst-play*) line="$line --no-interactive --videosink=fakesink" ;;
       *--from=10\ --to=20*) line=${line/--from=10 --to=20/--from=0.1 --to=0.2} ;;
-      event-calibrate*) # a second is enough
+      event-calibrate*) # a second, and a few properties to search, are enough
         line=${line/--to 2 --measure-from 2 --measure-to 10/--to 0.3 --measure-from 0.3 --measure-to 1}
         line=${line/--lag find/--lag find --to 0.3}
-        line="${line/eventsim-dvs/\"eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0\"}"
+        line="${line/--element eventsim-dvs/} --element \"eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0\""
         ;;
     esac
     echo "$line"
