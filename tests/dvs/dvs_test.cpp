@@ -861,18 +861,18 @@ class AlongMotion : public testing::TestWithParam<DvsSettings> {};
 INSTANTIATE_TEST_SUITE_P(
     , AlongMotion,
     testing::Values(DvsSettings{}, DvsSettings{.response = Response::log, .log_eps = 0.05},
-                    DvsSettings{.response = Response::linear, .leak_rate = 7, .adaptation = 0.3},
+                    DvsSettings{.response = Response::linear, .leak_rate = 23, .adaptation = 0.3},
                     DvsSettings{.overexposed_light = 3},
-                    DvsSettings{.cutoff_frequency = 100, .leak_rate = 9},
+                    DvsSettings{.cutoff_frequency = 330, .leak_rate = 30},
                     DvsSettings{.positive_threshold = 0.5,
                                 .negative_threshold = 0.7,
-                                .leak_rate = 30,
-                                .refractory_period = 900'000}));
+                                .leak_rate = 100,
+                                .refractory_period = 270'000}));
 
 TEST_P(AlongMotion, EqualsTheReference) {
   constexpr int width = 110;
   constexpr int height = 45;
-  constexpr int microseconds = 8'400;  // a whole number per step, up to 8 of them
+  constexpr int microseconds = 2'520;  // a whole number per step, up to 8 of them
   auto settings = GetParam();
   settings.upsampling = Upsampling::motion;
   settings.max_interpolated_frames = 7;
@@ -918,7 +918,7 @@ TEST_P(AlongMotion, EqualsTheReference) {
   }
   EXPECT_GT(steps_seen.size(), 4U);
   ASSERT_GT(expected.size(), 1500U);
-  expect_near(playback.events, expected, 0.002, 0.97, 5);
+  expect_near(playback.events, expected, 0.002, 0.97, 2);
 }
 
 TEST(Dvs, KeepsThresholdsThatEventsHaveDrawnWhenSettingsChange) {
