@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later
+ *
+ * A pipeline that converts a file of events. */
+#pragma once
+
+#include <gst/gst.h>
+
+#include "element_options.h"
+#include "file_formats.h"
+
+G_BEGIN_DECLS
+
+typedef struct {
+  guint width, height, x, y;
+} Region;
+
+/* What is converted of a recording. */
+typedef struct {
+  gdouble from, to; /* seconds after its start; to G_MAXDOUBLE for all */
+  gchar* crop;      /* WIDTHxHEIGHT+X+Y, or NULL for the whole sensor */
+  Region region;    /* the same */
+} Part;
+
+/* Parses part->crop. FALSE if it is invalid. */
+gboolean set_region(Part* part);
+
+/* Converts `in` to the file `out`, which exists, and counts the events. Prints progress, what `out`
+ * cannot store, and errors. Returns the exit status. */
+int convert_events(const char* in, const Reader* reader, const char* out, const Format* format,
+                   const ElementOptions* options, const Part* part, guint64* events);
+
+/* The first Ctrl-C from now on completes the file with the events so far; the second kills the
+ * program. */
+void catch_interrupt(void);
+gboolean was_interrupted(void);
+
+G_END_DECLS
