@@ -4,8 +4,8 @@
 A clip decodes from MARGIN before its start on. These frames, which the previous clip has as well, must
 be the same in both. Simulators that only remember a frame or two are warm after them; eventsim-dvs
 continues from the state that the previous clip left. Events, times and labels go to a file, from which
-another job feeds the filters and the writer, so that these see what they see of a whole video. Where
-anything is in doubt, that job makes the video as a whole."""
+another job feeds the filters and the writer, so that these see what they see of a whole video. If the
+clips may differ from the whole, that job makes the video as a whole."""
 import contextlib
 import hashlib
 import json
@@ -66,7 +66,7 @@ def cuts_of(video, length):
     return []
 
 
-def hindrance(video):
+def reason_against(video):
     """Why a video of this recipe cannot be cut; empty if it can."""
     if _simulator(video) not in WARMED_UP | WITH_STATE:
         return f"{_simulator(video)} cannot continue a clip"
@@ -103,7 +103,7 @@ def _read(path):
 # making a clip
 
 
-class Doubt(Exception):
+class NotJoinable(Exception):
     """The clips of a video may not be those of the whole."""
 
 
@@ -118,7 +118,7 @@ class ClipFrames(Frames):
         self._forget()
 
     def _forget(self):
-        self.times, self.corrupted, self.before, self.last, self.doubt = [], 0, [], [], ""
+        self.times, self.corrupted, self.before, self.last, self.problem = [], 0, [], [], ""
 
     def watch(self, pad):
         pad.add_probe(Gst.PadProbeType.BUFFER | Gst.PadProbeType.EVENT_DOWNSTREAM | Gst.PadProbeType.EVENT_FLUSH,
@@ -131,13 +131,13 @@ class ClipFrames(Frames):
         buffer = info.get_buffer()
         time = self._segment.to_stream_time(Gst.Format.TIME, buffer.pts)
         if time == Gst.CLOCK_TIME_NONE:
-            self.doubt = "a frame has no time"
+            self.problem = "a frame has no time"
         elif self.end is not None and time >= self.end:
             # The sink pad refuses what follows; the source pad would take a late tag for an error.
             pad.send_event(Gst.Event.new_eos())
             return Gst.PadProbeReturn.DROP
         elif buffer.has_flags(Gst.BufferFlags.DISCONT) and (self.before or self.times):
-            self.doubt = "its frames are not one stream"
+            self.problem = "its frames are not one stream"
         if time < self.start:
             self.before.append([buffer.pts, self._hash_of(buffer)])
         else:
@@ -160,7 +160,7 @@ class ClipFrames(Frames):
         elif event.type != Gst.EventType.GAP:
             return
         if self.before or self.times:
-            self.doubt = "its frames are not one stream"
+            self.problem = "its frames are not one stream"
 
     def _hash_of(self, buffer):
         """Hash of the luma, without row padding."""
@@ -182,11 +182,11 @@ def make_clip(video, folder, cuts, number):
     with tempfile.NamedTemporaryFile(dir=folder, suffix=".events", delete=False) as file:
         try:
             record |= _simulate(video, folder, number, frames, file)
-        except (Doubt, ec.PipelineError) as reason:
-            record["doubt"] = str(reason)
+        except (NotJoinable, ec.PipelineError) as reason:
+            record["problem"] = str(reason)
     events = os.path.join(folder, f"{number}.events")
     os.replace(file.name, events)
-    record |= {"size": os.path.getsize(events), "doubt": record.get("doubt", frames.doubt), "times": frames.times,
+    record |= {"size": os.path.getsize(events), "problem": record.get("problem", frames.problem), "times": frames.times,
                "corrupted": frames.corrupted, "before": frames.before, "last": frames.last}
     write_record(os.path.join(folder, f"{number}.json"), record)
 
@@ -198,8 +198,8 @@ def _simulate(video, folder, number, frames, file):
 
     found = {"caps": None}
     more = {"final-state": state_after(number)} if has_state(video) and frames.end is not None else {}
-    if has_state(video) and number > 0 and _read(os.path.join(folder, f"{number - 1}.json"))["doubt"]:
-        raise Doubt("the previous clip is in doubt")
+    if has_state(video) and number > 0 and _read(os.path.join(folder, f"{number - 1}.json"))["problem"]:
+        raise NotJoinable("the previous clip cannot be joined")
     with video.playing(SINK, threads=1, more=more, filters=False) as pipeline:
         decoders = decoders_of(pipeline)
         pipeline.gaps_as_buffers()
@@ -235,7 +235,7 @@ def _write(file, buffer, is_discontinuous):
 
 
 class Clips:
-    """All clips of a video, joined. Raises Doubt if they are not those of the whole."""
+    """All clips of a video, joined. Raises NotJoinable if they are not those of the whole."""
 
     def __init__(self, video, folder, cuts):
         self._video = video
@@ -248,24 +248,24 @@ class Clips:
         self.frames.times = [time for record in self._records for time in record["times"]]
         self.frames.corrupted = sum(record["corrupted"] for record in self._records)
         if np.any(np.diff(np.array(self.frames.times, np.int64)) <= 0):
-            raise Doubt("the times of its frames do not increase")
+            raise NotJoinable("the times of its frames do not increase")
 
     def _check(self, origin):
         for number, record in enumerate(self._records):
             if record["of"] != origin:
-                raise Doubt("the input has changed")
-            if record["doubt"]:
-                raise Doubt(record["doubt"])
+                raise NotJoinable("the input has changed")
+            if record["problem"]:
+                raise NotJoinable(record["problem"])
             if not os.path.exists(self._paths[number]) or os.path.getsize(self._paths[number]) != record["size"]:
-                raise Doubt(f"the events of clip {number} are missing or cut off")
+                raise NotJoinable(f"the events of clip {number} are missing or cut off")
             if record["caps"] != self._records[0]["caps"] or not record["times"]:
-                raise Doubt(f"clip {number} has no events of the same caps")
+                raise NotJoinable(f"clip {number} has no events of the same caps")
         for before, after in zip(self._records, self._records[1:]):
             seen = after["before"][1:]
             if len(seen) < MIN_MARGIN - 1:
-                raise Doubt(f"a second of it has fewer than {MIN_MARGIN} frames")
+                raise NotJoinable(f"a second of it has fewer than {MIN_MARGIN} frames")
             if seen != before["last"][-len(seen):]:
-                raise Doubt("a seek leads to other frames")
+                raise NotJoinable("a seek leads to other frames")
 
     @contextlib.contextmanager
     def playing(self, rest):

@@ -183,8 +183,8 @@ def clips_folder(args, name):
 def job_of(args, video):
     """What the workflow has to know of a video. Clips of another input or recipe are removed."""
     cuts = dataset_clips.cuts_of(video, args.clip_duration)
-    if cuts and (hindrance := dataset_clips.hindrance(video)):
-        print(f"{video.name}: in one job, not in clips: {hindrance}", file=sys.stderr)
+    if cuts and (reason := dataset_clips.reason_against(video)):
+        print(f"{video.name}: in one job, not in clips: {reason}", file=sys.stderr)
         cuts = []
     dataset_clips.remove_others(video, clips_folder(args, video.name), cuts)
     return {"path": os.path.abspath(video.path), "cuts": cuts, "in-order": dataset_clips.has_state(video)}
@@ -274,8 +274,8 @@ def make_one(args, recipe):
     if args.cuts:
         try:
             clips = dataset_clips.Clips(video, folder, args.cuts)
-        except dataset_clips.Doubt as doubt:
-            notes = {"whole": f"made as a whole, not in clips: {doubt}"}
+        except dataset_clips.NotJoinable as reason:
+            notes = {"whole": f"made as a whole, not in clips: {reason}"}
     record = record_of(video, args.output, keep=not args.verify, clips=clips)
     write_record(path_in(args.output, records_folder(args), name, "json"), record | notes)
     shutil.rmtree(folder, ignore_errors=True)

@@ -343,7 +343,7 @@ class Clips(unittest.TestCase):
             with self.subTest(simulator):
                 video = self.video(f"simulator: {simulator}\noutput: {output}")
                 self.assertEqual(dataset_clips.cuts_of(video, 1), self.CUTS)
-                self.assertEqual(dataset_clips.hindrance(video), "")
+                self.assertEqual(dataset_clips.reason_against(video), "")
                 clips = dataset_clips.Clips(video, self.folder_of_clips(video), self.CUTS)
                 joined = record_of(video, path_of("clips/made"), clips=clips)
                 self.assertEqual(joined, record_of(video, path_of("clips/whole")))
@@ -385,7 +385,7 @@ class Clips(unittest.TestCase):
         folder = self.folder_of_clips(video)
         for spoil in (lambda path: os.truncate(path, 100), os.remove):
             spoil(f"{folder}/1.events")
-            with self.assertRaisesRegex(dataset_clips.Doubt, "the events of clip 1 are missing or cut off"):
+            with self.assertRaisesRegex(dataset_clips.NotJoinable, "the events of clip 1 are missing or cut off"):
                 dataset_clips.Clips(video, folder, self.CUTS)
 
     def test_are_not_made_where_they_could_differ(self):
@@ -394,9 +394,9 @@ class Clips(unittest.TestCase):
             "simulator: eventsim-dvs final-state=/x": "it sets its own state",
             "simulator: identity": "identity cannot continue a clip",
         }.items():
-            self.assertEqual(dataset_clips.hindrance(self.video(text)), reason)
+            self.assertEqual(dataset_clips.reason_against(self.video(text)), reason)
         video = self.video("simulator: eventsim-dvs", framerate=3)
-        with self.assertRaisesRegex(dataset_clips.Doubt, "a second of it has fewer than 4 frames"):
+        with self.assertRaisesRegex(dataset_clips.NotJoinable, "a second of it has fewer than 4 frames"):
             dataset_clips.Clips(video, self.folder_of_clips(video), self.CUTS)
         self.assertEqual(dataset_clips.cuts_of(video, 300), [])
         self.assertEqual(dataset_clips.cuts_of(video, 0), [])
