@@ -571,9 +571,19 @@ TEST(Merge, LastsFromTheFirstStartToTheLastEnd) {
   Player player(recordings.line());
   ASSERT_TRUE(player.reaches(GST_STATE_PAUSED)) << player.error;
   const auto duration = player.duration();
+  GstQuery* const seeking = gst_query_new_seeking(GST_FORMAT_TIME);
+  EXPECT_TRUE(gst_element_query(player["sink"], seeking));
   ASSERT_TRUE(player.play()) << player.error;
   EXPECT_EQ(player.events.size(), 4U);
   EXPECT_EQ(duration / ms, 10'999U);
+  gboolean seekable = FALSE;
+  gint64 start = -1;
+  gint64 end = -1;
+  gst_query_parse_seeking(seeking, nullptr, &seekable, &start, &end);
+  gst_query_unref(seeking);
+  EXPECT_TRUE(seekable);
+  EXPECT_EQ(start, 0);
+  EXPECT_EQ(end, static_cast<gint64>(duration));
   EXPECT_EQ(player.position() / ms, 10'999U);
 }
 

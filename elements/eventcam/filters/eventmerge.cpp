@@ -537,7 +537,20 @@ static gboolean answer_duration(GstAggregator* aggregator, GstQuery* query) {
   return duration ? TRUE : FALSE;
 }
 
+/// Seekable up to the end of the last stream, if all streams are.
+static gboolean answer_seeking(GstAggregator* aggregator, GstQuery* query) {
+  if (!PARENT_AGGREGATOR_CLASS->src_query(aggregator, query)) return FALSE;
+  GstFormat format = GST_FORMAT_UNDEFINED;
+  gboolean seekable = FALSE;
+  gst_query_parse_seeking(query, &format, &seekable, nullptr, nullptr);
+  const auto duration = MergedTimeline(GST_ELEMENT(aggregator)).duration();
+  if (seekable && format == GST_FORMAT_TIME && duration)
+    gst_query_set_seeking(query, format, TRUE, 0, *duration);
+  return TRUE;
+}
+
 static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
+  if (GST_QUERY_TYPE(query) == GST_QUERY_SEEKING) return answer_seeking(aggregator, query);
   GstFormat format = GST_FORMAT_UNDEFINED;
   if (GST_QUERY_TYPE(query) == GST_QUERY_DURATION)
     gst_query_parse_duration(query, &format, nullptr);
