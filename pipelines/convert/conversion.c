@@ -18,16 +18,14 @@ typedef struct {
   gboolean labelled; /* some events have labels */
 } Conversion;
 
-gboolean set_region(Part* part) {
-  Region* region = &part->region;
-  /* Alone, sscanf() would take signs and spaces. */
-  static const char form[] = "^[0-9]{1,5}x[0-9]{1,5}[+][0-9]{1,5}[+][0-9]{1,5}\\z";
-  return g_regex_match_simple(form, part->crop, 0, 0) &&
-         sscanf(part->crop, "%5ux%5u+%5u+%5u", &region->width, &region->height, &region->x,
-                &region->y) == 4 &&
-         region->width > 0 && region->height > 0 &&
-         region->x + region->width <= GST_EVENT_CAMERA_MAX_SIDE &&
-         region->y + region->height <= GST_EVENT_CAMERA_MAX_SIDE;
+/* True if only a part of the time is converted. */
+static gboolean is_trimmed(const Part* part) {
+  return part->from > 0 || part->to < G_MAXDOUBLE;
+}
+
+/* True if only a part of the sensor is converted. */
+static gboolean is_cropped(const Part* part) {
+  return part->region.width > 0;
 }
 
 /* Sets the location of the element `name`, or of the writer if it is the sink itself. */
@@ -92,7 +90,7 @@ static void link_when_known(const Conversion* self) {
   g_autoptr(GstElement) writer = gst_bin_get_by_name(GST_BIN(self->pipeline), "writer");
   /* Frames are not cropped, so they would not match the events. */
   const gboolean takes_frames =
-      self->part->crop == NULL && strcmp(self->format->media_type, "application/x-aedat") == 0;
+      !is_cropped(self->part) && strcmp(self->format->media_type, "application/x-aedat") == 0;
   g_signal_connect(reader, "no-more-pads", G_CALLBACK(link_streams), takes_frames ? writer : NULL);
 }
 
@@ -185,11 +183,6 @@ static GstPadProbeReturn set_crop(GstPad* pad, GstPadProbeInfo* info, gpointer k
   g_object_set(crop, "left", region->x, "right", (guint)sensor.width - region->x - region->width,
                "top", region->y, "bottom", (guint)sensor.height - region->y - region->height, NULL);
   return GST_PAD_PROBE_OK;
-}
-
-/* True if only a part of the time is converted. */
-static gboolean is_trimmed(const Part* part) {
-  return part->from > 0 || part->to < G_MAXDOUBLE;
 }
 
 /* Makes a reader that knows its file start over at the first time and end at the last, and plays.
@@ -308,7 +301,7 @@ static gboolean run(Conversion* self) {
 
 /* Adds what counts the events, and what crops. */
 static void probe(Conversion* self) {
-  const gboolean crops = self->part->crop != NULL;
+  const gboolean crops = is_cropped(self->part);
   g_autoptr(GstElement) last =
       gst_bin_get_by_name(GST_BIN(self->pipeline), crops ? "crop" : "events");
   if (crops) {
@@ -327,7 +320,7 @@ int convert_events(const char* in, const Reader* reader, const char* out, const 
   g_autofree gchar* line =
       g_strdup_printf("filesrc name=in ! %s name=reader %s queue name=events ! %s %s",
                       reader->element, reader->has_streams ? "" : "!",
-                      part->crop != NULL ? "eventcrop name=crop !" : "", format->writer);
+                      is_cropped(part) ? "eventcrop name=crop !" : "", format->writer);
   g_autoptr(GstElement) pipeline =
       gst_parse_launch_full(line, NULL, GST_PARSE_FLAG_FATAL_ERRORS, &error);
   if (pipeline == NULL) {
@@ -342,7 +335,7 @@ int convert_events(const char* in, const Reader* reader, const char* out, const 
   if (reader->has_streams) link_when_known(&self);
   const gboolean ok = run(&self);
   if (ok) print_left_out(&self);
-  if (ok && !interrupted && self.events == 0 && (is_trimmed(part) || part->crop != NULL))
+  if (ok && !interrupted && self.events == 0 && (is_trimmed(part) || is_cropped(part)))
     print_empty(&self);
   gst_element_set_state(pipeline, GST_STATE_NULL);
   *events = self.events;

@@ -17,12 +17,8 @@ typedef struct {
 /* What is converted of a recording. */
 typedef struct {
   gdouble from, to; /* seconds after its start; to G_MAXDOUBLE for all */
-  gchar* crop;      /* WIDTHxHEIGHT+X+Y, or NULL for the whole sensor */
-  Region region;    /* the same */
+  Region region;    /* of the sensor; without a width for all */
 } Part;
-
-/* Parses part->crop. FALSE if it is invalid. */
-gboolean set_region(Part* part);
 
 /* Converts `in` to the file `out`, which exists, and counts the events. Prints progress, what `out`
  * cannot store, and errors. Returns the exit status. */

@@ -9,6 +9,7 @@
 #define _XOPEN_SOURCE 700 /* for realpath() */
 #include <errno.h>
 #include <fcntl.h>
+#include <gst/eventcamera/eventcamera.h>
 #include <gst/gst.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,6 +27,7 @@
 
 static ElementOptions element_options;
 static Part part = {.to = G_MAXDOUBLE};
+static gchar* crop_text;
 static gchar* output_directory;
 static gchar* output_extension;
 static gchar** files;
@@ -48,7 +50,7 @@ static const GOptionEntry options[] = {
      "Start of the part to convert, counted from the start of IN", "SECONDS"},
     {"to", 0, 0, G_OPTION_ARG_DOUBLE, &part.to,
      "End of the part to convert, exclusive, counted from the start of IN", "SECONDS"},
-    {"crop", 0, 0, G_OPTION_ARG_STRING, &part.crop,
+    {"crop", 0, 0, G_OPTION_ARG_STRING, &crop_text,
      "Convert only a region of the sensor, whose first pixel becomes (0, 0)", "WIDTHxHEIGHT+X+Y"},
     {"output-directory", 0, 0, G_OPTION_ARG_FILENAME, &output_directory,
      "Convert each IN to a file of the same name in this folder", "DIRECTORY"},
@@ -210,6 +212,16 @@ static int convert_all(void) {
   return status;
 }
 
+/* Parses WIDTHxHEIGHT+X+Y. FALSE if the text is invalid. */
+static gboolean parse_region(const char* text, Region* out) {
+  /* Alone, sscanf() would take signs and spaces. */
+  static const char form[] = "^[0-9]{1,5}x[0-9]{1,5}[+][0-9]{1,5}[+][0-9]{1,5}\\z";
+  return g_regex_match_simple(form, text, 0, 0) &&
+         sscanf(text, "%5ux%5u+%5u+%5u", &out->width, &out->height, &out->x, &out->y) == 4 &&
+         out->width > 0 && out->height > 0 && out->x + out->width <= GST_EVENT_CAMERA_MAX_SIDE &&
+         out->y + out->height <= GST_EVENT_CAMERA_MAX_SIDE;
+}
+
 /* Returns the error in the options and file names, or NULL. */
 static const char* misuse(void) {
   const guint count = files != NULL ? g_strv_length(files) : 0;
@@ -220,7 +232,7 @@ static const char* misuse(void) {
   if (!(part.from >= 0 && part.from < part.to && part.from < 1e9))
     return "--from must be at least 0 and less than --to";
   if (part.to < G_MAXDOUBLE && part.to >= 1e9) return "--to must be less than 1e9";
-  if (part.crop != NULL && !set_region(&part))
+  if (crop_text != NULL && !parse_region(crop_text, &part.region))
     return "--crop needs WIDTHxHEIGHT+X+Y, such as 320x240+100+50";
   return NULL;
 }
