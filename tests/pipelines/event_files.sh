@@ -43,7 +43,7 @@ eval "$(grep "^python3 .*loadmat" "$SOURCE/docs/formats.md" | sed 's#^#/usr/bin/
 convert n-mnist.npz matlab.csv
 cmp n-mnist.bin.lines matlab.csv || fail "n-mnist.mat has other events"
 
-# From each format to each.
+# From each format to each. The same bytes as above have the same events.
 for in in "${!types[@]}"; do
   for out in "${!types[@]}"; do
     convert "ball.$in" "pair.$out"
@@ -221,7 +221,7 @@ for ending in "${!types[@]}"; do
     if grep ERROR played; then fail "$player ball.$ending"; fi
   done
 done
-for player in "${playing[@]}"; do wait "$player"; done
+for player in "${playing[@]}"; do wait "$player" || fail "a recording is not played to its end"; done
 
 # Other files are not recognised as events.
 "$GST_LAUNCH" -q videotestsrc num-buffers=1 ! pngenc ! filesink location=picture.png
