@@ -30,6 +30,6 @@ inline void announce_latency(GstDebugCategory* category, gpointer element, const
                          "%s was set: latency may have changed", latency->name);
     gst_element_post_message(changed, gst_message_new_latency(GST_OBJECT(changed)));
   };
-  g_signal_connect(element, (std::string("notify::") + property).c_str(), G_CALLBACK(post),
-                   category);
+  const std::string notify = std::string("notify::").append(property);
+  g_signal_connect(element, notify.c_str(), G_CALLBACK(post), category);
 }
