@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Builds the plugins and programs with each feature disabled, beside others that have nothing to do
-# with it, in one directory and in such an order that little is built again: Meson deletes what a
-# configuration does not need. Starts from a copy of build, if there is one. Nothing but one optical
-# flow may need OpenCV.
+# with it, in one directory and in such an order that little is built again. Starts from a copy of
+# build, if there is one. Nothing but one optical flow may need OpenCV.
 set -eu
 cd "$(dirname "$0")/.."
 scratch=$(mktemp -d)
@@ -31,7 +30,10 @@ without() { # FEATURE...
     esac
   done
   options+=(-Dtests=false -Dbenchmarks=false -Dintrospection=disabled -Dwerror=true --prefix="$scratch/installed")
-  if [ -d "$build" ]; then meson setup --reconfigure "$build" "${options[@]}" >/dev/null; fi
+  if [ -d "$build" ]; then
+    meson setup --reconfigure "$build" "${options[@]}" >/dev/null
+    ninja -C "$build" -t cleandead >/dev/null # what only other configurations build
+  fi
   ./compile "$build" -Dbuildtype=plain "${options[@]}"
 }
 
