@@ -46,13 +46,15 @@ HWY_INLINE hn::Vec<Quarters> quarters(Sum sum) {
     return sum;
 }
 
-/// Sums at one of the four pixels of a patch's cell.
+/// Sums at one of the four pixels of a patch's cell, of the differences there.
 struct Corner {
   // Not defaulted, like that of ProductSum.
   Corner() {}  // NOLINT(modernize-use-equals-default)
-  HWY_INLINE void add(Word d, Word slope_x, Word slope_y) {
+  HWY_INLINE void add(Word d) {
     square.add(d, d);
     plain.add(d, hn::Set(Words(), 1));
+  }
+  HWY_INLINE void add_slopes(Word d, Word slope_x, Word slope_y) {
     along_x.add(d, slope_x);
     along_y.add(d, slope_y);
   }
@@ -62,6 +64,9 @@ struct Corner {
   WordSum along_x;
   WordSum along_y;
 };
+
+/// What the sums of a cell are for.
+enum class Sums { error, error_and_step };
 
 /// Stores the totals of four sums.
 HWY_INLINE void store_totals(const WordSum& sum0, const WordSum& sum1, const WordSum& sum2,
@@ -100,7 +105,7 @@ class Search {
       start_x_[i] = flow_x_[i] = flows[i].x;
       start_y_[i] = flow_y_[i] = flows[i].y;
       previous_[i] = std::numeric_limits<float>::infinity();
-      cell_x_[i] = cell_y_[i] = std::numeric_limits<float>::max();
+      leave_cell(i);
       active_[i] = 1;
     }
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
@@ -115,7 +120,7 @@ class Search {
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
     move_to(flow_x_, flow_y_);
-    read_moved();
+    read_moved<Sums::error>();
     for (int i = 0; i < count_; i += lanes)
       hn::Store(hn::Sub(hn::Mul(hn::Set(floats, better_share), Cell(*this, i).error()),
                         hn::Set(floats, better_by)),
@@ -132,7 +137,7 @@ class Search {
           flow_y[i] = flow.y;
         }
         move_to(flow_x, flow_y);
-        read_moved();
+        read_moved<Sums::error>();
         for (int i = 0; i < count_; i += lanes) {
           const auto error = Cell(*this, i).error();
           const auto is_better = hn::Lt(error, hn::Load(floats, previous_ + i));
@@ -147,6 +152,7 @@ class Search {
       start_x_[i] = flow_x_[i];
       start_y_[i] = flow_y_[i];
       previous_[i] = std::numeric_limits<float>::infinity();
+      leave_cell(i);
     }
   }
 
@@ -157,7 +163,7 @@ class Search {
       if (active_[i] != 0) read_gradients(i);
     move_to(flow_x_, flow_y_);
     for (int iteration = 0; iteration < iterations; ++iteration) {
-      read_moved();
+      read_moved<Sums::error_and_step>();
       bool any = false;
       for (int i = 0; i < count_; i += lanes) {
         const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
@@ -236,8 +242,14 @@ class Search {
     mean_y_[i] = static_cast<float>(totals[5]) / pixels;
   }
 
+  /// Has the sums of a patch read wherever it is next.
+  void leave_cell(int i) {
+    cell_x_[i] = cell_y_[i] = std::numeric_limits<float>::max();
+  }
+
   /// Computes the sums at the four pixels of a patch's cell, of the differences d0 ... d3 and their
   /// products.
+  template <Sums sums>
   void read_cell(int i) {
     const int x = left_ + i * stride_;
     const int to_x = static_cast<int>(cell_x_[i]);
@@ -254,31 +266,40 @@ class Search {
     WordSum d23;
     for (int first = 0; first < side * side; first += vector_size) {
       const auto here = load_words(from_, x, top_, first);
-      const auto slope_x = load_words(gradients_.x(), x, top_, first);
-      const auto slope_y = load_words(gradients_.y(), x, top_, first);
       const auto d0 = hn::Sub(load_words(to_, to_x, to_y, first), here);
       const auto d1 = hn::Sub(load_words(to_, to_x + 1, to_y, first), here);
       const auto d2 = hn::Sub(load_words(to_, to_x, to_y + 1, first), here);
       const auto d3 = hn::Sub(load_words(to_, to_x + 1, to_y + 1, first), here);
-      c0.add(d0, slope_x, slope_y);
-      c1.add(d1, slope_x, slope_y);
-      c2.add(d2, slope_x, slope_y);
-      c3.add(d3, slope_x, slope_y);
+      c0.add(d0);
+      c1.add(d1);
+      c2.add(d2);
+      c3.add(d3);
       d01.add(d0, d1);
       d02.add(d0, d2);
       d03.add(d0, d3);
       d12.add(d1, d2);
       d13.add(d1, d3);
       d23.add(d2, d3);
+      if constexpr (sums == Sums::error_and_step) {
+        const auto slope_x = load_words(gradients_.x(), x, top_, first);
+        const auto slope_y = load_words(gradients_.y(), x, top_, first);
+        c0.add_slopes(d0, slope_x, slope_y);
+        c1.add_slopes(d1, slope_x, slope_y);
+        c2.add_slopes(d2, slope_x, slope_y);
+        c3.add_slopes(d3, slope_x, slope_y);
+      }
     }
     std::int32_t totals[max_sums];
     store_totals(c0.square, c1.square, c2.square, c3.square, totals);
     store_totals(d01, d02, d03, d12, totals + 4);
     store_totals(d13, d23, d13, d23, totals + 8);
     store_totals(c0.plain, c1.plain, c2.plain, c3.plain, totals + sum);
-    store_totals(c0.along_x, c1.along_x, c2.along_x, c3.along_x, totals + sum_x);
-    store_totals(c0.along_y, c1.along_y, c2.along_y, c3.along_y, totals + sum_y);
-    for (int k = 0; k < max_sums; ++k) sums_[k][i] = static_cast<float>(totals[k]);
+    if constexpr (sums == Sums::error_and_step) {
+      store_totals(c0.along_x, c1.along_x, c2.along_x, c3.along_x, totals + sum_x);
+      store_totals(c0.along_y, c1.along_y, c2.along_y, c3.along_y, totals + sum_y);
+    }
+    for (int k = 0; k < (sums == Sums::error ? sum_x : max_sums); ++k)
+      sums_[k][i] = static_cast<float>(totals[k]);
   }
 
   /// Stores the positions of patches, and queues those that entered another cell.
@@ -317,8 +338,9 @@ class Search {
   }
 
   /// Reads the cells that patches entered.
+  template <Sums sums>
   void read_moved() {
-    for (int k = 0; k < moved_count_; ++k) read_cell(moved_[k]);
+    for (int k = 0; k < moved_count_; ++k) read_cell<sums>(moved_[k]);
     moved_count_ = 0;
   }
 
