@@ -37,18 +37,22 @@ class Rows {
   explicit Rows(Harness& h) : h_(h) {}
 
   /// Pushes a frame and returns the output.
-  Buffer change(int rows) {
-    for (int y = 0; y < rows; ++y) bright_[y] = !bright_[y];
-    EXPECT_EQ(h_.push(h_.frame(40 * GST_MSECOND * static_cast<GstClockTime>(count_++),
-                               [this](int, int y) { return bright_[y] ? 200 : 50; })),
-              GST_FLOW_OK);
+  Buffer change(gsize rows) {
+    for (gsize y = 0; y < rows; ++y) bright_[y] = !bright_[y];
+    GstBuffer* const frame = gst_buffer_new_allocate(nullptr, size * size, nullptr);
+    for (gsize y = 0; y < size; ++y)
+      gst_buffer_memset(frame, y * size, bright_[y] ? 200 : 50, size);
+    GST_BUFFER_PTS(frame) = 40 * GST_MSECOND * count_++;
+    EXPECT_EQ(h_.push(frame), GST_FLOW_OK);
     return h_.pull();
   }
 
  private:
+  static constexpr gsize size = 1000;
+
   Harness& h_;
-  bool bright_[1000] = {};
-  int count_ = 0;
+  bool bright_[size] = {};
+  GstClockTime count_ = 0;
 };
 
 gsize room_of(const Buffer& buffer) {
@@ -65,11 +69,11 @@ TEST(EventBuffers, AreAsLongAsTheirEvents) {
   h.caps(large_video);
   Rows rows(h);
   EXPECT_FALSE(rows.change(0));
-  for (const int count : {1, 3, 1000, 2, 999, 1}) {
+  for (const gsize count : {1, 3, 1000, 2, 999, 1}) {
     const auto buffer = rows.change(count);
     ASSERT_TRUE(buffer);
     const auto events = events_of(buffer.get());
-    ASSERT_EQ(events.size(), static_cast<std::size_t>(count) * 1000);
+    ASSERT_EQ(events.size(), count * 1000);
     for (std::size_t i = 0; i < events.size(); ++i) {
       ASSERT_EQ(events[i].x, i % 1000);
       ASSERT_EQ(gst_event_camera_event_get_y(&events[i]), i / 1000);
