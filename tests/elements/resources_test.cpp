@@ -74,7 +74,8 @@ INSTANTIATE_TEST_SUITE_P(, Memory, testing::Combine(testing::ValuesIn(elements),
 
 TEST_P(Memory, DoesNotGrowFrameByFrame) {
   const auto& [element, draws] = GetParam();
-  const int frames = is_on_gpu(element) ? 200 : 10'000;  // a software renderer is slow
+  // A software renderer is slow.
+  const int frames = is_on_gpu(element) ? repetitions(100, 500) : repetitions(2'000, 20'000);
   Harness h(element);
   h.caps(video, draws ? pictures_of(element) : GST_EVENT_CAMERA_MEDIA_TYPE);
   const Flight flight(h);
@@ -114,7 +115,7 @@ INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(element_names()),
                          element_lines::test_name);
 
 TEST_P(EveryElement, ReleasesEverythingOnStop) {
-  const int starts = repetitions(60, 500);
+  const int starts = repetitions(30, 500);
   const std::string line = Kind(GetParam()).launch_with_sources(1'000'000);
   Resources after_some;
   for (int i = 0; i < starts; ++i) {
@@ -202,7 +203,7 @@ class Flood {
 /// The packets are also the test's, which releases them while they are received.
 TEST(RtpFlood, NeedsNoMoreMemoryOverTime) {
   mallopt(M_ARENA_MAX, 1);
-  const int packets = repetitions(300'000, 20'000'000);
+  const int packets = repetitions(100'000, 20'000'000);
   const auto pipeline = launched(
       "appsrc name=source format=time block=true max-buffers=1 max-bytes=0 "
       "caps=\"application/x-rtp,media=application,clock-rate=1000000,"
