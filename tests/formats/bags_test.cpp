@@ -10,7 +10,10 @@
 #include <iterator>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
+#include <utility>
 
 #include "src/core/byte_order.hpp"
 #include "src/formats/ros/bag_decoder.hpp"
@@ -288,6 +291,39 @@ TEST_F(Bags, StateTheirLastTime) {
     decoder->open(source);
     decoded(*decoder, bytes);
     EXPECT_EQ(decoder->last_time(), expected.events.back().t);
+  }
+}
+
+/// A source that reads nothing more once it is stopped.
+class StoppableBytes final : public ByteSource {
+ public:
+  explicit StoppableBytes(std::vector<std::uint8_t> bytes) : source_(std::move(bytes)) {}
+
+  void stop() { is_stopped_ = true; }
+  std::uint64_t size() const override { return source_.size(); }
+  std::optional<std::size_t> read(std::uint64_t position,
+                                  std::span<std::uint8_t> out) noexcept override {
+    return is_stopped_ ? std::nullopt : source_.read(position, out);
+  }
+  std::optional<std::span<const std::uint8_t>> piece(std::uint64_t position) override {
+    return is_stopped_ ? std::nullopt : source_.piece(position);
+  }
+
+ private:
+  MemoryBytes source_;
+  bool is_stopped_ = false;
+};
+
+TEST_F(Bags, StateNoLastTimeOfASourceThatIsStopped) {
+  for (const auto& name : names()) {
+    SCOPED_TRACE(name);
+    const auto bytes = bytes_of(folder / name);
+    StoppableBytes source(bytes);
+    const auto decoder = std::make_unique<BagDecoder>("");
+    decoder->open(source);
+    decoded(*decoder, bytes);
+    source.stop();
+    EXPECT_EQ(decoder->last_time(), std::nullopt);
   }
 }
 

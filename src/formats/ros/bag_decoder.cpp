@@ -215,6 +215,7 @@ std::optional<Microseconds> BagDecoder::decoded_last_time() {
     if (const auto offset = topics_[i]->clock_offset())
       tail.clock_offsets_[streams_[i].source] = *offset;
   const bool reads_itself = tail.open(*source_);
+  if (tail.file_ == nullptr) return std::nullopt;  // reading was stopped
   const auto start = tail.file_->seek_point_before(*logged);
   if (!start) return std::nullopt;
   tail.file_->restart(*start);
