@@ -70,10 +70,10 @@ std::vector<AbsoluteEvent> sent_events() {
   return events;
 }
 
-/// Gets the events from the appsink `out` of a pipeline.
+/// Gets the events from the appsink `out` of a pipeline, which stops before they are gone.
 class Receiver {
  public:
-  explicit Receiver(const Pipeline& pipeline) {
+  explicit Receiver(Pipeline& pipeline) : pipeline_(pipeline) {
     GstAppSinkCallbacks callbacks = {};
     callbacks.new_sample = [](GstAppSink* out, gpointer self) {
       static_cast<Receiver*>(self)->take(gst_app_sink_pull_sample(out));
@@ -81,6 +81,9 @@ class Receiver {
     };
     gst_app_sink_set_callbacks(GST_APP_SINK(pipeline["out"]), &callbacks, this, nullptr);
   }
+  ~Receiver() { pipeline_.set(GST_STATE_NULL); }
+  Receiver(const Receiver&) = delete;
+  Receiver& operator=(const Receiver&) = delete;
 
   std::vector<AbsoluteEvent> events() {
     const std::lock_guard lock(mutex_);
@@ -96,6 +99,7 @@ class Receiver {
 
  private:
   void take(GstSample* sample) {
+    if (sample == nullptr) return;  // stopped
     {
       const std::lock_guard lock(mutex_);
       append_events(gst_sample_get_buffer(sample), events_);
@@ -103,6 +107,7 @@ class Receiver {
     gst_sample_unref(sample);
   }
 
+  Pipeline& pipeline_;
   std::mutex mutex_;
   std::vector<AbsoluteEvent> events_;
 };
