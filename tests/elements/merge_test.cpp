@@ -482,8 +482,8 @@ TEST(Merge, WritesTwoRecordingsIntoOne) {
   const Recordings recordings;
   const TemporaryFile both;
   Pipeline pipeline("eventmerge name=m ! evtenc" + both.sink() + "  " + recordings.a.source() +
-                    "evtdec ! m.  " + recordings.b.source() +
-                    "evtdec buffer-duration=7000000 ! m.");
+                    "evtdec ! m.sink_0  " + recordings.b.source() +
+                    "evtdec buffer-duration=7000000 ! m.sink_1");
   ASSERT_TRUE(pipeline.play()) << pipeline.error;
   EXPECT_TRUE(pipeline.warnings.empty());
   auto expected = Recordings::read(recordings.a);

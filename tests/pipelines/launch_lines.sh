@@ -151,7 +151,7 @@ for file in evt3.mcap evt3.bag evt3.db3; do
 done
 
 # Merged: two recordings, and two live streams side by side.
-launch eventmerge name=m ! evtenc ! filesink location=both.raw  filesrc location=candidate.raw ! evtdec ! m.  filesrc location=filtered.raw ! evtdec ! m.
+launch eventmerge name=m ! evtenc ! filesink location=both.raw  filesrc location=candidate.raw ! evtdec ! m.sink_0  filesrc location=filtered.raw ! evtdec ! m.sink_1
 [ "$(stat -c %s both.raw)" -gt "$(stat -c %s candidate.raw)" ] || fail "the merged recording is not larger"
 launch eventmerge name=m sink_1::xpos=320 ! eventrender ! fakesink sync=true  videotestsrc is-live=true pattern=ball num-buffers=20 ! eventsim-diff ! queue ! m.  videotestsrc is-live=true pattern=snow num-buffers=20 ! eventsim-frame ! queue ! m.
 

@@ -13,9 +13,9 @@
  * one microsecond are in the order of the pads. Labels stay with their events. Where a stream is
  * flagged DISCONT, so is the output. A seek must flush.
  *
- * Readers of recordings are linked to the pads in any order: name the pads, as in `m.sink_1`, to
- * place their sensors. The output starts once #GstEventMerge:min-streams streams are linked, and an
- * interval is sent once every stream has reached its end, or has ended.
+ * Readers of recordings are linked as they start, in any order, and GStreamer may give two at once
+ * the same pad: name the pads, as in `m.sink_1`. The output starts once #GstEventMerge:min-streams
+ * streams are linked, and an interval is sent once every stream has reached its end, or has ended.
  *
  * Streams from live sources are waited for no longer than the latency, to which
  * #GstAggregator:latency adds, and need a queue before each pad. Later events are dropped, and
@@ -24,7 +24,7 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 eventmerge name=m ! evtenc ! filesink location=both.raw  filesrc location=a.raw !
- * evtdec ! m.  filesrc location=b.raw ! evtdec ! m.
+ * evtdec ! m.sink_0  filesrc location=b.raw ! evtdec ! m.sink_1
  * gst-launch-1.0 eventmerge name=m sink_1::xpos=346 ! eventrender ! videoconvert ! autovideosink
  * filesrc location=left.raw ! evtdec ! m.sink_0  filesrc location=right.raw ! evtdec ! m.sink_1
  * gst-launch-1.0 eventmerge name=m ! eventrender ! videoconvert ! autovideosink  videotestsrc
