@@ -9,15 +9,15 @@ export GST_TRACERS=leaks GST_DEBUG=GST_TRACER:7 GST_DEBUG_NO_COLOR=1 GST_DEBUG_F
 
 check() {
   echo "gst-launch-1.0 $*"
-  local status attempt
-  # At times, gst-launch-1.0 (1.22) misses an error that comes before its main loop, and waits.
-  for attempt in 1 2 3 4 5; do
+  local status seconds
+  # At times, gst-launch-1.0 (1.22) waits forever after an error or the end before its main loop.
+  for seconds in 2 2 4 8 20; do
     status=0
-    timeout 20 "$GST_LAUNCH" -q "$@" || status=$?
+    timeout $seconds "$GST_LAUNCH" -q "$@" || status=$?
     [ $status -ne 124 ] && break
   done
   if [ $status -eq 124 ]; then
-    echo "FAILED: does not end in $attempt attempts"
+    echo "FAILED: does not end"
     exit 1
   fi
   if grep "object-alive, " "$log" | grep -v "new format string"; then
