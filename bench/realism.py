@@ -77,7 +77,7 @@ class Scene:
 SCENES = {
     "slider": Scene("slider-depth, a DAVIS240C on a slider, 240x180", "slider-depth", "images.txt",
                     "events-t-x-y-p.txt.gz", 2, 2),
-    "cradle": Scene("dark-cradle, a DAVIS346 before Newton's cradle in the dark, 346x260", "dark-cradle",
+    "cradle": Scene("dark-cradle, a DAVIS346 in front of Newton's cradle in the dark, 346x260", "dark-cradle",
                     "davis346.aedat4", "davis346.aedat4", 4, 8),
     "balloon": Scene("balloon, an event camera beside a frame camera at 160 frames per second, 957x856", "balloon",
                      "images.txt", "events.raw", 10, 14, "reachable.png"),

@@ -120,6 +120,6 @@ class Capture:
 
 def described(message):
     if message.type == Gst.MessageType.EOS:
-        return "the camera has stopped"
+        return "the camera has stopped; check that it is connected, and start again"
     error, _ = message.parse_error()
     return f"{message.src.get_name()}: {error.message}"

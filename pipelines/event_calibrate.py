@@ -400,7 +400,9 @@ def span_of(video, recorded, lag, start, end):
     span = Span(latest_start if start is None else origin + round((start + lag) * 1e6),
                 earliest_end if end is None else origin + round((end + lag) * 1e6))
     if span.end <= span.start:
-        raise RuntimeError("the video and the recording do not overlap in time")
+        raise RuntimeError(f"nothing to compare from {span.start / 1e6:.3f} to {span.end / 1e6:.3f} s: the video and the"
+                           f" recording have both from {latest_start / 1e6:.3f} to {earliest_end / 1e6:.3f} s; they"
+                           " need the same clock, and the times of the options must lie within")
     return span
 
 
@@ -409,7 +411,7 @@ def main():
     args = options()
     find_plugins()
     if args.profile and args.element.split()[:1] != [PROFILED]:
-        raise RuntimeError(f"only {PROFILED} has profiles, {args.element.split()[0]} has none")
+        raise RuntimeError(f"only {PROFILED} has profiles, {args.element.split()[0]} has none; leave out --profile")
     for path in filter(None, (args.profile, args.map)):
         expect_writable(path, filter(None, (args.video, args.recording, args.mask)))
     progress = Progress()

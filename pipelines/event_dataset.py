@@ -31,7 +31,8 @@ try:
     from plugins import find_plugins
     from progress import Progress
 except ImportError as missing:
-    sys.exit(f"error: {missing}\nOn Debian, install: python3-gst-eventcamera python3-yaml")
+    sys.exit(f"error: {missing}\nInstall python3-gst-eventcamera, a Debian package of gst-eventsim, and python3-yaml, or in a"
+             " checkout run ./pipelines/event-dataset")
 
 HERE = os.path.dirname(os.path.realpath(__file__))
 STEP = re.compile(r"^(\d+) of (\d+) steps")
@@ -159,7 +160,7 @@ def locked(output, part):
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise RuntimeError(f"another event-dataset works in {output}") from None
+        raise RuntimeError(f"another event-dataset works in {output}; wait for it, or name another folder") from None
     return lock
 
 

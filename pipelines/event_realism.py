@@ -113,7 +113,7 @@ def print_table(real, simulated, rows):
     for title, *cells in lines:
         print("  ".join([title.ljust(widths[0])] + [cell.rjust(width) for cell, width in zip(cells, widths[1:])])
               .rstrip())
-    print("* differs by more than a second recording of the same scene would")
+    print("* beyond the noise ceiling: two recordings of the scene by the same camera would differ less")
 
 
 # the page
@@ -259,7 +259,7 @@ def page_of(sensor, real, simulated, rows, charts):
     return ('<!DOCTYPE html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
             f"<title>Realism of {', '.join(names[1:])}</title><style>{STYLE}</style><h1>Beside {names[0]}</h1>"
             f"<table><tr><th></th>{header}</tr>{body}</table>"
-            "<p>* differs by more than a second recording of the same scene would.</p>"
+            "<p>* beyond the noise ceiling: two recordings of the scene by the same camera would differ less.</p>"
             f'<h2>Events per pixel</h2><div class="maps">{figures}</div><div class="charts">{"".join(charts)}</div>\n')
 
 
@@ -290,11 +290,14 @@ def span_of(streams, start, end):
     origin = int(streams[0].events["t"][0])
     first = max(int(stream.events["t"][0]) for stream in streams) if start is None else origin + round(start * 1e6)
     last = min(int(stream.events["t"][-1]) for stream in streams) if end is None else origin + round(end * 1e6)
+    if start is not None and end is not None and first >= last:
+        raise RuntimeError("--from must be less than --to")
     if first >= last:
         raise RuntimeError("the streams do not overlap in time: "
                            + ", ".join(f"{stream.name} lasts from {stream.events['t'][0] / 1e6:.6f} to"
                                        f" {stream.events['t'][-1] / 1e6:.6f} s" for stream in streams)
-                           + ". A .raw file that is written begins at 0; .npz and .aedat4 keep times.")
+                           + ". A .raw file whose first event is later than 12 hours is written from 0 on; .npz and"
+                             " .aedat4 keep all times.")
     return Span(first - 1, last)
 
 
@@ -302,8 +305,10 @@ def main():
     Gst.init(None)
     args = options()
     find_plugins()
+    if args.video and not args.html:
+        raise RuntimeError("--video is for the page; name that with --html")
     if args.html:
-        expect_writable(args.html, filter(None, [args.real, *args.simulated, args.mask]))
+        expect_writable(args.html, filter(None, [args.real, *args.simulated, args.mask, args.video]))
     sensor = Sensor()
     streams = []
     for path in [args.real] + args.simulated:
@@ -318,7 +323,7 @@ def main():
         stream.events = span.of(stream.events)
     real, *simulated = streams
     if len(real.events) == 0:
-        raise RuntimeError(f"{args.real}: no events in the compared time")
+        raise RuntimeError(f"{args.real}: no events in the compared time; choose another with --from and --to")
     travels = travels_of(args.video, sensor, span) if args.html and args.video else None
     for stream in simulated:
         stream.figures = compare(sensor, real.events, stream.events, span)

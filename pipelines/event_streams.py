@@ -19,7 +19,8 @@ try:
     from gst_eventcamera.recordings import buffer_of
     from gst_eventcamera.sources import LUMA, SINK
 except (ImportError, ValueError) as missing:
-    sys.exit(f"error: {missing}\nOn Debian, install: python3-gst-eventcamera")
+    sys.exit(f"error: {missing}\nInstall python3-gst-eventcamera, a Debian package of gst-eventsim, or in a checkout"
+             " run the programs of pipelines/")
 
 # Frames simulated before a span, so that pixels have a history.
 PAST_FRAMES = 5
@@ -214,7 +215,7 @@ def decode(path, start, end):
         # Decoders have few buffers and wait for them.
         video.frames.append(Frame(buffer.pts, buffer.copy_deep()))
     if not video.frames:
-        raise RuntimeError(f"{path}: no video frames")
+        raise RuntimeError(f"{path}: no video frames; name a video, or a text file of lines \"seconds picture\"")
     return video
 
 

@@ -36,10 +36,10 @@ def threshold_limits(element):
     """The minimum, maximum and default of an element's thresholds."""
     made = Gst.ElementFactory.make(element.split()[0])
     if made is None:
-        raise RuntimeError(f"there is no element \"{element.split()[0]}\"")
+        raise RuntimeError(f"there is no element \"{element.split()[0]}\"; name a simulator, such as eventsim-dvs")
     spec = made.find_property("positive-threshold")
     if spec is None:
-        raise RuntimeError(f"\"{element}\" has no thresholds")
+        raise RuntimeError(f"\"{element}\" has no thresholds; name a simulator, such as eventsim-dvs")
     return spec.minimum, spec.maximum, spec.default_value
 
 
@@ -120,7 +120,8 @@ def find_thresholds(simulated_by, recorded, spans, setting, progress, first=None
     within the spans."""
     goal = share * sum(counts(span.of(recorded)) for span in spans)
     if goal.min() == 0:
-        raise RuntimeError("the recording has no events, or events of only one polarity")
+        raise RuntimeError("the recording lacks ON or OFF events in the time to calibrate on; choose another with --from and"
+                           " --to")
     search = ThresholdSearch(goal, threshold_limits(setting.element), first, precision)
     for trial in range(MAX_TRIALS):
         thresholds = search.pair()

@@ -38,7 +38,7 @@ while [ $# -gt 0 ]; do
         read -ra simulator <<<"$2"
       else
         if [ ! -e "$2" ]; then
-          echo "error: there is no camera $2" >&2
+          echo "error: there is no camera $2; list those that are there: ls /dev/video*" >&2
           exit 1
         fi
         # By default v4l2src selects the largest frames, which many cameras deliver only a few times a second.
@@ -68,7 +68,7 @@ if ! has pipewiresink; then
   exit 1
 fi
 if ! has "${simulator[0]-}"; then
-  echo "error: no simulator \"${simulator[*]}\"" >&2
+  echo "error: no simulator \"${simulator[*]}\"; list them: gst-inspect-1.0 eventsim" >&2
   exit 1
 fi
 remote=${PIPEWIRE_REMOTE:-pipewire-0}

@@ -182,7 +182,7 @@ const Setting table[] = {
      0, fixed, upsampling_type},
     {"max-interpolated-frames", "Maximum interpolated frames",
      "Maximum number of frames interpolated between two frames with upsampling=motion; without "
-     "this limit, no point moves by more than a pixel between them",
+     "this limit, up to 4 pixels of motion have steps of a pixel, and more have longer ones",
      &DvsSettings::max_interpolated_frames, 0, 254},
     {"cutoff-frequency", "Cutoff frequency",
      "Bandwidth of the photoreceptor at white; darker pixels are slower (Hz; 0 = no limit)",

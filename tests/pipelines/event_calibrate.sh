@@ -134,5 +134,5 @@ for option in --profile --map; do
   refused "\. cannot be written; name a file" scene.mkv recorded.raw --element eventsim-dvs $option .
 done
 refused "recorded.raw is read, so it cannot be written" scene.mkv recorded.raw --map ./recorded.raw
-refused "do not overlap in time" scene.mkv recorded.raw --element eventsim-frame --from 5
+refused "nothing to compare from" scene.mkv recorded.raw --element eventsim-frame --from 5
 echo "all thresholds were recovered"

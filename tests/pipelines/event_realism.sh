@@ -82,6 +82,9 @@ refused "none.png\|no events where the mask is white" real1.raw real2.raw --mask
 refused "large.raw: it has 320 x 240 pixels, more than" real1.raw large.raw
 refused "empty.raw: no events" real1.raw empty.raw
 refused "do not overlap in time" real1.raw later.csv
+refused "from must be less than --to" real1.raw real2.raw --from 2 --to 1
+refused "name that with --html" real1.raw real2.raw --video scene.mkv
+refused "scene.mkv is read, so it cannot be written" real1.raw real2.raw --video scene.mkv --html scene.mkv
 refused "nowhere.raw" real1.raw nowhere.raw
 refused "nowhere/page.html cannot be written; name a file" real1.raw real2.raw --html nowhere/page.html
 "$GST_LAUNCH" -q videotestsrc num-buffers=4 ! video/x-raw,width=320,height=240 ! matroskamux ! filesink location=large.mkv

@@ -16,7 +16,7 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventhdf5sink format=metavision
- * location=events.h5
+ * location=events.hdf5
  * ]|
  */
 #include <gst/base/gstbasesink.h>
