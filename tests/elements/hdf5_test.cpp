@@ -204,10 +204,12 @@ TEST_P(Hdf5, IsWritten) {
   // The file is complete at the end of the stream, not only after the stop.
   EXPECT_TRUE(read(path) == events);
   // Again, overwriting the existing file.
-  ASSERT_TRUE(player.reaches(GST_STATE_READY));
-  ASSERT_TRUE(player.play()) << player.error;
-  ASSERT_TRUE(player.reaches(GST_STATE_NULL));
-  EXPECT_TRUE(read(path) == events);
+  for (const auto state : {GST_STATE_READY, GST_STATE_NULL}) {
+    ASSERT_TRUE(player.reaches(state));
+    std::ofstream(path, std::ios::trunc) << "of another program";
+    ASSERT_TRUE(player.play()) << player.error;
+    EXPECT_TRUE(read(path) == events);
+  }
 }
 
 /// Through EVT words and back.
@@ -267,6 +269,28 @@ TEST_P(Hdf5, IsWholeWhereThePipelineIsStoppedBeforeTheEnd) {
     EXPECT_EQ(sink.push(events, 1'000'000), GST_FLOW_OK);
   }
   EXPECT_TRUE(read(path) == events);
+}
+
+TEST_P(Hdf5, IsWrittenToAnotherFileAfterAStop) {
+  const auto first = folder_ / "first.h5";
+  const auto second = folder_ / "second.h5";
+  Sink sink("eventhdf5sink format=" + std::string(GetParam()) + " location=" + in_quotes(first));
+  sink.caps(events_caps);
+  const auto late = AbsoluteEvent::at(5, 5, 1'000'000, Polarity::on);
+  const auto early = AbsoluteEvent::at(6, 6, 1003, Polarity::off);
+  EXPECT_EQ(sink.push({late}, 1'000'000), GST_FLOW_OK);
+  const Owned<GstElement> element(gst_harness_find_element(sink.get(), "eventhdf5sink"));
+  ASSERT_EQ(gst_element_set_state(element.get(), GST_STATE_READY), GST_STATE_CHANGE_SUCCESS);
+  EXPECT_TRUE(read(first) == Events{late});
+  g_object_set(element.get(), "location", second.c_str(), nullptr);
+  gst_element_set_state(element.get(), GST_STATE_PLAYING);
+  sink.caps(events_caps);
+  EXPECT_EQ(sink.push({early}, 0), GST_FLOW_OK);
+  sink.end();
+  EXPECT_EQ(sink.warning(), "");
+  EXPECT_EQ(sink.error(), "");
+  EXPECT_TRUE(read(first) == Events{late});
+  EXPECT_TRUE(read(second) == Events{early});
 }
 
 TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {

@@ -56,7 +56,7 @@ struct Settings {
   GstClockTime commit_interval = GST_SECOND;
 };
 
-/// State of the file, from caps to stop.
+/// State of the file, from caps to READY.
 struct State {
   GstEventCameraInfo info = {};
   std::unique_ptr<Hdf5Writer> writer;  ///< null before caps and after the end
@@ -160,21 +160,6 @@ static bool begin_file(GstEventHdf5Sink* self, const GstEventCameraInfo& info) {
   });
 }
 
-static gboolean start(GstBaseSink* sink) {
-  auto* self = GST_EVENT_HDF5_SINK(sink);
-  if (!self->priv->settings.copy().location.empty()) return TRUE;
-  GST_ELEMENT_ERROR(self, RESOURCE, NOT_FOUND, ("No file to write to. Set the property location."),
-                    ("location is empty"));
-  return FALSE;
-}
-
-static gboolean stop(GstBaseSink* sink) {
-  auto* self = GST_EVENT_HDF5_SINK(sink);
-  const bool ended = end_file(self);
-  self->priv->state = State();
-  return ended;
-}
-
 static gboolean set_caps(GstBaseSink* sink, GstCaps* caps) {
   auto* self = GST_EVENT_HDF5_SINK(sink);
   const State& state = self->priv->state;
@@ -245,6 +230,26 @@ static gboolean event(GstBaseSink* sink, GstEvent* event) {
   return GST_BASE_SINK_CLASS(gst_event_hdf5_sink_parent_class)->event(sink, event);
 }
 
+/* states */
+
+/// GstBaseSink's start and stop are of READY, in which the properties may still be set.
+static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
+  auto* self = GST_EVENT_HDF5_SINK(element);
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
+      self->priv->settings.copy().location.empty()) {
+    GST_ELEMENT_ERROR(self, RESOURCE, NOT_FOUND,
+                      ("No file to write to. Set the property location."), ("location is empty"));
+    return GST_STATE_CHANGE_FAILURE;
+  }
+  const GstStateChangeReturn result =
+      GST_ELEMENT_CLASS(gst_event_hdf5_sink_parent_class)->change_state(element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    end_file(self);
+    self->priv->state = State();
+  }
+  return result;
+}
+
 /* type */
 
 static Guarded<Settings>& settings_of(GObject* object) {
@@ -298,10 +303,9 @@ static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
   gst_element_class_set_static_metadata(element_class, "HDF5 file sink", "Sink/File",
                                         "Writes events as HDF5: DSEC or Metavision",
                                         EVENTSIM_AUTHORS);
+  element_class->change_state = change_state;
 
   GstBaseSinkClass* sink_class = GST_BASE_SINK_CLASS(klass);
-  sink_class->start = start;
-  sink_class->stop = stop;
   sink_class->set_caps = set_caps;
   sink_class->render = render;
   sink_class->event = event;
