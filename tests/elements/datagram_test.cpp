@@ -453,6 +453,17 @@ TEST(Payloader, RefusesSensorsThatTheFormatDoesNotSupport) {
   EXPECT_NE(h.error().find("up to 1024x512 pixels"), std::string::npos);
 }
 
+/// A queue sends refused caps again, before the next buffer.
+TEST(Payloader, RefusesThemEachTime) {
+  Harness h("eventdatagrampay format=jaer");
+  h.caps(events_caps, "application/x-event-datagram");
+  h.caps("application/x-event-camera, format=XYTP, width=1280, height=720",
+         "application/x-event-datagram");
+  EXPECT_NE(h.error().find("up to 1024x512 pixels"), std::string::npos);
+  EXPECT_EQ(h.push(buffer_of(0, {Event::at(1200, 5, 1, Polarity::on)}, GST_MSECOND)),
+            GST_FLOW_NOT_NEGOTIATED);
+}
+
 TEST(Payloader, ReportsItsLatency) {
   Harness h("eventdatagrampay max-latency=7000000");
   h.caps(events_caps, "application/x-event-datagram");

@@ -259,9 +259,9 @@ static gboolean take_caps(GstEventDatagramPay* self, GstEvent* event) {
   Settings settings = priv.settings.copy();
   settings.width = info.width;
   settings.height = info.height;
-  priv.info = info;
   if (!guarded(self, report_of, [&] { priv.packer = make_datagram_packer(settings); }))
     return FALSE;
+  priv.info = info;
   const OwnedCaps out(gst_caps_new_simple("application/x-event-datagram", "format", G_TYPE_STRING,
                                           name_of(settings.format), nullptr));
   GST_DEBUG_OBJECT(self, "sending the events of %dx%d pixels as %" GST_PTR_FORMAT, info.width,
