@@ -42,6 +42,7 @@ run_lines() { # PAGE...
     esac
     echo "$line"
     count=$((count + 1))
+    case $line in *train_on_events*) continue ;; esac # by the test of the examples, in 20 s
     if [[ $line =~ ^(web|rtsp)-events\  ]]; then # serves the lines that follow
       : >serving
       eval "exec $line" >>serving 2>&1 </dev/null &
