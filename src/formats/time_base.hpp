@@ -53,8 +53,9 @@ class TimeBase {
   }
 
  private:
-  /// Limit of small steps: two minutes for 28 bits, two seconds for 12.
-  static constexpr std::uint32_t max_step = std::uint32_t{1} << (bits * 3 / 4);
+  /// Limit of small steps: two minutes for 28 bits; four seconds for 12, in which faery writes
+  /// pauses. One flipped bit makes no such step across the wrap.
+  static constexpr std::uint32_t max_step = std::uint32_t{1} << (bits == 12 ? 10 : 21);
   static constexpr std::uint32_t mask = ~std::uint32_t{0} >> (32 - bits);
 
   static std::uint32_t count_of(std::uint64_t time) {
