@@ -82,7 +82,7 @@ std::vector<TableNumber> TableSample::times_of(const Columns& columns) const {
   return times;
 }
 
-std::optional<Columns> TableSample::find_columns() const {
+std::optional<Columns> TableSample::find_columns(bool is_xypt) const {
   const std::size_t skipped = counts_rows() ? 1 : 0;
   // Returns the column with a number for which `holds` is true, if there is exactly one.
   const auto only_column = [&](const auto& holds) {
@@ -101,7 +101,7 @@ std::optional<Columns> TableSample::find_columns() const {
       [](TableNumber number) { return std::isfinite(number.value) && !is_whole(number.value); });
   if (!time) time = only_column([](TableNumber number) { return number.form != Form::integer; });
 
-  for (const auto* const letters : {"txyp", "xypt", "xytp"}) {
+  for (const auto* const letters : {is_xypt ? "xypt" : "txyp", "txyp", "xypt", "xytp"}) {
     auto columns = *columns_of(letters);
     columns.insert(columns.begin(), skipped, std::nullopt);
     if (rows_.empty()) return columns;

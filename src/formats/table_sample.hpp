@@ -41,8 +41,9 @@ class TableSample {
 
   /// Detects the columns. If only one column has fractions, it is the time. Otherwise returns the
   /// first of txyp, xypt and xytp for which p is a polarity, x and y are coordinates and t never
-  /// decreases. A column that counts rows may precede them. Nothing if no order fits.
-  std::optional<Columns> find_columns() const;
+  /// decreases; xypt is tried before if it `is_xypt` most likely. A column that counts rows may
+  /// precede them. Nothing if no order fits.
+  std::optional<Columns> find_columns(bool is_xypt = false) const;
 
   /// Detects the time unit: seconds if a time has a fraction; otherwise microseconds, or
   /// nanoseconds if only these give a plausible date. If `is_either`, the gaps between times decide

@@ -2,6 +2,7 @@
 #include "src/formats/unit_stream_decoder.hpp"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 
 namespace eventcamera {
@@ -99,8 +100,11 @@ std::size_t UnitStreamDecoder::read_units(std::span<const std::uint8_t> bytes, D
     batch_.open(out, static_cast<std::size_t>(count));
     batch_.start = from;
     batch_.start_position = position_;
+    const auto triggers = out.triggers.size();
     const auto* reached = decoder_->read(from, from + count, batch_);
     latest_ = std::max(latest_, latest_of(batch_.close()));
+    for (const auto& trigger : std::span(out.triggers).subspan(triggers))
+      latest_ = std::max(latest_, trigger.t);
     if (reached == from) return bytes.size() - static_cast<std::size_t>(to - from);
     position_ += static_cast<std::uint64_t>(reached - from);
     from = reached;

@@ -63,7 +63,7 @@ class GapLimiter {
  public:
   static constexpr Microseconds max_gap = Microseconds{12} * 3600 * 1'000'000;
 
-  /// Must be called at least for every event after a long pause.
+  /// Must be called for every event.
   void reach(Microseconds t) {
     const auto gap = static_cast<std::uint64_t>(t) - static_cast<std::uint64_t>(last_);
     if (t > last_ && gap > static_cast<std::uint64_t>(max_gap)) {

@@ -539,6 +539,15 @@ TEST(Mcap, KeepsTriggersWithEvt3) {
   EXPECT_FALSE(make_mcap_encoder({.size = hd})->encode_trigger({1000, 16, true}, bytes));
 }
 
+TEST(Mcap, BeginsItsWordsWithoutAWrap) {
+  for (const Microseconds t : {0, 5'000}) {
+    const auto bytes = encoded({hd, BagEvents::evt3, BagCompression::none},
+                               std::vector{AbsoluteEvent::at(1, 2, t, Polarity::on)});
+    constexpr std::uint8_t last_time_high[] = {0xff, 0x8f};
+    EXPECT_TRUE(std::ranges::search(bytes, last_time_high).empty());
+  }
+}
+
 TEST(Mcap, IsAsSpecified) {
   const auto path = std::filesystem::temp_directory_path() / ("mcap-" + std::to_string(getpid()));
   const auto save = [](const std::filesystem::path& file, const Bytes& bytes) {

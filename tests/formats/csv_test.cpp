@@ -110,6 +110,8 @@ TEST(Csv, ColumnsByTheFirstLines) {
     EXPECT_EQ(found.corruption.places, 0U) << text;
   }
   EXPECT_EQ(read("%geometry:640,480\n3,4,1,10\n").size, (SensorSize{640, 480}));
+  // The only events that could be txyp as well.
+  EXPECT_EQ(read("%geometry:640,480\n5,3,1,0\n").events, Events{on(5, 3, 0)});
   EXPECT_EQ(read("240 180\n0.00001 3 4 1\n").size, (SensorSize{240, 180}));
   // Out of order, but with one column of seconds.
   EXPECT_EQ(read("3 4 0.00001 1\n5 6 0.000002 0\n").events, (Events{on(3, 4, 10), off(5, 6, 2)}));

@@ -410,6 +410,36 @@ TEST(Evt3, FollowsTheWrapOf24BitsAndAFlippedBit) {
               AbsoluteEvent::at(0, 0, lap + 0x65000, off)}));
 }
 
+TEST(Evt3, FollowsStepsOfFourSeconds) {
+  const auto [decoded, corruption] =
+      read(EvtFormat::evt3, evt3({0x8dac, 0x6000, 0x0000, 0x2000, 0x81ac, 0x6000, 0x2000}));
+  constexpr Microseconds first = 0xdac * 4096;
+  EXPECT_EQ(decoded.events, events({AbsoluteEvent::at(0, 0, first, off),
+                                    AbsoluteEvent::at(0, 0, first + 1024 * 4096, off)}));
+  EXPECT_EQ(corruption.places, 0U);
+}
+
+/// No trigger of a sought time or later is missing.
+TEST(Triggers, HaveSeekPointsWithoutEvents) {
+  for (const auto format : {EvtFormat::evt3, EvtFormat::evt2, EvtFormat::evt21, EvtFormat::evt4}) {
+    const auto encoder = make_evt_encoder(format, vga);
+    Bytes bytes;
+    encoder->encode(events({AbsoluteEvent::at(1, 2, 5, on)}), bytes);
+    for (Microseconds t = 100; t < 4'000'000; t += 20) encoder->encode_trigger({t, 1, true}, bytes);
+    const auto decoder = make_evt_decoder(format, vga);
+    decode(*decoder, bytes);
+    for (Microseconds t = 1000; t < 4'000'000; t += 400'000) {
+      const auto seek_point = decoder->seek_point_before(t);
+      ASSERT_TRUE(seek_point);
+      decoder->restart(*seek_point);
+      const auto decoded = decode(*decoder, std::span(bytes).subspan(seek_point->position));
+      ASSERT_FALSE(decoded.triggers.empty()) << t;
+      EXPECT_LE(decoded.triggers.front().t, t);
+      EXPECT_TRUE(t < 1'000'000 || seek_point->position > 0U);
+    }
+  }
+}
+
 TEST(Evt3, DropsWhatIsOutside) {
   const auto [decoded, corruption] =
       read(EvtFormat::evt3, evt3({0x8000, 0x6000, 0x0000, 0x2000 + 640, 0x3000 + 638, 0x4fff,

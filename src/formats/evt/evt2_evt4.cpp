@@ -95,10 +95,8 @@ class CdEncoder final : public Encoder {
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
     const auto write = [&](std::span<const AbsoluteEvent> few, Words& words) {
       while (!few.empty()) {
-        const auto t = few.front().t;
-        if (gaps_.written(t) >> 6 != time_high_) [[unlikely]]
-          put_time_high(t, words);
-        few = few.subspan(Format::put(few, gaps_.written(t), width_, words));
+        const auto time = reach(few.front().t, words);
+        few = few.subspan(Format::put(few, time, width_, words));
       }
     };
     write_events<typename Format::Word>(events, words_at_once, out, write);
@@ -108,9 +106,8 @@ class CdEncoder final : public Encoder {
     if (trigger.id > CdWord::max_trigger_id) return false;
     Words words(out);
     words.reserve(words_at_once);
-    if (gaps_.written(trigger.t) >> 6 != time_high_) put_time_high(trigger.t, words);
-    words.put(
-        Format::word(CdWord::of_trigger(Format::types.trigger, gaps_.written(trigger.t), trigger)));
+    const auto time = reach(trigger.t, words);
+    words.put(Format::word(CdWord::of_trigger(Format::types.trigger, time, trigger)));
     return true;
   }
 
@@ -118,9 +115,16 @@ class CdEncoder final : public Encoder {
     return Format::word(CdWord::time_high(Format::types.time_high, count));
   }
 
-  void put_time_high(Microseconds t, Words& words) {
+  /// Writes the words up to a time, and returns it as it is written.
+  std::uint64_t reach(Microseconds t, Words& words) {
     gaps_.reach(t);
-    const auto count = gaps_.written(t) >> 6;
+    const auto time = gaps_.written(t);
+    if (const auto count = time >> 6; count != time_high_) [[unlikely]]
+      put_time_high(count, words);
+    return time;
+  }
+
+  void put_time_high(std::uint64_t count, Words& words) {
     const bool first = time_high_ == none;
     if (Format::has_steady_time && !first)
       put_steps(count, words);

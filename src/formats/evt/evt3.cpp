@@ -200,12 +200,12 @@ class Evt3Encoder final : public Encoder {
 
   /// Returns the time to write, after reserving space for the words of a pause.
   std::uint64_t written(Microseconds t, WordWriter<std::uint16_t>& words) {
-    const auto time = gaps_.written(t);
-    if (state_.steps_to(time) == 0) return time;
     gaps_.reach(t);
-    const auto steps = state_.steps_to(gaps_.written(t));
-    if (steps > 1 && steps <= Evt3Words::max_steps) words.reserve(steps + words_at_once);
-    return gaps_.written(t);
+    const auto time = gaps_.written(t);
+    const auto steps = state_.steps_to(time);
+    if (steps > 1 && steps <= Evt3Words::max_steps) [[unlikely]]
+      words.reserve(steps + words_at_once);
+    return time;
   }
 
   Evt3Words state_;

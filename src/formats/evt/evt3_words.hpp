@@ -53,7 +53,11 @@ class Evt3Words {
   /// no TIME_HIGH for a pause of more than `max_pause` microseconds.
   void begin_packet(std::uint64_t time, std::uint64_t max_pause) {
     const auto high = time >> 12;
-    high_ = high - high_ > max_pause >> 12 ? high - 1 : high_ - 1;
+    const bool is_first = high_ == before_first;
+    if (high - high_ > max_pause >> 12)
+      high_ = high - 1;
+    else if (!is_first)
+      --high_;
     low_ = y_ = none;
   }
 
@@ -91,6 +95,7 @@ class Evt3Words {
 
  private:
   static constexpr std::uint32_t none = ~std::uint32_t{0};
+  static constexpr std::uint64_t before_first = ~std::uint64_t{0};  ///< one before 0
 
   struct Vector {
     std::size_t events = 0;  ///< 0: a vector does not pay off
@@ -137,7 +142,7 @@ class Evt3Words {
   }
 
   std::uint32_t width_;
-  std::uint64_t high_ = ~std::uint64_t{0};  // one before 0
+  std::uint64_t high_ = before_first;
   std::uint32_t low_ = none;
   std::uint32_t y_ = none;
 };

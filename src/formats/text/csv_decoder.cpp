@@ -193,6 +193,7 @@ bool CsvDecoder::read_header_line(std::string_view line) {
     if (split(line.substr(geometry.size()), fields) != 2) return true;
     const auto size = read_size(fields[0], fields[1]);
     if (size != SensorSize{}) size_ = size;
+    has_geometry_ = true;
     return true;
   }
   if (is_comment(line)) return true;
@@ -263,7 +264,7 @@ void CsvDecoder::find_columns(const TableSample& sample) {
   if (!settings_.columns.empty()) {
     columns_ = settings_.columns;
   } else if (!has_names_) {
-    auto found = sample.find_columns();
+    auto found = sample.find_columns(has_geometry_);
     if (!found)
       throw UnsupportedFormat(
           "not CSV events, or an unknown column order; set column-order, or name the columns t, x, "
