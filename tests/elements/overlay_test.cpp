@@ -16,10 +16,11 @@ class OverlayTest : public testing::Test {
   explicit OverlayTest(const std::string& launch = "eventoverlay palette=grey")
       : overlay(launch, "video_sink", "event_sink") {}
 
-  void begin(const std::string& sensor_size, const std::string& format = "GRAY8") {
+  void begin(const std::string& sensor_size, const std::string& format = "GRAY8",
+             const std::string& framerate = "25/1") {
     gst_harness_set_src_caps_str(
         video.get(),
-        ("video/x-raw, format=" + format + ", width=8, height=4, framerate=25/1").c_str());
+        ("video/x-raw, format=" + format + ", width=8, height=4, framerate=" + framerate).c_str());
     gst_harness_set_src_caps_str(
         events.get(), ("application/x-event-camera, format=XYTP, " + sensor_size).c_str());
   }
@@ -81,6 +82,48 @@ TEST_F(OverlayTest, CutsBuffersOfEventsWhereFramesEnd) {
   EXPECT_EQ(drawn(), (Places{{1, 255}}));
   push_frame(80 * ms);
   EXPECT_EQ(drawn(), (Places{{2, 255}}));
+}
+
+TEST_F(OverlayTest, DrawsTheEventsSinceTheLastFrameWhereItsEndIsNotKnown) {
+  begin("width=8, height=4", "GRAY8", "0/1");
+  push_frame(0, GST_CLOCK_TIME_NONE);
+  push_events(0,
+              {Event::at(0, 0, 0, Polarity::on), Event::at(1, 0, 40'000, Polarity::on),
+               Event::at(2, 0, 40'001, Polarity::on), Event::at(3, 0, 90'000, Polarity::on)},
+              120 * ms);
+  EXPECT_EQ(drawn(), Places{});
+  push_frame(40 * ms, GST_CLOCK_TIME_NONE);
+  EXPECT_EQ(drawn(), (Places{{0, 255}, {1, 255}}));
+  push_frame(90 * ms, GST_CLOCK_TIME_NONE);
+  EXPECT_EQ(drawn(), (Places{{2, 255}, {3, 255}}));
+}
+
+TEST_F(OverlayTest, DrawsTheEventsOfEachFrameAtEveryRate) {
+  begin("width=8, height=4");
+  for (const double rate : {0.5, 1., 2.}) {
+    flush({video.get(), events.get()});
+    for (auto* harness : {video.get(), events.get()}) {
+      GstSegment segment;
+      gst_segment_init(&segment, GST_FORMAT_TIME);
+      segment.rate = rate;
+      gst_harness_push_event(harness, gst_event_new_segment(&segment));
+    }
+    for (int i = 0; i < 2; ++i) {
+      const auto start = static_cast<GstClockTime>(i) * 40 * ms;
+      push_frame(start);
+      push_events(
+          start,
+          {Event::at(4 * i, 0, 5'000, Polarity::on), Event::at(4 * i + 1, 0, 15'000, Polarity::on)},
+          20 * ms);
+      push_events(start + 20 * ms,
+                  {Event::at(4 * i + 2, 0, 5'000, Polarity::on),
+                   Event::at(4 * i + 3, 0, 15'000, Polarity::on)},
+                  20 * ms);
+      EXPECT_EQ(drawn(),
+                (Places{{4 * i, 255}, {4 * i + 1, 255}, {4 * i + 2, 255}, {4 * i + 3, 255}}))
+          << rate;
+    }
+  }
 }
 
 TEST_F(OverlayTest, IsNotHeldUpByAnEventPastTheEndOfItsBuffer) {

@@ -21,8 +21,11 @@
 #include <gst/video/video.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/authors.hpp"
@@ -38,6 +41,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_overlay_debug);
 #define GST_CAT_DEFAULT event_overlay_debug
 
+using eventcamera::Event;
 using eventcamera::Microseconds;
 using eventcamera::Overlay;
 using eventcamera::PaletteName;
@@ -70,6 +74,7 @@ class EventOverlay final : public EventAggregator {
   bool take_video_caps(const GstCaps* caps);
   bool take_event_caps(const GstCaps* caps);
   std::optional<EventInterval> interval_of_frame(GstBuffer* frame) const;
+  std::span<const Event> in_running_time(std::span<const Event> events, double rate);
   bool take_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end);
   bool take_buffer(GstBuffer* buffer, GstClockTime end);
   bool take_events_until(GstClockTime end);
@@ -81,9 +86,11 @@ class EventOverlay final : public EventAggregator {
   // Accessed by the source pad's thread only, or while there is none.
   std::optional<GstVideoInfo> video_;
   std::optional<SensorSize> sensor_;
-  std::optional<Overlay> overlay_;  // set once both are known
-  gsize taken_ = 0;                 // number of processed events of the first queued buffer
-  GstClockTime known_ = 0;          // running time up to which events are complete
+  std::optional<Overlay> overlay_;     // set once both are known
+  gsize taken_ = 0;                    // number of processed events of the first queued buffer
+  GstClockTime known_ = 0;             // running time up to which events are complete
+  std::optional<GstClockTime> shown_;  // running time up to which frames were shown
+  std::vector<Event> scaled_;          // in_running_time()
   WarnOnce warn_of_missing_{GST_CAT_DEFAULT};
 };
 
@@ -94,20 +101,35 @@ std::optional<EventInterval> running_interval(GstAggregatorPad* pad,
                                               const EventInterval& interval) {
   const auto start = running_time(pad, interval.start);
   if (!start) return std::nullopt;
-  return EventInterval{*start, *start + (interval.end - interval.start)};
+  constexpr auto max = static_cast<double>(G_MAXINT64);
+  const auto length = static_cast<double>(interval.end - interval.start) / segment_of(pad).rate;
+  return EventInterval{*start, *start + static_cast<GstClockTime>(std::min(length, max))};
 }
 
-/// Interval during which a frame is shown, in running time.
+/// Interval during which a frame is shown, in running time; that since the last frame if nothing
+/// tells when it ends.
 std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) const {
   const GstClockTime start = GST_BUFFER_PTS(frame);
   if (!GST_CLOCK_TIME_IS_VALID(start) || start > G_MAXINT64) return std::nullopt;
   const GstClockTime duration =
       GST_BUFFER_DURATION_IS_VALID(frame) ? GST_BUFFER_DURATION(frame) : frame_duration(*video_);
-  return running_interval(main_pad(),
-                          {start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)});
+  auto interval = running_interval(
+      main_pad(), {start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)});
+  if (interval && duration == 0)
+    interval->start = std::min(shown_.value_or(interval->end), interval->end);
+  return interval;
 }
 
 /* events */
+
+/// The events of a buffer that is played at a rate, with times that differ as running times do.
+std::span<const Event> EventOverlay::in_running_time(std::span<const Event> events, double rate) {
+  if (rate == 1) return events;
+  constexpr double max = std::numeric_limits<std::uint32_t>::max();
+  scaled_.assign(events.begin(), events.end());
+  for (auto& event : scaled_) event.t = static_cast<std::uint32_t>(std::min(event.t / rate, max));
+  return scaled_;
+}
 
 /// Adds the events of a buffer, whose `interval` is in running time, up to running time `end`.
 /// Returns true if these were all. May throw.
@@ -118,14 +140,17 @@ bool EventOverlay::take_events(GstBuffer* buffer, const EventInterval& interval,
     return true;
   }
   const auto origin = static_cast<Microseconds>(interval.start / 1000);
+  const double rate = segment_of(events_pad_).rate;
   const auto rest = mapped.events().subspan(std::min(taken_, mapped.events().size()));
   if (taken_ == 0)
     GST_LOG_OBJECT(events_pad_, "%" G_GSIZE_FORMAT " events at running time %" GST_TIME_FORMAT,
                    rest.size(), GST_TIME_ARGS(interval.start));
+  const auto length = static_cast<double>(static_cast<Microseconds>(end / 1000) - origin) * rate;
   const auto due =
-      end < interval.end ? events_until(rest, origin, static_cast<Microseconds>(end / 1000)) : rest;
+      end < interval.end ? events_until(rest, 0, static_cast<Microseconds>(length)) : rest;
   taken_ += due.size();
-  if (overlay_) warn(overlay_->add(due, origin, length_of(interval)), buffer);
+  if (overlay_)
+    warn(overlay_->add(in_running_time(due, rate), origin, length_of(interval)), buffer);
   return due.size() == rest.size();
 }
 
@@ -192,6 +217,7 @@ GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& inter
     if (!take_events_until(interval->end) && !timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
   OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
+  if (interval) shown_ = interval->end;
   if (is_gap(out.get())) return pass(std::move(out));
   GST_LOG_OBJECT(main_pad(),
                  "frame at %" GST_TIME_FORMAT "; events are known until %" GST_TIME_FORMAT,
@@ -258,6 +284,7 @@ void EventOverlay::flush() noexcept {
   overlay_.reset();
   taken_ = 0;
   known_ = 0;
+  shown_.reset();
 }
 
 void EventOverlay::stop() {
