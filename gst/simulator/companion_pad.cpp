@@ -134,10 +134,10 @@ GstFlowReturn CompanionPad::push(GstElement* element, OwnedBuffer buffer) {
   }
   changed_.wait(lock, [&] {
     return is_stopped_ || is_flushing_ || items_.empty() ||
-           items_.back().time < position_ + resolution;
+           items_.back().time < (is_seeking_ ? never : position_) + resolution;
   });
   if (is_stopped_ || is_flushing_) return GST_FLOW_FLUSHING;
-  if (position_ == forever) return GST_FLOW_EOS;
+  if (position_ == forever && !is_seeking_) return GST_FLOW_EOS;
   const bool is_full = items_.size() == max_items;
   if (is_full) items_.pop_front();
   known_ = *time;
@@ -221,6 +221,10 @@ void CompanionPad::stop() {
 
 void CompanionPad::set_flushing(bool is_flushing) {
   change([&] { is_video_flushing_ = is_flushing; });
+}
+
+void CompanionPad::set_seeking(bool is_seeking) {
+  change([&] { is_seeking_ = is_seeking; });
 }
 
 void CompanionPad::begin() {

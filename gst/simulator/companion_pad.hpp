@@ -53,9 +53,11 @@ class CompanionPad {
   /// True if a stream is linked to the pad.
   bool is_linked();
 
-  // Of the video. Its thread calls all but set_flushing().
+  // Of the video. Its thread calls all but the first two.
 
   void set_flushing(bool is_flushing);
+  /// Both streams are sought to where time starts over, this one first.
+  void set_seeking(bool is_seeking);
   /// Time starts over.
   void begin();
   /// The video has reached `time`. Of the buffers up to `start`, only the last is still needed.
@@ -107,6 +109,7 @@ class CompanionPad {
   bool is_stopped_ = true;
   bool is_flushing_ = false;
   bool is_video_flushing_ = false;
+  bool is_seeking_ = false;
   bool is_segment_done_ = false;
   std::deque<Item> items_;        ///< in order of time
   Nanoseconds known_ = never;     ///< all buffers before this time are queued

@@ -211,9 +211,14 @@ static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
       gst_event_unref(event);
       return FALSE;
     }
-    for (auto* companion : simulation_of(transform).companions())
+    const auto companions = simulation_of(transform).companions();
+    for (auto* companion : companions) companion->set_seeking(true);
+    for (auto* companion : companions)
       if (const OwnedPad pad = companion->pad())
         gst_pad_push_event(pad.get(), gst_event_ref(event));
+    const gboolean done = PARENT_TRANSFORM_CLASS->src_event(transform, event);
+    for (auto* companion : companions) companion->set_seeking(false);
+    return done;
   }
   return PARENT_TRANSFORM_CLASS->src_event(transform, event);
 }

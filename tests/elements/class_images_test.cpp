@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // eventsim-dvs with class images on its pad label_sink: which event has which class, what is waited
 // for, and classes on their way through other elements.
+#include <atomic>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -342,6 +343,38 @@ TEST(ClassImagesInPipelines, AreSeekedWithTheVideo) {
   ASSERT_TRUE(pipeline.reaches(GST_STATE_PAUSED));
   EXPECT_TRUE(pipeline.seek(300 * ms));
   EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  EXPECT_TRUE(pipeline.warnings.empty());
+}
+
+/// After the end, the video's thread does not tell how far the images may go until it is flushed.
+TEST(ClassImagesInPipelines, AreSeekedBeforeASlowVideo) {
+  const std::string frames = "videotestsrc ! video/x-raw,format=GRAY8,width=64,height=48 ! ";
+  Pipeline pipeline("eventsim-dvs name=dvs ! fakesink sync=false  " + frames + "dvs.sink  " +
+                    frames + "dvs.label_sink");
+  const Owned<GstPad> video(gst_element_get_static_pad(pipeline["dvs"], "sink"));
+  gst_pad_add_probe(
+      video.get(), GST_PAD_PROBE_TYPE_EVENT_UPSTREAM,
+      [](GstPad*, GstPadProbeInfo* info, gpointer) {
+        if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_SEEK) g_usleep(100'000);
+        return GST_PAD_PROBE_OK;
+      },
+      nullptr, nullptr);
+  const Owned<GstPad> images(gst_element_get_static_pad(pipeline["dvs"], "label_sink"));
+  std::atomic<int> count = 0;
+  gst_pad_add_probe(
+      images.get(), GST_PAD_PROBE_TYPE_BUFFER,
+      [](GstPad*, GstPadProbeInfo*, gpointer data) {
+        ++*static_cast<std::atomic<int>*>(data);
+        return GST_PAD_PROBE_OK;
+      },
+      &count, nullptr);
+  ASSERT_TRUE(pipeline.reaches(GST_STATE_PAUSED));
+  for (int times = 0; times < 2; ++times) {
+    count = 0;
+    ASSERT_TRUE(pipeline.seek(0, 1000 * ms));
+    ASSERT_TRUE(pipeline.play()) << pipeline.error;
+    EXPECT_GE(count, 30);
+  }
   EXPECT_TRUE(pipeline.warnings.empty());
 }
 
