@@ -5,12 +5,13 @@
 import json
 
 with open(config["jobs"], encoding="utf-8") as file:
-    videos = json.load(file)
+    jobs = json.load(file)
+videos, command = jobs["videos"], jobs["command"]
 
 
 def clips_of(name):
     cuts = videos[name]["cuts"]
-    return [f"{config['clips']}/{name}.d/{number}.json" for number in range(len(cuts) + 1 if cuts else 0)]
+    return [f"{jobs['clips']}/{name}.d/{number}.json" for number in range(len(cuts) + 1 if cuts else 0)]
 
 
 def clip_before(wildcards):
@@ -26,22 +27,22 @@ def arguments(wildcards):
 
 rule all:
     input:
-        lambda _: [f"{config['records']}/{name}.json" for name in videos],
+        lambda _: [f"{jobs['records']}/{name}.json" for name in videos],
 
 
 rule clip:
     input:
         clip_before,
     output:
-        config["clips"] + "/{name}.d/{number}.json",
+        jobs["clips"] + "/{name}.d/{number}.json",
     wildcard_constraints:
         number=r"\d+",
     params:
         arguments=arguments,
     log:
-        config["clips"] + "/{name}.d/{number}.log",
+        jobs["clips"] + "/{name}.d/{number}.log",
     shell:
-        "{config[command]} --clip-number {wildcards.number} --video={wildcards.name:q} {params.arguments:q}"
+        "{command} --clip-number {wildcards.number} --video={wildcards.name:q} {params.arguments:q}"
         " >{log:q} 2>&1"
 
 
@@ -49,10 +50,10 @@ rule video:
     input:
         lambda wildcards: clips_of(wildcards.name),
     output:
-        config["records"] + "/{name}.json",
+        jobs["records"] + "/{name}.json",
     params:
         arguments=arguments,
     log:
         "logs/{name}.log",
     shell:
-        "{config[command]} --video={wildcards.name:q} {params.arguments:q} >{log:q} 2>&1"
+        "{command} --video={wildcards.name:q} {params.arguments:q} >{log:q} 2>&1"

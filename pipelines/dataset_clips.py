@@ -82,12 +82,18 @@ def _simulator(video):
 
 
 def remove_others(video, folder, cuts):
-    """Removes clips that were made of another input or in another way."""
+    """Removes clips that were made of another input or in another way, or whose records are not whole."""
     with contextlib.suppress(FileNotFoundError):
         for file in os.listdir(folder):
-            if file.endswith(".json") and _read(os.path.join(folder, file))["of"] != _origin(video, cuts):
+            if file.endswith(".json") and _origin_in(os.path.join(folder, file)) != _origin(video, cuts):
                 shutil.rmtree(folder)
                 return
+
+
+def _origin_in(path):
+    """What the clip of a record was made from; None if the record is not whole."""
+    with contextlib.suppress(ValueError, KeyError, TypeError):
+        return _read(path)["of"]
 
 
 def _origin(video, cuts):

@@ -127,10 +127,13 @@ def reason_to_make(video, record, output):
         return "missing"
     if written != record["written"]["size"]:
         return "its events are not those that were written"
-    if record["making"] != making_of(video):
+    if record["making"] != making_of(video) or record["figures"]["frames"] < video.recipe.min_frames:
         return "the recipe has changed"
-    if record.get("state") != state_of(video.path) and record["input"]["sha256"] != hash_of(video.path):
-        return "the input has changed since the manifest"
+    try:
+        if record.get("state") != state_of(video.path) and record["input"]["sha256"] != hash_of(video.path):
+            return "the input has changed since the manifest"
+    except OSError as failure:  # such as a disk that is not mounted
+        print(f"{video.name}: kept as it was made; its input cannot be read: {failure}", file=sys.stderr)
     return ""
 
 
@@ -164,6 +167,12 @@ def locked(output, part):
     return lock
 
 
+def log_of(args):
+    """What Snakemake writes."""
+    number, count = args.part
+    return os.path.join(args.output, "snakemake.log" if count == 1 else f"snakemake-{number}-of-{count}.log")
+
+
 def profile_options(profile):
     """Our own profiles by their names; Snakemake finds others. It gives a shell the path of a profile's
     program without quotes."""
@@ -194,23 +203,24 @@ def job_of(args, video):
 def make(args, videos, lock):
     """Runs a job for each video, or for each of its clips and then one that joins them. Those that fail
     leave no record."""
-    output, command = args.output, [os.path.realpath(__file__)]
-    jobs = os.path.join(output, ".jobs-{}-of-{}.json".format(*args.part))
-    with concurrent.futures.ThreadPoolExecutor(args.cores) as pool, open(jobs, "w", encoding="utf-8") as file:
+    command = [os.path.realpath(__file__), *["verify"] * args.verify, os.path.abspath(args.recipe),
+               "--output", args.output]
+    jobs = ".jobs-{}-of-{}.json".format(*args.part)
+    with (concurrent.futures.ThreadPoolExecutor(args.cores) as pool,
+          open(os.path.join(args.output, jobs), "w", encoding="utf-8") as file):
         found = pool.map(lambda video: job_of(args, video), videos)
-        json.dump({video.name: job for video, job in zip(videos, found)}, file)
-    command += ["verify"] * args.verify + [os.path.abspath(args.recipe), "--output", output]
+        json.dump({"videos": {video.name: job for video, job in zip(videos, found)}, "command": shlex.join(command),
+                   "records": records_folder(args), "clips": clips_root(args)}, file)
     where = profile_options(args.profile) if args.profile else ["--cores", str(args.cores)]
     snakemake = subprocess.Popen(
-        ["snakemake", "--snakefile", os.path.join(HERE, "dataset.smk"), "--directory", output, *where,
+        ["snakemake", "--snakefile", os.path.join(HERE, "dataset.smk"), "--directory", args.output, *where,
          "--nolock", "--keep-going", "--rerun-incomplete", "--retries", str(args.retries), "--nocolor",
          "--rerun-triggers", "mtime", "--drop-metadata", "--scheduler", "greedy",
-         "--config", f"jobs={jobs}", f"records={records_folder(args)}",
-         f"clips={clips_root(args)}", f"command={shlex.join(command)}"],
+         "--config", f"jobs={jobs}"],  # read as YAML, so that it has no paths of the user
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", pass_fds=[lock.fileno()])
     progress = VideosDone(len(videos))
     try:
-        with open(os.path.join(output, "snakemake.log"), "w", encoding="utf-8") as log:
+        with open(log_of(args), "w", encoding="utf-8") as log:
             for line in snakemake.stdout:
                 log.write(line)
                 log.flush()
@@ -218,9 +228,11 @@ def make(args, videos, lock):
                     progress.tell(int(step[1]) * len(videos) // (int(step[2]) - 1))
     finally:
         progress.end()
-        snakemake.wait()  # it ends its jobs at Ctrl-C
+        for _ in snakemake.stdout:  # it ends its jobs at Ctrl-C, and cannot while nobody reads what it writes
+            continue
+        snakemake.wait()
         with contextlib.suppress(OSError):  # another part uses it, or a job was killed
-            os.rmdir(os.path.join(output, "unfinished"))
+            os.rmdir(os.path.join(args.output, "unfinished"))
     return snakemake.returncode
 
 
@@ -235,7 +247,7 @@ def failure_of(args, name):
         with contextlib.suppress(FileNotFoundError), open(path, encoding="utf-8", errors="replace") as file:
             if lines := file.read().strip().splitlines():
                 return lines[-1]
-    return "its job did not start or was killed; see snakemake.log"
+    return f"its job did not start or was killed; see {os.path.basename(log_of(args))}"
 
 
 def tell(kind, lines):
@@ -246,9 +258,12 @@ def tell(kind, lines):
 
 
 def records_of(args, videos):
-    found = {video.name: read_json(os.path.join(args.output, records_folder(args), f"{video.name}.json"))
-             for video in videos}
-    return {name: record if is_record(record) else None for name, record in found.items()}
+    """With the parts of today's recipe, which do not need another simulation."""
+    found = {}
+    for video in videos:
+        record = read_json(os.path.join(args.output, records_folder(args), f"{video.name}.json"))
+        found[video.name] = record | {"split": video.split} if is_record(record) else None
+    return found
 
 
 def is_record(record):
@@ -315,9 +330,11 @@ def make_all(args, recipe):
         mine = selected(args, videos)
         stale = stale_videos(mine, records_of(args, mine), args.output)
         status = make(args, stale, lock) if stale else 0
-        records = records_of(args, videos)
+        with open(os.path.join(args.output, ".lock-reports"), "w", encoding="utf-8") as reports:
+            fcntl.flock(reports, fcntl.LOCK_EX)  # other parts write them as well, with all records
+            records = records_of(args, videos)
+            write_reports(args.output, recipe, videos, records)
         remove_clips(args, [video for video in mine if records[video.name]])
-        write_reports(args.output, recipe, videos, records)
     refused = [f"{name}: {record['refused']}" for name, record in records.items() if record and "refused" in record]
     failed = [video.name for video in stale if not records[video.name]]
     tell("warning", [f"{name}: {warning}" for name, record in records.items() if record
@@ -331,7 +348,7 @@ def make_all(args, recipe):
     print(f"{len(videos)} videos: {made} made, {len(mine) - len(stale)} unchanged, {len(refused)} refused,"
           f" {len(failed)} failed, {absent} not made yet; {args.output}")
     if status != 0 and not failed:
-        raise RuntimeError(f"Snakemake ended with status {status}; see {args.output}/snakemake.log")
+        raise RuntimeError(f"Snakemake ended with status {status}; see {log_of(args)}")
     return 1 if refused or failed else 0
 
 

@@ -94,7 +94,7 @@ def hashes(folder):
 
 class DataSets(unittest.TestCase):
     def test_are_made_continued_and_verified(self):
-        folder = "a päth's/set"
+        folder = "a päth's #1: more/set"
         for name in ("walk/two words", "run/three's", "run/four"):
             make_video(f"{folder}/videos/{name}.mkv")
         recipe = recipe_of(folder)
@@ -248,6 +248,12 @@ class DataSets(unittest.TestCase):
         self.assertIn("1 made, 0 unchanged, 0 refused, 1 failed", printed)
         os.rmdir(path_of("failing/recipe/previews/one.png"))
         self.assertIn("1 made, 1 unchanged", event_dataset(path_of("failing/recipe.yaml"), "--part", "1/1"))
+        os.remove(path_of("failing/recipe/data/one.npz"))
+        os.remove(path_of("failing/recipe/snakemake.log"))
+        os.symlink("/dev/full", path_of("failing/recipe/snakemake.log"))
+        self.assertIn("No space left", event_dataset(path_of("failing/recipe.yaml"), status=1))
+        os.remove(path_of("failing/recipe/snakemake.log"))
+        self.assertIn("0 made, 2 unchanged", event_dataset(path_of("failing/recipe.yaml")))
 
     def test_are_made_in_parts(self):
         for number in range(4):
@@ -256,6 +262,20 @@ class DataSets(unittest.TestCase):
         self.assertRegex(event_dataset(recipe, "--part", "1/2"), "[1-3] not made yet")
         self.assertIn(" 0 not made yet", event_dataset(recipe, "--part", "2/2"))
         self.assertEqual(len(hashes("parts")), 4)
+
+        # Other parts need no other events.
+        recipe = recipe_of("parts", RECIPE.replace("train: 0.6, test: 0.4", "one: 0.5, two: 0.5"))
+        os.remove(path_of("parts/videos/0.mkv"))
+        os.symlink("nowhere", path_of("parts/videos/0.mkv"))
+        printed = event_dataset(recipe)
+        self.assertIn("0: kept as it was made; its input cannot be read", printed)
+        self.assertIn("0 made, 4 unchanged", printed)
+        for part in ("one", "two"):
+            with open(path_of(f"parts/recipe/{part}.txt"), encoding="utf-8") as file:
+                self.assertEqual(file.read().split(), [f"data/{video.name}.npz" for video in ec.Dataset(recipe, part)])
+        printed = event_dataset(recipe_of("parts", RECIPE + "min-frames: 4"), status=1)
+        self.assertIn("1: the recipe has changed; making it again", printed)
+        self.assertIn("0 made, 0 unchanged, 3 refused, 1 failed", printed)
 
 
 class Outputs(unittest.TestCase):
@@ -387,6 +407,11 @@ class Clips(unittest.TestCase):
             spoil(f"{folder}/1.events")
             with self.assertRaisesRegex(dataset_clips.NotJoinable, "the events of clip 1 are missing or cut off"):
                 dataset_clips.Clips(video, folder, self.CUTS)
+        dataset_clips.remove_others(video, folder, self.CUTS)
+        self.assertTrue(os.path.exists(folder))
+        os.truncate(f"{folder}/1.json", 0)
+        dataset_clips.remove_others(video, folder, self.CUTS)
+        self.assertFalse(os.path.exists(folder))
 
     def test_are_not_made_where_they_could_differ(self):
         for text, reason in {
