@@ -22,6 +22,9 @@ except (ImportError, ValueError) as missing:
     sys.exit(f"error: {missing}\nInstall python3-gst-eventcamera, a Debian package of gst-eventsim, or in a checkout"
              " run the programs of pipelines/")
 
+# Duration of a buffer of compared events, whose times have 32 bits, in microseconds.
+MAX_BUFFER = 1 << 31
+
 # Frames simulated before a span, so that pixels have a history.
 PAST_FRAMES = 5
 
@@ -290,9 +293,13 @@ def compare(sensor, recorded, simulated, span, picture=None):
     shift = max(0, -span.start)
     feeds = []
     for name, events in (("recorded", recorded), ("simulated", simulated)):
-        part = span.of(events).copy()
-        part["t"] += shift
-        feeds.append((name, caps, [buffer_of(part, span.start + shift, span.end - span.start)]))
+        buffers = []
+        for start in range(span.start, span.end, MAX_BUFFER):
+            end = min(start + MAX_BUFFER, span.end)
+            part = Span(start, end).of(events).copy()
+            part["t"] += shift
+            buffers.append(buffer_of(part, start + shift, end - start))
+        feeds.append((name, caps, buffers))
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "figures.json")
         drawn = f" map={quoted(picture)}" if picture else ""
