@@ -196,7 +196,7 @@ class Server:
         self._capture = Capture(device, DRAW_AND_ENCODE.format(simulator=simulator), self._tell_rate)
         self._encoder = self._capture.pipeline.get_by_name("encoder").get_static_pad("src")
         self._viewers = []
-        self._hosts = {"localhost", socket.gethostname(), *hosts}
+        self._hosts = {name.lower() for name in ("localhost", socket.gethostname(), *hosts)}
         self._http = Soup.Server()
         self._http.connect("request-started", lambda _, message: message.connect("got-headers", self._check))
         self._http.add_handler("/", self._serve_page)

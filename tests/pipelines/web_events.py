@@ -106,7 +106,7 @@ def stay_connected(url, count):
 
 
 with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, contextlib.ExitStack() as at_end:
-    server = ServerProcess(PROGRAM, "--port", "0")
+    server = ServerProcess(PROGRAM, "--port", "0", "--host", "MyServer.example")
     at_end.callback(server.process.kill)
     url = re.search(r"http://\S+/", server.address)[0]
     browser = Browser(profile)
@@ -150,7 +150,8 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, context
     for origin, status in (("http://elsewhere", 403), ("null", 403), ("http://[bad", 400), (url[:-1], 101)):
         answer = handshake(url, Origin=origin)
         assert answer == status, f"a page of {origin} is answered with {answer}"
-    for host, status in (("elsewhere.example", 403), ("[bad", 400), (f"localhost:{urlsplit(url).port}", 200)):
+    for host, status in (("elsewhere.example", 403), ("[bad", 400), (f"localhost:{urlsplit(url).port}", 200),
+                         ("myserver.example", 200)):
         answer = status_of(url, "/", Host=host)
         assert answer == status, f"a request to {host} is answered with {answer}"
     assert handshake(url, Host="elsewhere.example", Origin="http://elsewhere.example") == 403
