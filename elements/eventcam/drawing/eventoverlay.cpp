@@ -6,8 +6,9 @@
  *
  * Draws the events of the pad `event_sink` over the video of the pad `video_sink`. Each frame shows
  * the events of the interval that it starts, or those of the #GstEventOverlay:accumulation-time
- * before the interval's end. The two are synchronized by running time. Events are scaled to the
- * video if the sensor has a different size.
+ * before the interval's end. Frames without a duration or framerate show the events since the last
+ * one. The two streams are synchronized by running time. Events are scaled to the video if the
+ * sensor has a different size.
  *
  * Video from a live source waits for events no longer than its latency. Other video waits for the
  * events of its interval, or for a GAP event or EOS.
