@@ -4,6 +4,7 @@
 // corrupt parts.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -544,7 +545,9 @@ TEST(Mcap, BeginsItsWordsWithoutAWrap) {
     const auto bytes = encoded({hd, BagEvents::evt3, BagCompression::none},
                                std::vector{AbsoluteEvent::at(1, 2, t, Polarity::on)});
     constexpr std::uint8_t last_time_high[] = {0xff, 0x8f};
-    EXPECT_TRUE(std::ranges::search(bytes, last_time_high).empty());
+    EXPECT_EQ(std::search(bytes.begin(), bytes.end(), std::begin(last_time_high),
+                          std::end(last_time_high)),
+              bytes.end());
   }
 }
 
