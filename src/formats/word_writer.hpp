@@ -63,7 +63,7 @@ class GapLimiter {
  public:
   static constexpr Microseconds max_gap = Microseconds{12} * 3600 * 1'000'000;
 
-  /// Must be called for every event.
+  /// Must be called at least for every event after a long pause.
   void reach(Microseconds t) {
     const auto gap = static_cast<std::uint64_t>(t) - static_cast<std::uint64_t>(last_);
     if (t > last_ && gap > static_cast<std::uint64_t>(max_gap)) {
@@ -72,6 +72,11 @@ class GapLimiter {
     }
     begun_ = true;
     last_ = t;
+  }
+
+  /// Of the events since the last call of either, among which there is no long pause.
+  void pass(std::span<const AbsoluteEvent> events) {
+    if (!events.empty()) last_ = events.back().t;
   }
 
   /// Returns the time to write; unsigned, because overflow must be well-defined.

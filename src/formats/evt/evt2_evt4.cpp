@@ -94,10 +94,16 @@ class CdEncoder final : public Encoder {
 
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
     const auto write = [&](std::span<const AbsoluteEvent> few, Words& words) {
+      const auto all = few;
       while (!few.empty()) {
-        const auto time = reach(few.front().t, words);
+        auto time = gaps_.written(few.front().t);
+        if (time >> 6 != time_high_) [[unlikely]] {
+          gaps_.pass(all.first(all.size() - few.size()));
+          time = reach(few.front().t, words);
+        }
         few = few.subspan(Format::put(few, time, width_, words));
       }
+      gaps_.pass(all);
     };
     write_events<typename Format::Word>(events, words_at_once, out, write);
   }

@@ -179,10 +179,16 @@ class Evt3Encoder final : public Encoder {
  private:
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
     const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint16_t>& words) {
+      const auto all = few;
       while (!few.empty()) {
-        const auto time = written(few.front().t, words);
+        auto time = gaps_.written(few.front().t);
+        if (state_.steps_to(time) != 0) [[unlikely]] {
+          gaps_.pass(all.first(all.size() - few.size()));
+          time = written(few.front().t, words);
+        }
         few = few.subspan(state_.write(few, time, words));
       }
+      gaps_.pass(all);
     };
     write_events<std::uint16_t>(events, words_at_once, out, write);
   }

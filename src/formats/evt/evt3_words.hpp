@@ -53,10 +53,9 @@ class Evt3Words {
   /// no TIME_HIGH for a pause of more than `max_pause` microseconds.
   void begin_packet(std::uint64_t time, std::uint64_t max_pause) {
     const auto high = time >> 12;
-    const bool is_first = high_ == before_first;
     if (high - high_ > max_pause >> 12)
       high_ = high - 1;
-    else if (!is_first)
+    else if (high_ != before_first)
       --high_;
     low_ = y_ = none;
   }
