@@ -31,8 +31,8 @@ try:
     from plugins import find_plugins
     from progress import Progress
 except ImportError as missing:
-    sys.exit(f"error: {missing}\nInstall python3-gst-eventcamera, a Debian package of gst-eventsim, and python3-yaml, or in a"
-             " checkout run ./pipelines/event-dataset")
+    sys.exit(f"error: {missing}\nInstall python3-gst-eventcamera, a Debian package of gst-eventsim, and python3-yaml,"
+             " or in a checkout run ./pipelines/event-dataset")
 
 HERE = os.path.dirname(os.path.realpath(__file__))
 STEP = re.compile(r"^(\d+) of (\d+) steps")

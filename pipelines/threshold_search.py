@@ -120,8 +120,8 @@ def find_thresholds(simulated_by, recorded, spans, setting, progress, first=None
     within the spans."""
     goal = share * sum(counts(span.of(recorded)) for span in spans)
     if goal.min() == 0:
-        raise RuntimeError("the recording lacks ON or OFF events in the time to calibrate on; choose another with --from and"
-                           " --to")
+        raise RuntimeError("the recording lacks ON or OFF events in the time to calibrate on; choose another with"
+                           " --from and --to")
     search = ThresholdSearch(goal, threshold_limits(setting.element), first, precision)
     for trial in range(MAX_TRIALS):
         thresholds = search.pair()
