@@ -15,6 +15,9 @@ namespace {
 constexpr std::size_t max_levels = 4;
 constexpr int min_side = 15;
 
+/// Enough to occupy large GPUs; each takes blocks until none are left.
+constexpr int max_search_groups = 2048;
+
 /// Groups of the kernels that process one pixel per invocation.
 Groups groups_of(const LumaFormat& format) {
   return {gl::groups_of(64, format.width), format.height};
@@ -43,11 +46,12 @@ PointTracker::PointTracker(const Context& gl, const LumaFormat& format, int bloc
       points_(gl, "points", shaders::points),
       gather_(gl, "gather", shaders::gather),
       descend_(gl, "descend", shaders::descend),
+      list_(gl, "list", shaders::list),
       search_(gl, "search", shaders::search),
       spread_(gl, "spread", shaders::spread),
       motion_(gl, "motion", shaders::motion),
       slopes_(gl) {
-  slopes_.reserve(pixel_count(format) * 4);
+  slopes_.reserve((2 * pixel_count(format) + 1) * 4);
   // Points that are blocks themselves are searched for where they are stored.
   LumaFormat level = format;
   const std::size_t coarser_levels = block_side == 1 ? max_levels - 1 : max_levels;
@@ -100,7 +104,9 @@ void PointTracker::track(const Pyramid& from, const Pyramid& to, const Buffer& p
     blocks.pop_back();
     if (coarser != nullptr) descend_.run(groups_of(of_blocks), {coarser, &here}, {of_blocks.width});
     slope_.run(groups_of(format), {&picture.buffer(), &slopes_}, {format.width, format.height});
-    search_.run(groups_of(of_blocks),
+    list_.run(groups_of(of_blocks), {&here, &slopes_},
+              {of_blocks.width, format.width * format.height});
+    search_.run({std::min(max_search_groups, gl::groups_of(4, of_blocks.width * of_blocks.height))},
                 {&picture.buffer(), &slopes_, &target->picture.buffer(), &here},
                 {format.width, format.height, block_side_, blocks.empty() ? 1 : 0});
     coarser = &here;

@@ -57,10 +57,11 @@ class PointTracker {
   Kernel points_;
   Kernel gather_;
   Kernel descend_;
+  Kernel list_;
   Kernel search_;
   Kernel spread_;
   Kernel motion_;
-  Buffer slopes_;
+  Buffer slopes_;  ///< of a level, then the number and the places of its blocks
   std::list<Buffer> blocks_;  ///< of each level where they are not points, like points
 };
 

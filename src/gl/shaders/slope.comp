@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Scharr gradients of a picture: along x in the lower half of a word, along y in the upper half.
+// Scharr gradients of a picture: along x in the lower half of a word, along y in the upper half. Then
+// an empty list of blocks.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Picture { uint picture[]; };
@@ -16,6 +17,7 @@ void main() {
   int x = int(gl_GlobalInvocationID.x);
   int y = int(gl_WorkGroupID.y);
   if (x >= width) return;
+  if (x == 0 && y == 0) slopes[width * height] = 0;
   int left = 3 * (grey(x - 1, y - 1) + grey(x - 1, y + 1)) + 10 * grey(x - 1, y);
   int right = 3 * (grey(x + 1, y - 1) + grey(x + 1, y + 1)) + 10 * grey(x + 1, y);
   int above = 3 * (grey(x - 1, y - 1) + grey(x + 1, y - 1)) + 10 * grey(x, y - 1);
