@@ -41,6 +41,22 @@ double time_of(const Work& work) {
   return milliseconds_since(start);
 }
 
+/// Frames of a clip, back and forth, that come first and are not timed: drivers compile late, and
+/// diff has no difference before the third.
+constexpr std::int64_t untimed = 4;
+
+/// Calls `work` with the numbers of the frames to time, for about a second.
+template <class Work>
+void for_each_timed(const Work& work) {
+  const auto start = Clock::now();
+  constexpr std::int64_t fewest = 4;
+  constexpr std::int64_t most = 20;
+  for (auto i = untimed; i < untimed + most; ++i) {
+    if (i >= untimed + fewest && milliseconds_since(start) > 1000) break;
+    work(i);
+  }
+}
+
 double median(std::vector<double> values) {
   std::ranges::sort(values);
   return values[values.size() / 2];
@@ -133,10 +149,10 @@ Costs costs_of(const gl::Context& context, const Method& method, const Clip& cli
   std::vector<double> kernels;
   std::vector<double> read;
   std::vector<double> events;
-  for (std::size_t i = 0; i < clip.size(); ++i) {
+  const auto play = [&](std::int64_t i) {
+    const Frame& frame = bench::back_and_forth(clip, i);
     std::vector<std::uint8_t> bytes;
-    for (int y = 0; y < height; ++y)
-      bytes.insert(bytes.end(), clip[i].row(y), clip[i].row(y) + width);
+    for (int y = 0; y < height; ++y) bytes.insert(bytes.end(), frame.row(y), frame.row(y) + width);
     const double uploading = time_of([&] {
       texture.upload(bytes);
       finish();
@@ -144,39 +160,40 @@ Costs costs_of(const gl::Context& context, const Method& method, const Clip& cli
     double calling = 0;
     const double working = gpu.time_of([&] {
       calling = time_of([&] {
-        simulator->queue(texture.frame({LumaWeights::one, 0, 0, 0}),
-                         static_cast<Nanoseconds>(i) * bench::frame_time, settings);
+        simulator->queue(texture.frame({LumaWeights::one, 0, 0, 0}), i * bench::frame_time,
+                         settings);
       });
     });
     const EventBuckets* made = nullptr;
     const double reading = time_of([&] { made = simulator->read(); });
-    if (i <= 1) continue;  // drivers compile late; diff has no difference yet
+    if (i < untimed) return;
     upload.push_back(uploading);
     call.push_back(calling);
     kernels.push_back(working);
     read.push_back(reading);
     events.push_back(static_cast<double>(made->size()));
-  }
+  };
+  for (std::int64_t i = 0; i < untimed; ++i) play(i);
+  for_each_timed(play);
   return {median(upload), median(call), median(kernels), median(read), median(events)};
 }
 
 /// Milliseconds of a frame on the CPU.
 double cpu_cost_of(const Method& method, const Clip& clip, const Settings& settings) {
   const auto simulator = method.cpu.ours({clip[0].width(), clip[0].height(), 8});
-  std::vector<double> times;
-  for (std::size_t i = 0; i < clip.size(); ++i) {
-    const double time = time_of([&] {
-      simulator->push(scene::luma(clip[i]), static_cast<Nanoseconds>(i) * bench::frame_time,
-                      settings);
+  const auto play = [&](std::int64_t i) {
+    return time_of([&] {
+      simulator->push(scene::luma(bench::back_and_forth(clip, i)), i * bench::frame_time, settings);
     });
-    if (i >= 2) times.push_back(time);
-  }
+  };
+  for (std::int64_t i = 0; i < untimed; ++i) play(i);
+  std::vector<double> times;
+  for_each_timed([&](std::int64_t i) { times.push_back(play(i)); });
   return median(times);
 }
 
-/// Milliseconds for which a pipeline plays these frames, from memory to events.
-double pipeline_time(const Method& method, const Clip& clip, std::size_t frames,
-                     const Settings& settings) {
+/// Milliseconds of a frame in a pipeline, from memory to events.
+double element_cost_of(const Method& method, const Clip& clip, const Settings& settings) {
   std::string launch = "appsrc name=source format=time block=true max-buffers=1 ! glupload ! ";
   launch += std::string(method.element) +
             " positive-threshold=" + std::to_string(settings.positive_threshold) +
@@ -196,16 +213,22 @@ double pipeline_time(const Method& method, const Clip& clip, std::size_t frames,
   gst_app_src_set_caps(source, caps);
   gst_caps_unref(caps);
   gst_element_set_state(pipeline, GST_STATE_PLAYING);
-  const auto start = Clock::now();
-  for (std::size_t i = 0; i < frames; ++i) {
-    const auto& frame = clip[i];
+  const auto push = [&](std::int64_t i) {
+    const Frame& frame = bench::back_and_forth(clip, i);
     GstBuffer* buffer = gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(&video), nullptr);
     for (int y = 0; y < frame.height(); ++y)
       gst_buffer_fill(buffer, static_cast<gsize>(y * GST_VIDEO_INFO_PLANE_STRIDE(&video, 0)),
                       frame.row(y), static_cast<gsize>(frame.width()));
     GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(i) * bench::frame_time;
-    gst_app_src_push_buffer(source, buffer);
-  }
+    gst_app_src_push_buffer(source, buffer);  // waits until the last one has been taken
+  };
+  for (std::int64_t i = 0; i < untimed; ++i) push(i);
+  const auto start = Clock::now();
+  std::int64_t frames = 0;
+  for_each_timed([&](std::int64_t i) {
+    push(i);
+    ++frames;
+  });
   gst_app_src_end_of_stream(source);
   GstBus* bus = gst_element_get_bus(pipeline);
   GstMessage* end = gst_bus_timed_pop_filtered(
@@ -218,14 +241,7 @@ double pipeline_time(const Method& method, const Clip& clip, std::size_t frames,
   gst_element_set_state(pipeline, GST_STATE_NULL);
   gst_object_unref(pipeline);
   if (failed) throw std::runtime_error("the pipeline failed: " + launch);
-  return time;
-}
-
-/// Milliseconds of a frame in a pipeline: what all but the first two add.
-double element_cost_of(const Method& method, const Clip& clip, const Settings& settings) {
-  const double first = pipeline_time(method, clip, 2, settings);
-  const double all = pipeline_time(method, clip, clip.size(), settings);
-  return std::max(all - first, 0.0) / static_cast<double>(clip.size() - 2);
+  return time / static_cast<double>(frames);
 }
 
 void print_row(const gl::Context& context, const bench::Scene& scene, const Method& method,
