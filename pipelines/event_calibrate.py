@@ -6,7 +6,7 @@ denoising, adaptation, threshold jitter, refractory period and exposure pulses, 
 the standard deviation over the pixels as well as the numbers. Prints them, and how similar the two
 streams then are. Both streams are compared where the frames are not overexposed.
 
-    event-calibrate drive.mp4 drive.raw --lag find --profile camera.profile --to 2
+    event-calibrate drive.mp4 drive.raw --profile camera.profile --to 2
 
 VIDEO is anything that GStreamer decodes, or a text file of lines "seconds picture"; RECORDING is
 any event file that this project reads. Both need the same pixels and the same clock. --from and
@@ -358,13 +358,13 @@ def options():
     parser.add_argument("recording")
     parser.add_argument("--element", type=element_of, default=PROFILED,
                         help=f"a simulator and its properties (default: {PROFILED})")
-    for name, what in (("from", "start of the calibration"), ("to", "end of the calibration"),
+    for name, what in (("from", "start of the calibration (default: the second frame)"), ("to", "end of the calibration"),
                        ("measure-from", "start of the comparison"),
                        ("measure-to", "end of the comparison")):
         parser.add_argument("--" + name, type=seconds, metavar="SECONDS", help=what)
-    parser.add_argument("--lag", type=lag_of, default=0.0, metavar="SECONDS|find",
-                        help="time from the timestamp of a frame to the moment that it shows; \"find\""
-                        " estimates it (default: 0)")
+    parser.add_argument("--lag", type=lag_of, default="find", metavar="SECONDS|find",
+                        help="time from the timestamp of a frame to the moment that it shows; \"find\", the"
+                        " default, estimates it from two frame intervals or more")
     parser.add_argument("--mask", metavar="PICTURE",
                         help="a picture that is white where pixels of the camera can fire; events elsewhere"
                         " are left out of both streams")
@@ -392,13 +392,25 @@ def write_profile(path, element, video, recording):
         file.write("\n".join(lines) + "\n")
 
 
+def has_several_intervals(video, end):
+    """Whether two frame intervals or more end at `end`, in microseconds, or before."""
+    return len(video.frames) > 2 and video.frames[2].time // 1000 <= end
+
+
 def span_of(video, recorded, lag, start, end):
-    """From `start` to `end` after the video's first frame; by default the time that both cover."""
+    """From `start` to `end` after the video's first frame; by default the time that both cover, without
+    the first of several frame intervals: at the first frame, the pixels have no history yet."""
     latest_start = max(video.frames[0].time // 1000, int(recorded["t"][0]) - 1)
     earliest_end = min(video.frames[-1].time // 1000, int(recorded["t"][-1]))
     origin = video.origin // 1000
-    span = Span(latest_start if start is None else origin + round((start + lag) * 1e6),
-                earliest_end if end is None else origin + round((end + lag) * 1e6))
+    end = earliest_end if end is None else origin + round((end + lag) * 1e6)
+    if start is not None:
+        start = origin + round((start + lag) * 1e6)
+    elif has_several_intervals(video, end):
+        start = max(video.frames[1].time // 1000, latest_start)
+    else:
+        start = latest_start
+    span = Span(start, end)
     if span.end <= span.start:
         raise RuntimeError(f"nothing to compare from {span.start / 1e6:.3f} to {span.end / 1e6:.3f} s: the video and the"
                            f" recording have both from {latest_start / 1e6:.3f} to {earliest_end / 1e6:.3f} s; they"
@@ -428,11 +440,11 @@ def main():
     if len(recorded) == 0:
         raise RuntimeError(f"{args.recording}: no events" + (" where the mask is white" if args.mask else ""))
     progress.end()
-    if args.lag == "find":
+    lag = args.lag
+    if lag == "find":
         span = span_of(video, recorded, 0, start, args.to)
-        lag = find_lag(until(video, span.end), recorded, span, args.element, progress)
-    else:
-        lag = args.lag
+        is_found = has_several_intervals(video, span.end)
+        lag = find_lag(until(video, span.end), recorded, span, args.element, progress) if is_found else 0.0
     video = delayed(video, lag)
     span = span_of(video, recorded, lag, start, args.to)
     measured = span
@@ -445,6 +457,8 @@ def main():
     progress.end()
     simulated = simulate(video, element)
     figures = compare(video, recorded, simulated, measured)
+    if args.lag == "find" and not is_found:
+        print("One frame interval does not tell when frames show the scene: at their timestamps, unless --lag says when.")
     if lag != 0:
         print(f"Frames show the scene {lag * 1000:.1f} ms later than their timestamps.")
     if hidden >= 0.005:

@@ -22,7 +22,7 @@ recovers() { # POSITIVE NEGATIVE TOLERANCE ELEMENT...
   local positive=$1 negative=$2 tolerance=$3
   shift 3
   "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! "$@" positive-threshold="$positive" negative-threshold="$negative" ! evtenc ! filesink location=recorded.raw
-  calibrate scene.mkv recorded.raw --element "$*" --to 0.3 | tee found
+  calibrate scene.mkv recorded.raw --element "$*" --lag 0 --to 0.3 | tee found
   grep -q "trial" progress || fail "no progress was printed"
   read -r found_positive found_negative < <(sed -n 's/.* positive-threshold=\([0-9.]*\) negative-threshold=\([0-9.]*\)$/\1 \2/p' found)
   awk -v p="$found_positive" -v n="$found_negative" -v wp="$positive" -v wn="$negative" -v by="$tolerance" \
@@ -37,7 +37,7 @@ recovers 8.5 12.5 0.12 eventsim-diff
 recovers 0.2 0.3 0.05 eventsim-dvs response=log log-eps=0.02 refractory-period=0
 
 # A profile simulates the same events as the settings that it holds.
-calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0.1" --to 0.3 --profile camera.profile >found
+calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0.1" --lag 0 --to 0.3 --profile camera.profile >found
 element=$(grep '^eventsim-dvs' found)
 for simulator in "eventsim-dvs profile=camera.profile" "$element"; do
   # shellcheck disable=SC2086
@@ -48,26 +48,37 @@ done
 
 # Thresholds lie between those that fit the mean and those that fit the standard deviation.
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-dvs response=log log-eps=0.02 adaptation=0.5 adaptation-time=200000000 ! evtenc ! filesink location=recorded.raw
-calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0 threshold-jitter=0" --to 0.3 | tee found
+calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0 threshold-jitter=0" --lag 0 --to 0.3 | tee found
 awk '$1 == "mean" { mean = $4 / $2 } $1 == "std." { deviation = $5 / $3 } END { exit !(mean < 0.98 && deviation > 1.02 && mean * deviation > 0.96 && mean * deviation < 1.04) }' found ||
   fail "mean and standard deviation are not off by about the same factor"
 
 # Exposure pulses are found by their bursts of events.
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-dvs response=log log-eps=0.02 exposure-pulse=0.03 exposure-lead=9000000 ! evtenc ! filesink location=recorded.raw
-calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0" --to 0.3 | tee found
+calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0" --lag 0 --to 0.3 | tee found
 read -r lead pulse < <(sed -n 's/.* exposure-lead=\([0-9]*\).* exposure-pulse=\([0-9.]*\) .*/\1 \2/p' found)
 awk -v lead="${lead:-0}" -v pulse="${pulse:-0}" 'BEGIN { exit !(lead > 8.8e6 && lead < 9.2e6 && pulse > 0.02 && pulse < 0.045) }' ||
   fail "a pulse of ${pulse:-0}, ${lead:-0} ns before the frames"
 
-# A video as a list of pictures, with a known lag.
+# A video as a list of pictures, with a lag of -2 ms.
 "$GST_LAUNCH" -q videotestsrc pattern=zone-plate kx2=12 ky2=12 kt=5 num-buffers=16 ! video/x-raw,format=GRAY8,width=160,height=90,framerate=25/1 ! pngenc ! multifilesink location=%02d.png
 for i in $(seq 0 15); do
   printf '%s %02d.png\n' "$(awk -v i="$i" 'BEGIN { print 0.04 * i + 0.002 }')" "$i"
 done >pictures.txt
 "$GST_LAUNCH" -q videotestsrc pattern=zone-plate kx2=12 ky2=12 kt=5 num-buffers=16 ! video/x-raw,format=GRAY8,width=160,height=90,framerate=25/1 ! eventsim-dense positive-threshold=10 ! eventcsvenc ! filesink location=recorded.csv
-calibrate pictures.txt recorded.csv --element eventsim-dense --lag find --to 0.3 --measure-from 0.3 --measure-to 0.5 --map map.png | tee found
+calibrate pictures.txt recorded.csv --element eventsim-dense --to 0.3 --measure-from 0.3 --measure-to 0.5 --map map.png | tee found
 lag=$(sed -n 's/Frames show the scene \(-*[0-9.]*\) ms later.*/\1/p' found)
-awk -v lag="${lag:-0}" 'BEGIN { exit !(lag > -5 && lag < 1) }' || fail "the pictures are ${lag:-0} ms late"
+awk -v lag="${lag:-0}" 'BEGIN { exit !(lag > -5 && lag < 0) }' || fail "the pictures are ${lag:-0} ms late"
+without_search="eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0 threshold-jitter=0 exposure-pulse=0"
+calibrate scene.mkv recorded.raw --element "$without_search" --to 0.04 | tee one
+grep -q "^One frame interval does not tell when" one || fail "a lag was estimated from one frame interval"
+
+# The first of several frame intervals is left out, unless --from says otherwise.
+for start in "" "--from 0.04" "--from 0"; do
+  # shellcheck disable=SC2086
+  calibrate scene.mkv recorded.raw --element "$without_search" --lag 0 --to 0.3 $start >"found$start"
+done
+cmp <(tail -n +2 found) <(tail -n +2 "found--from 0.04")
+! cmp -s <(tail -n +2 found) <(tail -n +2 "found--from 0") || fail "the first frame interval is compared"
 [ -s map.png ] || fail "no picture was written"
 
 # The right half of the recording is noise, which a mask leaves out.
@@ -88,14 +99,14 @@ awk '/map correlation/ { exit !($3 > 0.9) }' found || fail "events outside the m
 # Where the video is overexposed, events of the recording are left out.
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-frame positive-threshold=12.5 negative-threshold=8.5 ! evtenc ! filesink location=recorded.raw
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! videobalance brightness=0.4 ! matroskamux ! filesink location=bright.mkv
-calibrate bright.mkv recorded.raw --element eventsim-frame --to 0.3 | tee found
+calibrate bright.mkv recorded.raw --element eventsim-frame --lag 0 --to 0.3 | tee found
 hidden=$(sed -n 's/^\([0-9]*\) % of the recorded events are left out: the frames are overexposed there\.$/\1/p' found)
 [ "${hidden:-0}" -gt 10 ] || fail "${hidden:-0} % of the events are where the video is overexposed"
 awk '/map correlation/ { exit !($3 > 0.9) }' found || fail "events are compared where the video is overexposed"
 
 # The result is printed even if a disk is full.
 ln -s /dev/full full.png
-if calibrate scene.mkv recorded.raw --element eventsim-frame --to 0.3 --map full.png >found; then fail "a full disk was written to"; fi
+if calibrate scene.mkv recorded.raw --element eventsim-frame --lag 0 --to 0.3 --map full.png >found; then fail "a full disk was written to"; fi
 grep -q "map correlation" found || fail "the result is lost: $(cat found)"
 
 # Errors say what is wrong.

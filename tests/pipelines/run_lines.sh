@@ -36,7 +36,7 @@ run_lines() { # PAGE...
       *--from=10\ --to=20*) line=${line/--from=10 --to=20/--from=0.1 --to=0.2} ;;
       event-calibrate*) # a second, and a few properties to search, are enough
         line=${line/--to 2 --measure-from 2 --measure-to 10/--to 0.3 --measure-from 0.3 --measure-to 1}
-        line=${line/--lag find/--lag find --to 0.3}
+        line=${line/--profile camera.profile/--profile camera.profile --to 0.3}
         line="${line/--element eventsim-dvs/} --element \"eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0\""
         ;;
     esac
