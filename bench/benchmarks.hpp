@@ -5,7 +5,7 @@
 
 namespace bench {
 
-/// All methods on a scene, plain and optimized: SCENE/METHOD/FORMULATION/threads:N.
+/// All methods on a scene, naive and optimized: SCENE/METHOD/FORMULATION/threads:N.
 void register_simulators(const Scene& scene);
 
 /// Dense flow alone, of whole frames, and OpenCV's with the same parameters:

@@ -28,7 +28,7 @@ class OpenCvFlow {
   void find(const Frame& last, const Frame& now) { flow_.find(last.view(), now.view(), threads_); }
 
  private:
-  plain::OpenCvFlow flow_;
+  naive::OpenCvFlow flow_;
   int threads_;
 };
 

@@ -7,11 +7,11 @@
 #include <utility>
 #include <vector>
 
-#include "bench/plain/dense.hpp"
-#include "bench/plain/diff.hpp"
-#include "bench/plain/dvs.hpp"
-#include "bench/plain/frame.hpp"
-#include "bench/plain/sparse.hpp"
+#include "bench/naive/dense.hpp"
+#include "bench/naive/diff.hpp"
+#include "bench/naive/dvs.hpp"
+#include "bench/naive/frame.hpp"
+#include "bench/naive/sparse.hpp"
 #include "src/dvs/dvs_simulator.hpp"
 #include "src/simulate/dense_simulator.hpp"
 #include "src/simulate/diff_simulator.hpp"
@@ -24,23 +24,23 @@ using namespace eventcamera;
 
 using MakeSimulator = std::function<std::unique_ptr<Simulator>(const LumaFormat&)>;
 
-/// A method in both formulations, plain and optimized.
+/// A method in both formulations, naive and optimized.
 struct Method {
   std::string name;
   double threshold;
-  MakeSimulator plain;
+  MakeSimulator naive;
   MakeSimulator ours;
 };
 
-template <class PlainSimulator, class... Arguments>
-MakeSimulator make_plain(const Arguments&... arguments) {
+template <class NaiveSimulator, class... Arguments>
+MakeSimulator make_naive(const Arguments&... arguments) {
   return [=](const LumaFormat& format) {
-    return std::make_unique<PlainSimulator>(format, arguments...);
+    return std::make_unique<NaiveSimulator>(format, arguments...);
   };
 }
 
 inline Method dense_method(const std::string& name, FlowMethod flow) {
-  return {name, 3, make_plain<plain::DenseSimulator>(flow), [flow](const LumaFormat& format) {
+  return {name, 3, make_naive<naive::DenseSimulator>(flow), [flow](const LumaFormat& format) {
             auto simulator = make_dense_simulator(format);
             simulator->set_flow(flow);
             return simulator;
@@ -49,22 +49,22 @@ inline Method dense_method(const std::string& name, FlowMethod flow) {
 
 /// Thresholds are those of the settings.
 inline Method dvs_method(const std::string& name, const DvsSettings& settings) {
-  return {name, 0, make_plain<plain::DvsSimulator>(settings), [settings](const auto& format) {
+  return {name, 0, make_naive<naive::DvsSimulator>(settings), [settings](const auto& format) {
             auto simulator = make_dvs_simulator(format);
             simulator->set(settings);
             return simulator;
           }};
 }
 
-inline const Method frame_method{"frame", 20, make_plain<plain::FrameSimulator>(),
+inline const Method frame_method{"frame", 20, make_naive<naive::FrameSimulator>(),
                                  make_frame_simulator};
 inline const Method dis_lq_method = dense_method("dense-dis-lq", FlowMethod::dis_lq);
 inline const Method dis_hq_method = dense_method("dense-dis-hq", FlowMethod::dis_hq);
 inline const Method opencv_dis_method = dense_method("dense-opencv-dis", FlowMethod::opencv_dis);
 inline const Method farneback_method = dense_method("dense-farneback", FlowMethod::farneback);
-inline const Method sparse_method{"sparse", 6, make_plain<plain::SparseSimulator>(),
+inline const Method sparse_method{"sparse", 6, make_naive<naive::SparseSimulator>(),
                                   make_sparse_simulator};
-inline const Method diff_method{"diff", 19, make_plain<plain::DiffSimulator>(),
+inline const Method diff_method{"diff", 19, make_naive<naive::DiffSimulator>(),
                                 make_diff_simulator};
 
 /// All methods, with multiples of their usual thresholds.

@@ -20,7 +20,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLoca
 
 INK = "#262b36"
 PAPER = "#b9bec9"
-PLAIN = "#e0a458"
+NAIVE = "#e0a458"
 OURS = "#2f6fb5"
 EVENTCV = "#dfe2e8"
 # Rows of the growth plots: label and colour of each method.
@@ -116,7 +116,7 @@ def draw_runtimes(runs, path):
         ticks = []
         for row in ROWS:
             bars = [(row[column], EVENTCV if row is EVENTCV_RUNTIMES else PAPER)] if row[column] else []
-            for formulation, colour in (("plain", PLAIN), ("ours", OURS)):
+            for formulation, colour in (("naive", NAIVE), ("ours", OURS)):
                 run = runs.get(f"{scene}/{row[1]}/{formulation}/threads:2")
                 if run:
                     bars.append((run["real_time"], colour))
@@ -149,7 +149,7 @@ def draw_runtimes(runs, path):
         axes.set_axisbelow(True)
         axes.set_xlabel("milliseconds a frame")
         axes.set_title(title, pad=14)
-    handles = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in (PAPER, PLAIN, EVENTCV, OURS)]
+    handles = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in (PAPER, NAIVE, EVENTCV, OURS)]
     figure.legend(
         handles,
         [
@@ -208,7 +208,7 @@ def draw_growth(runs, path):
             lines = [
                 (points, method, formulation)
                 for method in methods
-                for formulation in ("plain", "ours")
+                for formulation in ("naive", "ours")
                 if (points := points_of(runs, axis, counter, method, formulation))
             ]
             if not lines:

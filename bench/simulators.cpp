@@ -25,7 +25,7 @@ Pairs pairs_of(const Scene& scene) {
   for (const auto& clip : scene.clips) {
     const int width = clip.front().width();
     const int height = clip.front().height();
-    plain::OpenCvFlow finder(FlowMethod::dis_hq, width, height);
+    naive::OpenCvFlow finder(FlowMethod::dis_hq, width, height);
     for (std::size_t i = 1; i < clip.size(); ++i) {
       const auto flow = finder.find(clip[i - 1].view(), clip[i].view(), 1);
       pairs.push_back({&clip[i - 1],
@@ -54,10 +54,10 @@ void time_pairs(benchmark::State& state, const Pairs& pairs, int threads, const 
   state.counters["events"] = sum / static_cast<double>(state.iterations());
 }
 
-void time_plain_after_flow(benchmark::State& state, const Pairs& pairs, const StepTimes& steps,
+void time_naive_after_flow(benchmark::State& state, const Pairs& pairs, const StepTimes& steps,
                            const Thresholds& thresholds, int threads) {
   const auto& frame = *pairs.front().now;
-  plain::DenseInterpolation interpolation(frame.width(), frame.height());
+  naive::DenseInterpolation interpolation(frame.width(), frame.height());
   time_pairs(state, pairs, threads, [&](const Pair& pair, ThreadPool& pool, EventBuckets& events) {
     interpolation.fire(pair.last->view(), pair.now->view(), pair.flow_view(), steps, thresholds,
                        pool, events);
@@ -97,7 +97,7 @@ void register_simulators(const Scene& scene) {
           time_simulator(state, scene.clips, make, settings);
         });
       };
-      add_formulation("plain", method.plain);
+      add_formulation("naive", method.naive);
       add_formulation("ours", method.ours);
     };
     const auto add_after_flow = [&](const std::string& name, auto time) {
@@ -109,7 +109,7 @@ void register_simulators(const Scene& scene) {
     };
 
     for (const auto& method : all_methods()) add_method(method);
-    add_after_flow("plain", time_plain_after_flow);
+    add_after_flow("naive", time_naive_after_flow);
     add_after_flow("ours", time_our_after_flow);
   }
 }

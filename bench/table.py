@@ -97,8 +97,8 @@ def beside(other, text):
     return cell
 
 
-beside_plain = beside("plain", lambda ours, plain: (
-    f"**{plain / ours:.1f}×** {milliseconds(ours)} ms (naive {milliseconds(plain)})"))
+beside_naive = beside("naive", lambda ours, naive: (
+    f"**{naive / ours:.1f}×** {milliseconds(ours)} ms (naive {milliseconds(naive)})"))
 beside_opencv = beside("opencv", lambda ours, opencv: (
     f"**{opencv / ours:.2f}×** {milliseconds(ours)} ms (OpenCV {milliseconds(opencv)})"))
 beside_memcpy = beside("memcpy", lambda ours, memcpy: (
@@ -126,8 +126,8 @@ def main():
         run = json.load(file)
     times = times_of(run)
     tables = [
-        table(times, METHODS, "2", "two threads", beside_plain),
-        table(times, METHODS, "1", "one thread", beside_plain),
+        table(times, METHODS, "2", "two threads", beside_naive),
+        table(times, METHODS, "1", "one thread", beside_naive),
         table(times, FLOWS, "2", "flow alone, two threads", beside_opencv),
         table(times, FLOWS, "1", "flow alone, one thread", beside_opencv),
         table_of_sizes(sizes_of(run)),

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "bench/plain/frame.hpp"
-#include "bench/plain/opencv.hpp"
+#include "bench/naive/frame.hpp"
+#include "bench/naive/opencv.hpp"
 
-namespace plain {
+namespace naive {
 
 /// Sparse interpolation: tracks only the changed pixels.
 class SparseSimulator final : public Simulator {
@@ -82,4 +82,4 @@ class SparseSimulator final : public Simulator {
   std::vector<MovingPoint> points_;
 };
 
-}  // namespace plain
+}  // namespace naive

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include "bench/plain/frame.hpp"
-#include "bench/plain/opencv.hpp"
+#include "bench/naive/frame.hpp"
+#include "bench/naive/opencv.hpp"
 #include "src/simulate/warp.hpp"
 
-namespace plain {
+namespace naive {
 
 /// Dense forward interpolation with a given flow.
 class DenseInterpolation {
@@ -34,10 +34,10 @@ class DenseInterpolation {
         for (int x = 0; x < now.width; ++x)
           between.at(x, y) = warp.at<Interpolation::forward>(x, y, dx_.at(x, y), dy_.at(x, y), j);
       });
-      plain::fire(before, between.view(), j, steps.microseconds(j), thresholds, threads, events);
+      naive::fire(before, between.view(), j, steps.microseconds(j), thresholds, threads, events);
       before = between.view();
     }
-    plain::fire(before, now, m, steps.microseconds(m), thresholds, threads, events);
+    naive::fire(before, now, m, steps.microseconds(m), thresholds, threads, events);
   }
 
  private:
@@ -71,4 +71,4 @@ class DenseSimulator final : public Simulator {
   DenseInterpolation interpolation_;
 };
 
-}  // namespace plain
+}  // namespace naive

@@ -8,10 +8,10 @@
 #include "src/core/thread_pool.hpp"
 #include "src/simulate/simulator.hpp"
 
-/// Plain implementations, as a baseline for speed: each method in its most direct form, with
+/// Naive implementations, as a baseline for speed: each method in its most direct form, with
 /// OpenCV's optical flow and simple loops over the pixels of one frame after another, on all
 /// threads. 8-bit frames.
-namespace plain {
+namespace naive {
 
 using namespace eventcamera;
 using FrameView = ImageView<std::uint8_t>;
@@ -66,4 +66,4 @@ class FrameSimulator final : public Simulator {
   Image<std::uint8_t> last_;
 };
 
-}  // namespace plain
+}  // namespace naive

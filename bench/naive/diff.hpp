@@ -5,11 +5,11 @@
 #include <cstdlib>
 #include <utility>
 
-#include "bench/plain/frame.hpp"
-#include "bench/plain/opencv.hpp"
+#include "bench/naive/frame.hpp"
+#include "bench/naive/opencv.hpp"
 #include "src/core/thread_pool.hpp"
 
-namespace plain {
+namespace naive {
 
 /// Diff: moves the pixels of one difference frame into the next.
 class DiffSimulator final : public Simulator {
@@ -118,4 +118,4 @@ class DiffSimulator final : public Simulator {
   std::vector<Image<int>> frames_;  ///< by thread; 0 where nothing fires
 };
 
-}  // namespace plain
+}  // namespace naive

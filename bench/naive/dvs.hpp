@@ -8,12 +8,12 @@
 #include <random>
 #include <vector>
 
-#include "bench/plain/frame.hpp"
-#include "bench/plain/opencv.hpp"
+#include "bench/naive/frame.hpp"
+#include "bench/naive/opencv.hpp"
 #include "src/dvs/dvs_settings.hpp"
 #include "src/simulate/warp.hpp"
 
-namespace plain {
+namespace naive {
 
 /// reference::denoised() in integers.
 inline void denoise(const ImageView<std::uint8_t>& frame, int limit, ThreadPool& threads,
@@ -225,4 +225,4 @@ class DvsSimulator final : public Simulator {
   std::optional<OpenCvFlow> flow_;
 };
 
-}  // namespace plain
+}  // namespace naive

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// The plain implementations give the same events as the frame simulator and the dense path, and,
+// The naive implementations give the same events as the frame simulator and the dense path, and,
 // with the same flow, as the reference equations.
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace {
 
 using namespace eventcamera;
 
-class Plain : public testing::TestWithParam<int> {
+class Naive : public testing::TestWithParam<int> {
  protected:
   std::vector<Event> events_of(Simulator& simulator, int threshold) const {
     const double grey_levels = threshold;
@@ -28,7 +28,7 @@ class Plain : public testing::TestWithParam<int> {
   static std::vector<Track> tracks_of(const Image<std::uint8_t>& from,
                                       const Image<std::uint8_t>& to,
                                       const std::vector<Point>& points) {
-    plain::OpenCvTracker tracker;
+    naive::OpenCvTracker tracker;
     tracker.push(from.view(), 1);
     tracker.push(to.view(), 1);
     std::vector<cv::Point2f> places;
@@ -52,54 +52,54 @@ class Plain : public testing::TestWithParam<int> {
   const StepTimes steps{scene::frame_time, 11};
 };
 
-INSTANTIATE_TEST_SUITE_P(Threads, Plain, testing::Values(1, 2));
+INSTANTIATE_TEST_SUITE_P(Threads, Naive, testing::Values(1, 2));
 
-TEST_P(Plain, FrameEqualsTheSimulator) {
-  plain::FrameSimulator plain_simulator(format);
-  const auto events = events_of(plain_simulator, 20);
+TEST_P(Naive, FrameEqualsTheSimulator) {
+  naive::FrameSimulator naive_simulator(format);
+  const auto events = events_of(naive_simulator, 20);
   EXPECT_GT(events.size(), 100U);
   EXPECT_TRUE(events == events_of(*make_frame_simulator(format), 20));
 }
 
-TEST_P(Plain, DenseAfterTheFlowEqualsTheKernel) {
+TEST_P(Naive, DenseAfterTheFlowEqualsTheKernel) {
   ThreadPool threads;
   threads.set_threads(GetParam());
   for (const auto method : {FlowMethod::dis_lq, FlowMethod::dis_hq, FlowMethod::farneback}) {
-    plain::OpenCvFlow finder(method, format.width, format.height);
+    naive::OpenCvFlow finder(method, format.width, format.height);
     const auto flow = finder.find(last.view(), now.view(), 1);
-    EventBuckets plain_events;
-    plain::DenseInterpolation(format.width, format.height)
-        .fire(last.view(), now.view(), flow, steps, {3, 3}, threads, plain_events);
+    EventBuckets naive_events;
+    naive::DenseInterpolation(format.width, format.height)
+        .fire(last.view(), now.view(), flow, steps, {3, 3}, threads, naive_events);
     EventBuckets events;
     InterpolationKernel().fire(
         InterpolatedInterval<std::uint8_t>{
             {last.view(), now.view(), steps.count()}, flow, Interpolation::forward, steps, {3, 3}},
         threads, events);
     EXPECT_GT(events.size(), 100U);
-    EXPECT_TRUE(scene::copy(plain_events) == scene::copy(events));
+    EXPECT_TRUE(scene::copy(naive_events) == scene::copy(events));
   }
 }
 
-TEST_P(Plain, DenseEqualsTheReference) {
+TEST_P(Naive, DenseEqualsTheReference) {
   for (const auto method : {FlowMethod::dis_lq, FlowMethod::dis_hq, FlowMethod::farneback}) {
-    plain::OpenCvFlow finder(method, format.width, format.height);
+    naive::OpenCvFlow finder(method, format.width, format.height);
     const auto flow = finder.find(last.view(), now.view(), 1);
-    plain::DenseSimulator simulator(format, method);
+    naive::DenseSimulator simulator(format, method);
     EXPECT_TRUE(events_of(simulator, 3) ==
                 reference::dense(last, now, flow, Interpolation::forward, steps, {3, 3}));
   }
 }
 
-TEST_P(Plain, SparseEqualsTheReference) {
+TEST_P(Naive, SparseEqualsTheReference) {
   const auto points = reference::changed(last, now, 6);
   const auto expected = reference::sparse<std::uint8_t>(
       last, now, points, tracks_of(last, now, points), steps, {6, 6});
   EXPECT_GT(expected.size(), 100U);
-  plain::SparseSimulator simulator(format);
+  naive::SparseSimulator simulator(format);
   EXPECT_TRUE(events_of(simulator, 6) == expected);
 }
 
-TEST_P(Plain, DiffEqualsTheReference) {
+TEST_P(Naive, DiffEqualsTheReference) {
   const auto before = reference::difference_frame(frames[0], last, {19, 19});
   const auto after = reference::difference_frame(last, now, {19, 19});
   const auto tracked = [&](int sign) {
@@ -109,7 +109,7 @@ TEST_P(Plain, DiffEqualsTheReference) {
   };
   const auto expected = reference::diff(before, after, tracked(1), tracked(-1), steps);
   EXPECT_GT(expected.size(), 100U);
-  plain::DiffSimulator simulator(format);
+  naive::DiffSimulator simulator(format);
   EXPECT_TRUE(events_of(simulator, 19) == expected);
 }
 

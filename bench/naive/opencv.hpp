@@ -14,7 +14,7 @@
 #include "src/simulate/motion.hpp"
 
 /// OpenCV's optical flow with the parameters of the simulators.
-namespace plain {
+namespace naive {
 
 using namespace eventcamera;
 
@@ -131,4 +131,4 @@ void for_each_moving(const std::vector<cv::Point2f>& points, const Tracks& track
   }
 }
 
-}  // namespace plain
+}  // namespace naive
