@@ -104,7 +104,7 @@ struct EventAggregatorFunctions {
       self.release_memory();
       return events_report(self.role_.verb, error);
     };
-    return guarded(self.element_, report, work);
+    return catch_exceptions(self.element_, report, work);
   }
 
   static void forget_segment_ends(EventAggregator& self) {

@@ -103,8 +103,8 @@ class WarnOnce {
 /// from the exception. The result is then GST_FLOW_ERROR, false or nullptr. If `work` returns void,
 /// the result is true on success.
 template <class MakeReport, std::invocable Work>
-auto guarded(gpointer element, const MakeReport& report, const Work& work,
-             CallSite at = CallSite()) {
+auto catch_exceptions(gpointer element, const MakeReport& report, const Work& work,
+                      CallSite at = CallSite()) {
   using Result = std::invoke_result_t<const Work&>;
   try {
     if constexpr (std::is_void_v<Result>) {

@@ -71,7 +71,7 @@ EventFilter& gst_event_filter_impl(GstEventFilter* self) {
 /// Runs `work`; reports any exception.
 template <class Work>
 static auto reported(gpointer self, const Work& work) {
-  return guarded(
+  return catch_exceptions(
       self,
       [](const std::exception& error) -> Report {
         if (is_a<std::bad_alloc>(error))

@@ -102,7 +102,7 @@ static const EventFileFormat& format_of(GstEventWriter* self) {
 /// Runs `work`; reports any exception.
 template <class Work>
 static GstFlowReturn reported(GstEventWriter* self, const Work& work) {
-  return guarded(
+  return catch_exceptions(
       self,
       [](const auto& error) {
         return WritableEvents::failure(error, {GST_STREAM_ERROR_ENCODE, "Cannot write the file."});

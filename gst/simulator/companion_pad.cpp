@@ -29,8 +29,9 @@ struct CompanionPad::Functions {
   static GstFlowReturn chain(GstPad* pad, GstObject* element, GstBuffer* buffer) {
     const Report no_memory{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
                            std::string("Not enough memory for the ") + of(pad).content_ + "."};
-    return guarded(element, no_memory,
-                   [&] { return of(pad).push(GST_ELEMENT(element), OwnedBuffer(buffer)); });
+    return catch_exceptions(element, no_memory, [&] {
+      return of(pad).push(GST_ELEMENT(element), OwnedBuffer(buffer));
+    });
   }
 
   static gboolean event(GstPad* pad, GstObject*, GstEvent* event) {

@@ -37,7 +37,7 @@ void StreamSimulation::reported(const Work& work) {
                      "interpolated-frames.",
                      "The simulation failed.");
   };
-  if (!guarded(element_, failure, work)) stream_.flow = GST_FLOW_ERROR;
+  if (!catch_exceptions(element_, failure, work)) stream_.flow = GST_FLOW_ERROR;
 }
 
 /* negotiation */
@@ -59,7 +59,7 @@ bool StreamSimulation::set_caps(GstCaps* in, GstCaps* out) {
                          std::to_string(luma.height) + " pixels.",
                      "Cannot simulate this video.");
   };
-  const bool made = guarded(element_, failure, [&] {
+  const bool made = catch_exceptions(element_, failure, [&] {
     if (!state_ || FrameLuma::format_of(state_->video) != luma) {
       if (state_ && state_->simulator().last_time()) stream_.discontinuous = true;
       state_.reset();  // before allocating the next: frames can be large

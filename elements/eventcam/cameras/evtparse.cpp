@@ -192,7 +192,7 @@ static Input input_of(const GstCaps* caps) {
 
 template <class Work>
 static auto reported(GstEvtParse* self, const Work& work) {
-  return guarded(
+  return catch_exceptions(
       self, Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for the events."}, work);
 }
 

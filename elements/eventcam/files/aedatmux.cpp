@@ -335,7 +335,7 @@ static GstFlowReturn write_some(GstAedatMux* self) {
 /// Runs `work`; reports any exception.
 template <class Work>
 static GstFlowReturn reported(GstAedatMux* self, const Work& work) {
-  return guarded(
+  return catch_exceptions(
       self,
       [](const auto& error) {
         return WritableEvents::failure(error, {GST_STREAM_ERROR_MUX, "Cannot write the file."});

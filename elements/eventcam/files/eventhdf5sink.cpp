@@ -118,7 +118,7 @@ static GType compression_type() {
 /// Runs `work`; reports any exception and ends the file, because it cannot be repaired.
 template <class Work>
 static bool reported(GstEventHdf5Sink* self, const Work& work) {
-  return guarded(
+  return catch_exceptions(
       self,
       [&](const std::exception& error) {
         auto* priv = self->priv;

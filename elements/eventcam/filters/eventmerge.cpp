@@ -474,11 +474,12 @@ static Report failure(const std::exception& error) {
 }
 
 static guint children_count(GstChildProxy* self) {
-  return guarded(self, failure, [&] { return static_cast<guint>(numbered_pads(self).size()); });
+  return catch_exceptions(self, failure,
+                          [&] { return static_cast<guint>(numbered_pads(self).size()); });
 }
 
 static GObject* child_by_index(GstChildProxy* self, guint index) {
-  return guarded(self, failure, [&]() -> GObject* {
+  return catch_exceptions(self, failure, [&]() -> GObject* {
     auto pads = numbered_pads(self);
     return index < pads.size() ? G_OBJECT(pads[index].release()) : nullptr;
   });
@@ -503,7 +504,7 @@ static GstPad* request_new_pad(GstElement* element, GstPadTemplate* pad_template
                                const GstCaps* caps) {
   GstPad* const pad = PARENT_ELEMENT_CLASS->request_new_pad(element, pad_template, name, caps);
   if (pad == nullptr) return nullptr;
-  guarded(element, failure, [&] {
+  catch_exceptions(element, failure, [&] {
     const auto position =
         aggregator_impl<EventMerge>(element).released.lock()->extract(GST_OBJECT_NAME(pad));
     if (position) *GST_EVENT_MERGE_PAD(pad)->priv->position.lock() = position.mapped();
@@ -513,7 +514,7 @@ static GstPad* request_new_pad(GstElement* element, GstPadTemplate* pad_template
 }
 
 static void release_pad(GstElement* element, GstPad* pad) {
-  guarded(element, failure, [&] {
+  catch_exceptions(element, failure, [&] {
     (*aggregator_impl<EventMerge>(element).released.lock())[GST_OBJECT_NAME(pad)] =
         GST_EVENT_MERGE_PAD(pad)->priv->position.copy();
   });
@@ -592,8 +593,9 @@ static void gst_event_merge_class_init(GstEventMergeClass* klass) {
 
   GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
   aggregator_class->update_src_caps = [](GstAggregator* element, GstCaps* caps, GstCaps** result) {
-    return guarded(element, failure,
-                   [&] { return aggregator_impl<EventMerge>(element).choose_caps(caps, result); });
+    return catch_exceptions(element, failure, [&] {
+      return aggregator_impl<EventMerge>(element).choose_caps(caps, result);
+    });
   };
   aggregator_class->sink_event = sink_event;
   aggregator_class->src_query = src_query;

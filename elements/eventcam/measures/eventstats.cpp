@@ -138,7 +138,7 @@ static Guarded<Settings>& settings_of(GObject* object) {
 template <class Work>
 static auto reported(gpointer self, const Work& work) {
   const auto report = [](const std::exception& error) { return events_report("count", error); };
-  return guarded(self, report, work);
+  return catch_exceptions(self, report, work);
 }
 
 /* figures */

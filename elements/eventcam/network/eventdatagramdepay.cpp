@@ -286,9 +286,9 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   const bool discont = GST_BUFFER_IS_DISCONT(taken);
   const MappedBytes bytes(GST_ELEMENT(self), std::move(buffer));
   if (!bytes.is_mapped()) return GST_FLOW_ERROR;
-  return guarded(self,
-                 Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."},
-                 [&] { return receive(self, bytes.get(), arrival, discont); });
+  return catch_exceptions(
+      self, Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."},
+      [&] { return receive(self, bytes.get(), arrival, discont); });
 }
 
 /// Starts a new stream with the next datagram.
@@ -300,7 +300,7 @@ static bool start_stream(GstEventDatagramDepay* self, const DatagramSettings& se
                   std::string("Cannot receive events of this sensor in this format: ") +
                       error.what() + ". Select another format, or correct width and height."};
   };
-  return guarded(self, report, [&] {
+  return catch_exceptions(self, report, [&] {
     auto unpacker = make_datagram_unpacker(settings);
     auto& state = self->priv->state;
     state.emplace(State{.settings = settings, .unpacker = std::move(unpacker)});

@@ -157,7 +157,7 @@ static void set_timer(Private& priv) {
 template <class Work>
 static GstFlowReturn pack(GstEventDatagramPay* self, const Work& work) {
   auto& priv = *self->priv;
-  const bool packed = guarded(self, report_of, [&] {
+  const bool packed = catch_exceptions(self, report_of, [&] {
     if (priv.packer) work(*priv.packer, [&](const Datagram& datagram) { keep(priv, datagram); });
     set_timer(priv);
   });
@@ -259,7 +259,7 @@ static gboolean take_caps(GstEventDatagramPay* self, GstEvent* event) {
   Settings settings = priv.settings.copy();
   settings.width = info.width;
   settings.height = info.height;
-  if (!guarded(self, report_of, [&] { priv.packer = make_datagram_packer(settings); }))
+  if (!catch_exceptions(self, report_of, [&] { priv.packer = make_datagram_packer(settings); }))
     return FALSE;
   priv.info = info;
   const OwnedCaps out(gst_caps_new_simple("application/x-event-datagram", "format", G_TYPE_STRING,

@@ -174,7 +174,7 @@ static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
 }
 
 static void flush(GstRtpEventDepay* self) {
-  guarded(self, no_memory, [&] {
+  catch_exceptions(self, no_memory, [&] {
     if (auto& state = self->priv->state)
       state->unpacker.flush([&](const RtpInterval& interval) { push(self, interval); });
   });
@@ -232,7 +232,7 @@ static bool decode(GstRtpEventDepay* self, GstBuffer* buffer) {
   bool is_valid = false;
   GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
   if (gst_rtp_buffer_map(buffer, GST_MAP_READ, &rtp)) {
-    is_valid = guarded(self, no_memory, [&] { return unpacker.decode(packet_of(&rtp)); });
+    is_valid = catch_exceptions(self, no_memory, [&] { return unpacker.decode(packet_of(&rtp)); });
     gst_rtp_buffer_unmap(&rtp);
   } else {
     unpacker.count_rejected();
@@ -245,7 +245,7 @@ static GstBuffer* process(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
   auto* self = GST_RTP_EVENT_DEPAY(depayload);
   auto& priv = *self->priv;
   priv.was_processed = true;
-  guarded(self, no_memory, [&] {
+  catch_exceptions(self, no_memory, [&] {
     priv.state->unpacker.append(packet_of(rtp),
                                 [&](const RtpInterval& interval) { push(self, interval); });
   });
@@ -393,7 +393,7 @@ static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
     else
       state.emplace(sensor, *format);
   };
-  if (!guarded(self, no_memory, follow)) return FALSE;
+  if (!catch_exceptions(self, no_memory, follow)) return FALSE;
   return send_caps(self, sensor);
 }
 

@@ -201,7 +201,7 @@ static GstFlowReturn reported(GstRtpEventPay* self, const Work& work) {
                   std::to_string(RtpPacker::min_size + max_header_size(self)) + "."};
     return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to send the events."};
   };
-  if (!guarded(self, failure, work)) return GST_FLOW_ERROR;
+  if (!catch_exceptions(self, failure, work)) return GST_FLOW_ERROR;
   return priv.flow;
 }
 
@@ -343,7 +343,8 @@ static gboolean set_caps(GstRTPBasePayload* payload, GstCaps* caps) {
     const Report too_large{GST_STREAM_ERROR_FORMAT,
                            "EVT3 words support sensors of 1x1 to 2048x2048 pixels, not " + width +
                                "x" + height + "; set format=XYTP."};
-    if (!guarded(self, too_large, [&] { priv.state.emplace(sensor, format, first_event); }))
+    if (!catch_exceptions(self, too_large,
+                          [&] { priv.state.emplace(sensor, format, first_event); }))
       return FALSE;
   }
   const char* format_name = rtp_event_formats[static_cast<std::size_t>(priv.state->format)];

@@ -178,7 +178,7 @@ static GstFlowReturn push_tensor(GstEventTensor* self, const WindowQueue::Window
 static GstFlowReturn drain(GstEventTensor* self) {
   auto& priv = *self->priv;
   if (!priv.state) return GST_FLOW_OK;
-  const GstFlowReturn result = guarded(self, no_memory, [&] {
+  const GstFlowReturn result = catch_exceptions(self, no_memory, [&] {
     const auto window = priv.state->windows.finish();
     return window ? push_tensor(self, *window) : GST_FLOW_OK;
   });
@@ -248,8 +248,9 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   }
   GST_LOG_OBJECT(priv.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                  mapped.events().size(), GST_TIME_ARGS(interval->start));
-  return guarded(self, no_memory,
-                 [&] { return add(self, mapped.events(), mapped.start(), *interval, taken); });
+  return catch_exceptions(self, no_memory, [&] {
+    return add(self, mapped.events(), mapped.start(), *interval, taken);
+  });
 }
 
 /// Returns true if tensors take the place of the gap, such as that of a window that began before
@@ -263,7 +264,7 @@ static bool take_gap(GstEventTensor* self, GstEvent* event) {
   if (priv.state->format.windows.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
       start > max_tensor_time || duration > max_tensor_time - start)
     return priv.state->windows.is_open();
-  priv.gap_result = guarded(self, no_memory, [&] {
+  priv.gap_result = catch_exceptions(self, no_memory, [&] {
     return add(self, {}, 0, {start, start + duration}, nullptr);
   });
   return true;
@@ -315,7 +316,7 @@ static gboolean take_caps(GstEventTensor* self, GstEvent* event) {
     priv.state->format.sensor = info;
   } else {
     drain(self);
-    if (!guarded(self, no_memory, [&] { return make_state(self, info); })) return FALSE;
+    if (!catch_exceptions(self, no_memory, [&] { return make_state(self, info); })) return FALSE;
   }
   *priv.latency.lock() = priv.state->format.latency();
   const OwnedCaps out = priv.state->format.caps();

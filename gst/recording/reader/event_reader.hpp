@@ -196,7 +196,7 @@ Report not_linked();
 /// Runs `work`; reports any exception. If the cause is a failed pull, returns its flow instead.
 template <class Work>
 GstFlowReturn EventReader::guard(const Work& work) {
-  return guarded(
+  return catch_exceptions(
       element_, [this](const std::exception& error) { return report_of(error); },
       [&]() -> GstFlowReturn {
         try {
