@@ -119,7 +119,7 @@ source /tmp/pages/scratch_folder.sh
 source /tmp/pages/run_lines.sh
 mkdir pipelines
 ln -s /usr/share/doc/{gir1.2-gsteventcamera-1.0,python3-gst-eventcamera}/examples/* pipelines/
-run_lines /tmp/pages/README.md /tmp/pages/applications.md /tmp/pages/network.md
+run_lines /tmp/pages/README.md /tmp/pages/api.md /tmp/pages/network.md
 for file in ball.npz out.raw out.h5 events.npy; do
   [ -s $file ] || fail "$file is missing or empty"
 done
@@ -127,7 +127,7 @@ done
 echo "The $count lines of the README and of two more pages were run"
 READ
 mkdir "$scratch/pages"
-cp README.md docs/applications.md docs/network.md tests/pipelines/scratch_folder.sh tests/pipelines/run_lines.sh "$scratch/pages/"
+cp README.md docs/api.md docs/network.md tests/pipelines/scratch_folder.sh tests/pipelines/run_lines.sh "$scratch/pages/"
 tests/mmdebstrap.sh host --variant=apt --format=null \
   --customize-hook="copy-in '$scratch/old' '$scratch/pages' '$scratch/read' /tmp" \
   --customize-hook='chroot "$1" bash /tmp/read'

@@ -7,7 +7,7 @@ source "$SOURCE/tests/pipelines/pixel_files.sh"
 source "$SOURCE/tests/pipelines/run_lines.sh"
 export PATH=$BUILD/pipelines:$PATH
 mkdir pipelines
-cp -r "$SOURCE"/pipelines/{events_to_numpy.py,voxel_grids.py,examples} pipelines/
+cp -r "$SOURCE/pipelines/examples" pipelines/
 
 # The files that the lines read.
 eval "$GST_LAUNCH -q $ball ! x264enc ! mp4mux ! filesink location=drive.mp4"

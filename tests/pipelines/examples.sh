@@ -37,7 +37,7 @@ if [ ! -f "$GI_TYPELIB_PATH/GstEventCamera-1.0.typelib" ]; then
   echo "built without introspection: Python example skipped"
   exit 77
 fi
-events_to_numpy=$SOURCE/pipelines/events_to_numpy.py
+events_to_numpy=$SOURCE/pipelines/examples/events_to_numpy.py
 "$events_to_numpy" "${line% ! appsink*}" "$work/events.npy" | tee "$work/python"
 grep -q "^$counted events of a 320x240 sensor" "$work/python"
 refused "can't handle caps application/x-event-camera" "$events_to_numpy" "videotestsrc num-buffers=3" "$work/none.npy"

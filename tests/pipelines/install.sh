@@ -59,7 +59,7 @@ sed -i "s#^prefix=.*#prefix=${root// /\\\\ }/usr#" "$library/pkgconfig/gsteventc
 export PKG_CONFIG_PATH=$library/pkgconfig
 declare -a flags
 eval "flags=($(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0))"
-cc -Wall -Werror -o "$root/count_events" "$SOURCE/pipelines/count_events.c" "${flags[@]}"
+cc -Wall -Werror -o "$root/count_events" "$SOURCE/pipelines/examples/count_events.c" "${flags[@]}"
 
 export LD_LIBRARY_PATH=$library GST_PLUGIN_PATH=$plugins GST_REGISTRY=$root/registry.bin
 export PATH=$root/usr/bin:$PATH
