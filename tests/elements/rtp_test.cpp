@@ -66,6 +66,7 @@ struct Output {
       for (const auto& event : events_of(buffer.get()))
         interval.events.push_back({event.t, event.x, event.y_p});
       intervals.push_back(interval);
+      EXPECT_EQ(GST_BUFFER_DTS(buffer.get()), GST_BUFFER_PTS(buffer.get()));
       discontinuities += GST_BUFFER_IS_DISCONT(buffer.get()) ? 1 : 0;
     }
     while (const Owned<GstEvent> event{gst_harness_try_pull_event(h.get())}) {
@@ -130,6 +131,7 @@ struct Depayloader : Harness {
   void take(GstBuffer* packet, GstClockTime arrival) {
     GstBuffer* copy = gst_buffer_copy(packet);
     GST_BUFFER_PTS(copy) = arrival;
+    GST_BUFFER_DTS(copy) = arrival;  // as udpsrc does
     EXPECT_EQ(push(copy), GST_FLOW_OK);
   }
 };

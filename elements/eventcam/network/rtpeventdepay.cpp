@@ -167,6 +167,7 @@ static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
   }
   GstBuffer* buffer = copied_buffer(std::as_bytes(interval.events));
   GST_BUFFER_PTS(buffer) = start;
+  GST_BUFFER_DTS(buffer) = start;  // else the base class sets that of a packet, in receiver's time
   GST_BUFFER_DURATION(buffer) = duration;
   if (std::exchange(state.is_discontinuous, false))
     GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
