@@ -512,16 +512,19 @@ TEST(Depayloader, MapsTheSendersTimeToTheArrival) {
   EXPECT_FALSE(h.pull_event(GST_EVENT_SEGMENT));
 }
 
+GstBuffer* from_port(guint16 port, GstBuffer* datagram) {
+  GInetAddress* host = g_inet_address_new_loopback(G_SOCKET_FAMILY_IPV4);
+  GSocketAddress* address = g_inet_socket_address_new(host, port);
+  gst_buffer_add_net_address_meta(datagram, address);
+  g_object_unref(address);
+  g_object_unref(host);
+  return datagram;
+}
+
 TEST(Depayloader, ReceivesOneOfTwoSenders) {
   Depay h("format=t32-x16-y15-on1");
   const auto send = [&](guint16 port, guint32 t, GstClockTime arrival) {
-    GstBuffer* buffer = t32(t, 0, arrival);
-    GInetAddress* host = g_inet_address_new_loopback(G_SOCKET_FAMILY_IPV4);
-    GSocketAddress* address = g_inet_socket_address_new(host, port);
-    gst_buffer_add_net_address_meta(buffer, address);
-    g_object_unref(address);
-    g_object_unref(host);
-    h.push(buffer);
+    h.push(from_port(port, t32(t, 0, arrival)));
   };
   for (guint i = 0; i < 10; ++i) {
     send(1000, 5'000'000 + 10'000 * i, (2000 + 10 * i) * GST_MSECOND);
@@ -533,6 +536,18 @@ TEST(Depayloader, ReceivesOneOfTwoSenders) {
   EXPECT_EQ(h.warning(), "");
   send(2000, 9'500'000, 4000 * GST_MSECOND);  // the first one has left
   EXPECT_EQ(gst_harness_buffers_received(h.get()), 11U);
+}
+
+TEST(Depayloader, IsNotHeldByASenderOfInvalidDatagrams) {
+  Depay h("format=t32-x16-y15-on1");
+  for (guint i = 0; i < 10; ++i) {
+    GstBuffer* const broken = gst_buffer_new_memdup("x", 1);
+    GST_BUFFER_PTS(broken) = 10 * i * GST_MSECOND;
+    h.push(from_port(2000, broken));
+    h.push(from_port(1000, t32(5'000'000 + 10'000 * i, 0, (10 * i + 1) * GST_MSECOND)));
+  }
+  EXPECT_EQ(gst_harness_buffers_received(h.get()), 10U);
+  EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 10U);
 }
 
 TEST(Depayloader, FollowsASenderWhoseClockDrifts) {

@@ -10,15 +10,18 @@
 class CurrentSender {
  public:
   /// False if a datagram that arrived at this running time is of another sender.
-  bool sent(GstBuffer* datagram, GstClockTime arrival) {
+  bool may_have_sent(GstBuffer* datagram, GstClockTime arrival) const {
     const GstNetAddressMeta* meta = gst_buffer_get_net_address_meta(datagram);
-    if (meta == nullptr || !GST_CLOCK_TIME_IS_VALID(arrival)) return true;
-    if (!is_of(meta->addr)) {
-      if (address_ && arrival < last_ + max_silence) return false;
-      address_.reset(G_SOCKET_ADDRESS(g_object_ref(meta->addr)));
-    }
+    return meta == nullptr || !GST_CLOCK_TIME_IS_VALID(arrival) || !address_ || is_of(meta->addr) ||
+           arrival >= last_ + max_silence;
+  }
+
+  /// A valid datagram was received: its sender is the current one.
+  void has_sent(GstBuffer* datagram, GstClockTime arrival) {
+    const GstNetAddressMeta* meta = gst_buffer_get_net_address_meta(datagram);
+    if (meta == nullptr || !GST_CLOCK_TIME_IS_VALID(arrival)) return;
+    if (!is_of(meta->addr)) address_.reset(G_SOCKET_ADDRESS(g_object_ref(meta->addr)));
     last_ = arrival;
-    return true;
   }
 
  private:

@@ -232,8 +232,9 @@ static void log_late(GstEventDatagramDepay* self, GstClockTime arrival) {
                     GST_TIME_ARGS(arrival));
 }
 
-static GstFlowReturn receive(GstEventDatagramDepay* self, std::span<const std::uint8_t> bytes,
-                             GstClockTime arrival, bool discont) {
+/// Receives a datagram with these bytes. May throw.
+static GstFlowReturn receive(GstEventDatagramDepay* self, GstBuffer* datagram,
+                             std::span<const std::uint8_t> bytes, GstClockTime arrival) {
   auto& priv = *self->priv;
   auto& state = *priv.state;
   std::optional<Microseconds> time;
@@ -249,14 +250,17 @@ static GstFlowReturn receive(GstEventDatagramDepay* self, std::span<const std::u
     counts->late += reception.late ? 1 : 0;
     counts->rejected += reception.fault != nullptr ? 1 : 0;
   }
-  if (reception.fault != nullptr) reject(self, reception.fault, bytes.size(), arrival);
+  if (reception.fault != nullptr)
+    reject(self, reception.fault, bytes.size(), arrival);
+  else
+    state.sender.has_sent(datagram, arrival);
   if (reception.late) log_late(self, arrival);
   if (reception.lost > 0)
     GST_DEBUG_OBJECT(
         self, "lost %" G_GUINT64_FORMAT " datagrams before that of running time %" GST_TIME_FORMAT,
         guint64{reception.lost}, GST_TIME_ARGS(arrival));
   // A datagram without events, such as one with jAER's frame samples, may reveal a loss, too.
-  state.is_discontinuous |= discont || reception.lost > 0;
+  state.is_discontinuous |= GST_BUFFER_IS_DISCONT(datagram) || reception.lost > 0;
   return state.events.empty() ? GST_FLOW_OK : push(self, reception, arrival);
 }
 
@@ -279,16 +283,15 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
                       ("a buffer has no PTS in a segment of times"));
     return GST_FLOW_ERROR;
   }
-  if (!state->sender.sent(taken, arrival)) {
+  if (!state->sender.may_have_sent(taken, arrival)) {
     reject_second_sender(self, arrival);
     return GST_FLOW_OK;
   }
-  const bool discont = GST_BUFFER_IS_DISCONT(taken);
   const MappedBytes bytes(GST_ELEMENT(self), std::move(buffer));
   if (!bytes.is_mapped()) return GST_FLOW_ERROR;
   return catch_exceptions(
       self, Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."},
-      [&] { return receive(self, bytes.get(), arrival, discont); });
+      [&] { return receive(self, taken, bytes.get(), arrival); });
 }
 
 /// Starts a new stream with the next datagram.
