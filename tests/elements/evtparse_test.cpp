@@ -8,6 +8,7 @@
 
 #include "src/formats/evt/raw.hpp"
 #include "tests/elements/pipeline.hpp"
+#include "tests/elements/recording_files.hpp"
 
 namespace {
 
@@ -101,6 +102,24 @@ TEST(EvtParse, ReadsPaddedBuffersOfV4l2) {
   EXPECT_EQ(reading.stat("parse", "lost-bytes"), 0U);
   EXPECT_EQ(reading.stat("parse", "gaps"), 0U);
   EXPECT_EQ(reading.stat("decoder", "corrupt-places"), 0U);
+}
+
+TEST(EvtParse, ReadsTheTraceOfAV4l2Device) {
+  const auto sent = some_events(20'000);
+  Camera camera(EvtFormat::evt3);
+  const auto trace = recording_files::Folder::path("trace.bin");
+  {
+    std::ofstream file(trace, std::ios::binary);
+    for (int i = 0; i < 80; ++i)
+      file << bytes_of(Buffer(padded(camera.next(sent, 3'010'000 + 10'000 * i), 0, 0)).get());
+  }
+  Player player("filesrc location=" + in_quotes(trace) +
+                " blocksize=" + std::to_string(buffer_size) + " ! " + padded_caps +
+                " ! evtparse name=parse format=EVT3" + size + " ! evtdec name=decoder");
+  EXPECT_TRUE(player.play()) << player.error;
+  EXPECT_EQ(player.events, sent);
+  EXPECT_EQ(player.stat("parse", "lost-buffers"), 0U);
+  EXPECT_EQ(player.stat("parse", "gaps"), 0U);
 }
 
 TEST(EvtParse, SurvivesImpossibleTimes) {

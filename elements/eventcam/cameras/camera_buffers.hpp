@@ -28,7 +28,7 @@ class CameraBuffers {
                        const GstSegment& segment) {
     const auto arrival = arrival_of(buffer, segment);
     const auto last = std::exchange(last_arrival_, arrival);
-    const auto lost = lost_before(buffer);
+    const auto lost = lost_before(buffer, segment);
     Transfer transfer{.words = {.bytes = without_padding(buffer, bytes),
                                 .is_discontinuous = GST_BUFFER_IS_DISCONT(buffer) || lost > 0,
                                 .elapsed = {}},
@@ -55,8 +55,9 @@ class CameraBuffers {
     return arrival <= max ? arrival : GST_CLOCK_TIME_NONE;
   }
 
-  guint64 lost_before(GstBuffer* buffer) {
-    if (framing_ != eventcamera::Framing::padded) return 0;
+  /// Buffers of cameras are numbered; those of files have offsets in bytes.
+  guint64 lost_before(GstBuffer* buffer, const GstSegment& segment) {
+    if (framing_ != eventcamera::Framing::padded || segment.format != GST_FORMAT_TIME) return 0;
     const auto offset = GST_BUFFER_OFFSET(buffer);
     const auto last = std::exchange(last_offset_, offset);
     if (offset == GST_BUFFER_OFFSET_NONE || last == GST_BUFFER_OFFSET_NONE || offset <= last)
