@@ -222,13 +222,32 @@ struct EventAggregatorFunctions {
     return PARENT_AGGREGATOR_CLASS->sink_event(element, pad, event);
   }
 
+  static bool query_duration(const EventAggregator& self, gint64& duration) {
+    return (self.main_pad_ != nullptr
+                ? gst_pad_peer_query_duration(GST_PAD(self.main_pad_), GST_FORMAT_TIME, &duration)
+                : gst_pad_query_duration(GST_AGGREGATOR_SRC_PAD(self.element_), GST_FORMAT_TIME,
+                                         &duration)) != FALSE;
+  }
+
   static gboolean src_event(GstAggregator* element, GstEvent* event) {
+    const auto& self = of(element);
+    if (GST_EVENT_TYPE(event) == GST_EVENT_RECONFIGURE && self.role_.passes_main_pad)
+      gst_pad_push_event(GST_PAD(self.main_pad_), gst_event_ref(event));  // it decides on the caps
     if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) {
-      const SeekRequest request(event);
-      if (of(element).main_pad_ == nullptr && !request.flushes()) {
+      SeekRequest request(event);
+      if (self.main_pad_ == nullptr && !request.flushes()) {
         GST_WARNING_OBJECT(element, "does not flush: refused %" GST_PTR_FORMAT, event);
         gst_event_unref(event);
         return FALSE;
+      }
+      if (request.counts_from_end()) {  // the inputs have ends of their own
+        gint64 duration = 0;
+        const bool is_known = query_duration(self, duration);
+        if (!is_known) GST_WARNING_OBJECT(element, "no duration: refused %" GST_PTR_FORMAT, event);
+        gst_event_unref(event);
+        if (!is_known) return FALSE;
+        request = request.from_start(duration);
+        event = request.event().release();
       }
       // GstAggregator flushes before it forwards a seek, and never resumes if that fails.
       bool all_would = true;

@@ -2,6 +2,7 @@
 #include "gst/base/seek_request.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
@@ -46,6 +47,18 @@ bool SeekRequest::apply(GstSegment& segment) const {
   if (start.position > stop.position) return false;
   return gst_segment_do_seek(&segment, rate_, format_, flags_, start.type, start.position,
                              stop.type, stop.position, nullptr) != FALSE;
+}
+
+SeekRequest SeekRequest::from_start(gint64 duration) const {
+  SeekRequest request = *this;
+  const auto count = [duration](GstSeekType& type, gint64& position) {
+    if (std::exchange(type, type == GST_SEEK_TYPE_END ? GST_SEEK_TYPE_SET : type) ==
+        GST_SEEK_TYPE_END)
+      position = position < 0 ? std::max<gint64>(duration + position, 0) : duration;
+  };
+  count(request.start_type_, request.start_);
+  count(request.stop_type_, request.stop_);
+  return request;
 }
 
 SeekRequest SeekRequest::in_later_stream(gint64 delay) const {

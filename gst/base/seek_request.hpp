@@ -34,6 +34,8 @@ class SeekRequest {
                                            : std::nullopt;
   }
 
+  /// The same seek with positions that count from the start of a stream of this duration.
+  SeekRequest from_start(gint64 duration) const;
   /// The same seek in a stream that starts so much later.
   SeekRequest in_later_stream(gint64 delay) const;
   OwnedEvent event() const;

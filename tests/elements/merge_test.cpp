@@ -619,6 +619,17 @@ TEST(Merge, SeeksInTheStreamTimeOfItsOutput) {
   }
 }
 
+TEST(Merge, CountsASeekFromTheEndOfTheLastRecording) {
+  const Distant recordings;
+  Player player(recordings.line());
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED)) << player.error;
+  EXPECT_TRUE(gst_element_seek(player["m"], 1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+                               GST_SEEK_TYPE_END, -static_cast<gint64>(2 * GST_SECOND),
+                               GST_SEEK_TYPE_NONE, -1));
+  ASSERT_TRUE(player.play()) << player.error;
+  EXPECT_EQ(player.events, (Events{on_at(3, 1, 11'000'000), on_at(4, 1, 11'999'000)}));
+}
+
 /// Streams reach it at different times.
 TEST(Merge, RefusesASeekThatDoesNotFlush) {
   const Recordings recordings;

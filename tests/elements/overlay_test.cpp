@@ -154,6 +154,19 @@ TEST_F(OverlayTest, LetsTheVideoUseTheMemoryOfDownstream) {
   gst_query_unref(query);
 }
 
+TEST_F(OverlayTest, LetsDownstreamChangeTheFormatOfTheVideo) {
+  begin("width=8, height=4");
+  push_frame(0);
+  push_events(0, {});
+  EXPECT_EQ(drawn(), Places{});
+  while (const Owned<GstEvent> event{gst_harness_try_pull_upstream_event(video.get())}) continue;
+  gst_harness_push_upstream_event(video.get(), gst_event_new_reconfigure());
+  bool is_passed = false;
+  while (const Owned<GstEvent> event{gst_harness_try_pull_upstream_event(video.get())})
+    is_passed = is_passed || GST_EVENT_TYPE(event.get()) == GST_EVENT_RECONFIGURE;
+  EXPECT_TRUE(is_passed);
+}
+
 TEST_F(OverlayTest, ScalesTheSensorToTheVideo) {
   begin("width=4, height=4");
   push_frame(0);
@@ -322,6 +335,19 @@ TEST_F(OverlayTest, BeginsAnewAfterAFlush) {
   push_frame(0);
   push_events(0, {Event::at(2, 0, 5, Polarity::on)});
   EXPECT_EQ(drawn(), (Places{{2, 255}}));
+}
+
+TEST_F(OverlayTest, DrawsAllEventsAfterAFlushOfTheseAlone) {
+  begin("width=8, height=4");
+  push_frame(0);
+  push_events(0, {Event::at(1, 0, 5, Polarity::on), Event::at(2, 0, 50'000, Polarity::on)},
+              100 * ms);
+  EXPECT_EQ(drawn(), (Places{{1, 255}}));
+  flush({events.get()});
+  push_segment(events.get());
+  push_frame(40 * ms);
+  push_events(40 * ms, {Event::at(3, 0, 5, Polarity::on)});
+  EXPECT_EQ(drawn(), (Places{{3, 255}}));
 }
 
 }  // namespace

@@ -88,7 +88,8 @@ class EventOverlay final : public EventAggregator {
   std::optional<GstVideoInfo> video_;
   std::optional<SensorSize> sensor_;
   std::optional<Overlay> overlay_;     // set once both are known
-  gsize taken_ = 0;                    // number of processed events of the first queued buffer
+  OwnedBuffer begun_;                  // first queued buffer, if some events were processed
+  gsize taken_ = 0;                    // number of these
   GstClockTime known_ = 0;             // running time up to which events are complete
   std::optional<GstClockTime> shown_;  // running time up to which frames were shown
   std::vector<Event> scaled_;          // in_running_time()
@@ -164,11 +165,16 @@ bool EventOverlay::take_buffer(GstBuffer* buffer, GstClockTime end) {
     warn(interval_fault(buffer), buffer);
   else if (!running)
     GST_LOG_OBJECT(events_pad_, "outside the segment: dropped %" GST_PTR_FORMAT, buffer);
+  if (begun_.get() != buffer) taken_ = 0;
   if (running) {
-    if (running->start >= end || !take_events(buffer, *running, end)) return false;
+    if (running->start >= end) return false;
+    if (!take_events(buffer, *running, end)) {
+      begun_.reset(gst_buffer_ref(buffer));
+      return false;
+    }
     known_ = std::max(known_, running->end);
   }
-  taken_ = 0;
+  begun_.reset();
   gst_aggregator_pad_drop_buffer(events_pad_);
   return known_ + event_resolution <= end;
 }
@@ -283,7 +289,7 @@ bool EventOverlay::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
 
 void EventOverlay::flush() noexcept {
   overlay_.reset();
-  taken_ = 0;
+  begun_.reset();
   known_ = 0;
   shown_.reset();
 }
