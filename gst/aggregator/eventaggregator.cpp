@@ -222,49 +222,36 @@ struct EventAggregatorFunctions {
     return PARENT_AGGREGATOR_CLASS->sink_event(element, pad, event);
   }
 
-  static bool query_duration(const EventAggregator& self, gint64& duration) {
-    return (self.main_pad_ != nullptr
-                ? gst_pad_peer_query_duration(GST_PAD(self.main_pad_), GST_FORMAT_TIME, &duration)
-                : gst_pad_query_duration(GST_AGGREGATOR_SRC_PAD(self.element_), GST_FORMAT_TIME,
-                                         &duration)) != FALSE;
+  static gboolean seek(EventAggregator& self, OwnedEvent event) {
+    GstAggregator* const element = self.element_;
+    if (!count_from_start(event, self.main_pad_ != nullptr ? GST_PAD(self.main_pad_)
+                                                           : GST_AGGREGATOR_SRC_PAD(element)))
+      return FALSE;
+    const SeekRequest request(event.get());
+    if (self.main_pad_ == nullptr && !request.flushes()) {
+      GST_WARNING_OBJECT(element, "does not flush: refused %" GST_PTR_FORMAT, event.get());
+      return FALSE;
+    }
+    // GstAggregator flushes before it forwards a seek, and never resumes if that fails.
+    bool all_would = true;
+    for_each_sink_pad(element, [&](GstAggregatorPad* pad) {
+      if (would_seek(GST_PAD(pad), request)) return;
+      GST_WARNING_OBJECT(pad, "upstream would refuse: refused %" GST_PTR_FORMAT, event.get());
+      all_would = false;
+    });
+    if (!all_would) return FALSE;
+    GST_DEBUG_OBJECT(element, "forwarding %" GST_PTR_FORMAT, event.get());
+    // GstAggregator would apply it to its segment at once, before that of the main pad is there.
+    if (!request.flushes()) return forward(element, event.release());
+    self.prepare_seek(request);
+    return PARENT_AGGREGATOR_CLASS->src_event(element, event.release());
   }
 
   static gboolean src_event(GstAggregator* element, GstEvent* event) {
-    const auto& self = of(element);
+    auto& self = of(element);
+    if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) return seek(self, OwnedEvent(event));
     if (GST_EVENT_TYPE(event) == GST_EVENT_RECONFIGURE && self.role_.passes_main_pad)
       gst_pad_push_event(GST_PAD(self.main_pad_), gst_event_ref(event));  // it decides on the caps
-    if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) {
-      SeekRequest request(event);
-      if (self.main_pad_ == nullptr && !request.flushes()) {
-        GST_WARNING_OBJECT(element, "does not flush: refused %" GST_PTR_FORMAT, event);
-        gst_event_unref(event);
-        return FALSE;
-      }
-      if (request.counts_from_end()) {  // the inputs have ends of their own
-        gint64 duration = 0;
-        const bool is_known = query_duration(self, duration);
-        if (!is_known) GST_WARNING_OBJECT(element, "no duration: refused %" GST_PTR_FORMAT, event);
-        gst_event_unref(event);
-        if (!is_known) return FALSE;
-        request = request.from_start(duration);
-        event = request.event().release();
-      }
-      // GstAggregator flushes before it forwards a seek, and never resumes if that fails.
-      bool all_would = true;
-      for_each_sink_pad(element, [&](GstAggregatorPad* pad) {
-        if (would_seek(GST_PAD(pad), request)) return;
-        GST_WARNING_OBJECT(pad, "upstream would refuse: refused %" GST_PTR_FORMAT, event);
-        all_would = false;
-      });
-      if (!all_would) {
-        gst_event_unref(event);
-        return FALSE;
-      }
-      GST_DEBUG_OBJECT(element, "forwarding %" GST_PTR_FORMAT, event);
-      // GstAggregator would apply it to its segment at once, before that of the main pad is there.
-      if (!request.flushes()) return forward(element, event);
-      of(element).prepare_seek(request);
-    }
     return PARENT_AGGREGATOR_CLASS->src_event(element, event);
   }
 

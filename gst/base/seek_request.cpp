@@ -75,6 +75,19 @@ OwnedEvent SeekRequest::event() const {
   return OwnedEvent(seek);
 }
 
+bool count_from_start(OwnedEvent& seek, GstPad* pad) {
+  const SeekRequest request(seek.get());
+  if (!request.counts_from_end()) return true;
+  const auto query = GST_PAD_IS_SRC(pad) ? gst_pad_query_duration : gst_pad_peer_query_duration;
+  gint64 duration = 0;
+  if (query(pad, GST_FORMAT_TIME, &duration) == FALSE) {
+    GST_WARNING_OBJECT(pad, "no duration to count from: refused %" GST_PTR_FORMAT, seek.get());
+    return false;
+  }
+  seek = request.from_start(duration).event();
+  return true;
+}
+
 /// Segment of a sink pad; that of a stream which starts at 0 if none of times was received.
 static GstSegment segment_of(GstPad* sink) {
   const OwnedEvent event(gst_pad_get_sticky_event(sink, GST_EVENT_SEGMENT, 0));

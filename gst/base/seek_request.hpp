@@ -54,6 +54,11 @@ class SeekRequest {
   guint32 seqnum_;
 };
 
+/// Makes the positions of a seek event count from the start of the stream, by the duration that a
+/// source pad tells, or upstream of a sink pad. False if these tell none. For elements with several
+/// inputs, which have ends of their own.
+bool count_from_start(OwnedEvent& seek, GstPad* pad);
+
 /// True if the element upstream of a sink pad would accept a seek. For elements with several
 /// inputs, which must ask all of them before they forward a seek to one.
 bool would_seek(GstPad* sink, const SeekRequest& request);

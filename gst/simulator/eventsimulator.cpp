@@ -189,6 +189,31 @@ static gboolean answer_seeking(GstBaseTransform* transform, GstQuery* query) {
   return TRUE;
 }
 
+static gboolean seek(GstBaseTransform* transform, OwnedEvent event) {
+  const bool is_alone = all_companions(transform, [](GstPad*) { return false; });
+  if (!is_alone && !count_from_start(event, GST_BASE_TRANSFORM_SINK_PAD(transform))) return FALSE;
+  const SeekRequest request(event.get());
+  if (request.rate() < 0) {
+    GST_WARNING_OBJECT(transform,
+                       "refused to seek at rate %g: events cannot be simulated backwards",
+                       request.rate());
+    return FALSE;
+  }
+  if (!can_seek(transform, request)) {
+    GST_WARNING_OBJECT(transform, "an upstream would refuse: refused %" GST_PTR_FORMAT,
+                       event.get());
+    return FALSE;
+  }
+  const auto companions = simulation_of(transform).companions();
+  for (auto* companion : companions) companion->set_seeking(true);
+  for (auto* companion : companions)
+    if (const OwnedPad pad = companion->pad())
+      gst_pad_push_event(pad.get(), gst_event_ref(event.get()));
+  const gboolean done = PARENT_TRANSFORM_CLASS->src_event(transform, event.release());
+  for (auto* companion : companions) companion->set_seeking(false);
+  return done;
+}
+
 static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_QOS) {
     // Not forwarded: only this element skips frames.
@@ -196,30 +221,7 @@ static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
     gst_event_unref(event);
     return TRUE;
   }
-  if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) {
-    const SeekRequest request(event);
-    if (request.rate() < 0) {
-      GST_WARNING_OBJECT(transform,
-                         "refused to seek at rate %g: events cannot be simulated "
-                         "backwards",
-                         request.rate());
-      gst_event_unref(event);
-      return FALSE;
-    }
-    if (!can_seek(transform, request)) {
-      GST_WARNING_OBJECT(transform, "an upstream would refuse: refused %" GST_PTR_FORMAT, event);
-      gst_event_unref(event);
-      return FALSE;
-    }
-    const auto companions = simulation_of(transform).companions();
-    for (auto* companion : companions) companion->set_seeking(true);
-    for (auto* companion : companions)
-      if (const OwnedPad pad = companion->pad())
-        gst_pad_push_event(pad.get(), gst_event_ref(event));
-    const gboolean done = PARENT_TRANSFORM_CLASS->src_event(transform, event);
-    for (auto* companion : companions) companion->set_seeking(false);
-    return done;
-  }
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) return seek(transform, OwnedEvent(event));
   return PARENT_TRANSFORM_CLASS->src_event(transform, event);
 }
 

@@ -346,6 +346,24 @@ TEST(ClassImagesInPipelines, AreSeekedWithTheVideo) {
   EXPECT_TRUE(pipeline.warnings.empty());
 }
 
+TEST(ClassImagesInPipelines, AreSeekedFromTheEndOfTheVideo) {
+  const std::string frames = "video/x-raw,format=GRAY8,width=64,height=48,framerate=10/1 ! dvs.";
+  Pipeline pipeline("eventsim-dvs name=dvs ! fakesink sync=false  videotestsrc num-buffers=20 ! " +
+                    frames + "sink  videotestsrc num-buffers=40 ! " + frames + "label_sink");
+  ASSERT_TRUE(pipeline.reaches(GST_STATE_PAUSED));
+  ASSERT_TRUE(gst_element_seek(pipeline.get(), 1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+                               GST_SEEK_TYPE_END, -static_cast<gint64>(500 * ms),
+                               GST_SEEK_TYPE_NONE, -1));
+  ASSERT_TRUE(pipeline.play()) << pipeline.error;
+  for (const char* name : {"sink", "label_sink"}) {
+    const Owned<GstPad> pad(gst_element_get_static_pad(pipeline["dvs"], name));
+    const Owned<GstEvent> event(gst_pad_get_sticky_event(pad.get(), GST_EVENT_SEGMENT, 0));
+    GstSegment segment;
+    gst_event_copy_segment(event.get(), &segment);
+    EXPECT_EQ(segment.start, 1500 * ms) << name;
+  }
+}
+
 /// After the end, the video's thread does not tell how far the images may go until it is flushed.
 TEST(ClassImagesInPipelines, AreSeekedBeforeASlowVideo) {
   const std::string frames = "videotestsrc ! video/x-raw,format=GRAY8,width=64,height=48 ! ";
