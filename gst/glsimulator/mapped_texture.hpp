@@ -9,28 +9,30 @@
 /// Maps the first texture of a frame or a picture.
 class MappedTexture {
  public:
-  MappedTexture(const GstVideoInfo& video, GstBuffer* buffer, GstGLContext* context,
-                GstMapFlags access) {
+  /// Description of what keeps a context from using the first texture of a buffer; empty if
+  /// nothing does.
+  static std::string fault_of(const GstVideoInfo& video, GstBuffer* buffer, GstGLContext* context) {
     GstMemory* memory =
         gst_buffer_n_memory(buffer) > 0 ? gst_buffer_peek_memory(buffer, 0) : nullptr;
-    if (memory == nullptr || !gst_is_gl_memory(memory)) {
-      fault_ = "its memory is not an OpenGL texture";
-      return;
-    }
+    if (memory == nullptr || !gst_is_gl_memory(memory))
+      return "its memory is not an OpenGL texture";
     auto* texture = GST_GL_MEMORY_CAST(memory);
-    if (!gst_gl_context_can_share(texture->mem.context, context)) {
-      fault_ = "its texture is in an OpenGL context that is not shared with this element";
-      return;
-    }
+    if (!gst_gl_context_can_share(texture->mem.context, context))
+      return "its texture is in an OpenGL context that is not shared with this element";
     if (gst_gl_memory_get_texture_target(texture) != GST_GL_TEXTURE_TARGET_2D ||
         gst_gl_memory_get_texture_width(texture) < GST_VIDEO_INFO_WIDTH(&video) ||
-        gst_gl_memory_get_texture_height(texture) < GST_VIDEO_INFO_HEIGHT(&video)) {
-      fault_ = "its texture is not 2D, or smaller than the caps say";
-      return;
-    }
+        gst_gl_memory_get_texture_height(texture) < GST_VIDEO_INFO_HEIGHT(&video))
+      return "its texture is not 2D, or smaller than the caps say";
+    return "";
+  }
+
+  MappedTexture(const GstVideoInfo& video, GstBuffer* buffer, GstGLContext* context,
+                GstMapFlags access)
+      : fault_(fault_of(video, buffer, context)) {
+    if (!fault_.empty()) return;
     if (auto* sync = gst_buffer_get_gl_sync_meta(buffer)) gst_gl_sync_meta_wait(sync, context);
-    memory_ = memory;
-    if (!gst_memory_map(memory, &map_, static_cast<GstMapFlags>(access | GST_MAP_GL))) {
+    memory_ = gst_buffer_peek_memory(buffer, 0);
+    if (!gst_memory_map(memory_, &map_, static_cast<GstMapFlags>(access | GST_MAP_GL))) {
       memory_ = nullptr;
       fault_ = "its texture cannot be mapped";
     }

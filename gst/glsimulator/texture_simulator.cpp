@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <exception>
 #include <iterator>
+#include <new>
 #include <optional>
 #include <string>
 #include <utility>
@@ -172,12 +173,27 @@ class TextureVideoSimulator final : public VideoSimulator {
     push_finished();
   }
 
-  /// Returns the frame as a texture; uploads it if it is in system memory.
-  OwnedBuffer in_texture(GstBuffer* buffer) {
-    if (gst_buffer_n_memory(buffer) > 0 && gst_is_gl_memory(gst_buffer_peek_memory(buffer, 0)))
+  /// A frame that GstGLUpload can upload: it trusts that frames can be mapped, and takes textures
+  /// as they are.
+  OwnedBuffer in_system_memory(GstBuffer* buffer) const {
+    const VideoFrame mapped(video_, buffer, GST_MAP_READ);
+    if (!mapped) throw cannot_read(mapped.fault());
+    if (!gst_is_gl_memory(gst_buffer_peek_memory(buffer, 0)))
       return OwnedBuffer(gst_buffer_ref(buffer));
-    if (const VideoFrame mapped(video_, buffer, GST_MAP_READ); !mapped)  // GstGLUpload trusts it
-      throw cannot_read(mapped.fault());
+    OwnedBuffer copy(gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(&video_), nullptr));
+    GstVideoFrame to;
+    if (!copy || !gst_video_frame_map(&to, &video_, copy.get(), GST_MAP_WRITE))
+      throw std::bad_alloc();
+    gst_video_frame_copy(&to, mapped.get());
+    gst_video_frame_unmap(&to);
+    return copy;
+  }
+
+  /// Returns the frame as a texture that the context can use; uploads others.
+  OwnedBuffer in_texture(GstBuffer* buffer) {
+    if (MappedTexture::fault_of(video_, buffer, context_).empty())
+      return OwnedBuffer(gst_buffer_ref(buffer));
+    const OwnedBuffer in_memory = in_system_memory(buffer);
     if (upload_ == nullptr) {
       upload_ = gst_gl_upload_new(context_);
       const OwnedCaps from(gst_video_info_to_caps(&video_));
@@ -189,9 +205,9 @@ class TextureVideoSimulator final : public VideoSimulator {
       gst_gl_upload_set_caps(upload_, from.get(), to.get());
     }
     GstBuffer* uploaded = nullptr;
-    auto result = gst_gl_upload_perform_with_buffer(upload_, buffer, &uploaded);
+    auto result = gst_gl_upload_perform_with_buffer(upload_, in_memory.get(), &uploaded);
     if (result == GST_GL_UPLOAD_RECONFIGURE)  // it has selected an upload method
-      result = gst_gl_upload_perform_with_buffer(upload_, buffer, &uploaded);
+      result = gst_gl_upload_perform_with_buffer(upload_, in_memory.get(), &uploaded);
     if (result != GST_GL_UPLOAD_DONE)
       refuse(cannot_read("it cannot be uploaded to an OpenGL texture"));
     return OwnedBuffer(uploaded);

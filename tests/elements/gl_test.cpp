@@ -487,6 +487,18 @@ TEST_P(EitherOutput, HoldsFramesUntilItHasReadThem) {
   }
 }
 
+/// gldownload passes textures on, of any target, where nobody maps them.
+TEST(OpenGl, UploadsTexturesThatItCannotUse) {
+  const std::string tests =
+      "gltestsrc num-buffers=5 ! video/x-raw(memory:GLMemory),width=64,height=48 ! ";
+  const std::string frames =
+      "glcolorconvert ! video/x-raw(memory:GLMemory),texture-target=rectangle ! "
+      "gldownload ! video/x-raw ! ";
+  Pipeline pipeline(tests + frames + "gleventsim-frame ! fakesink name=sink sync=false");
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  EXPECT_GT(pipeline.stat("sink", "rendered"), 0U);
+}
+
 /// Whether the last context that was used is of a driver that heeds MESA_GLES_VERSION_OVERRIDE.
 bool is_mesa() {
   bool is_mesa = false;
