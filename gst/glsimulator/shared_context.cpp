@@ -70,7 +70,9 @@ void SharedContext::close() {
 
 void SharedContext::take(GstContext* context) {
   const std::lock_guard lock(mutex_);
+  const auto* const last = display_;
   gst_gl_handle_set_context(element_, context, &display_, &other_);
+  if (display_ != last) gst_clear_object(&context_);  // it is of the last one
 }
 
 bool SharedContext::answer(GstQuery* query) {

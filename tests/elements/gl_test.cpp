@@ -487,6 +487,28 @@ TEST_P(EitherOutput, HoldsFramesUntilItHasReadThem) {
   }
 }
 
+TEST(OpenGl, IsThatOfAnotherDisplayOnceTheApplicationSetsOne) {
+  Pipeline pipeline(
+      "videotestsrc num-buffers=5 ! glupload ! gleventsim-frame ! fakesink name=sink sync=false");
+  for (int times = 0; times < 2; ++times) {
+    GstGLDisplay* display = gst_gl_display_new_with_type(GST_GL_DISPLAY_TYPE_EGL_DEVICE);
+    ASSERT_NE(display, nullptr);
+    GstContext* context = gst_context_new(GST_GL_DISPLAY_CONTEXT_TYPE, TRUE);
+    gst_context_set_gl_display(context, display);
+    gst_element_set_context(pipeline.get(), context);
+    gst_context_unref(context);
+    ASSERT_TRUE(pipeline.reaches(GST_STATE_PAUSED)) << pipeline.error;
+    GstGLContext* used = nullptr;
+    gst_gl_query_local_gl_context(pipeline["sink"], GST_PAD_SINK, &used);
+    ASSERT_NE(used, nullptr);
+    EXPECT_EQ(used->display, display);
+    gst_object_unref(used);
+    gst_object_unref(display);
+    EXPECT_TRUE(pipeline.play()) << pipeline.error;
+    ASSERT_TRUE(pipeline.reaches(GST_STATE_READY));
+  }
+}
+
 /// gldownload passes textures on, of any target, where nobody maps them.
 TEST(OpenGl, UploadsTexturesThatItCannotUse) {
   const std::string tests =
