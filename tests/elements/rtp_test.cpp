@@ -16,7 +16,7 @@
 
 #include "src/wire/rtp_payload.hpp"
 #include "tests/elements/event_buffer.hpp"
-#include "tests/elements/harness.hpp"
+#include "tests/elements/pipeline.hpp"
 #include "tests/wire/rtp_packets.hpp"
 
 static bool is_memory_short = false;
@@ -837,6 +837,20 @@ TEST(RtpEventDepay, IsDescribedBySdp) {
   g_free(text);
   gst_caps_unref(from_sdp);
   gst_sdp_media_free(media);
+}
+
+TEST(RtpStatistics, StayAfterTheStreamUntilTheNextOne) {
+  Pipeline pipeline(
+      "videotestsrc pattern=ball num-buffers=5 ! eventsim-diff ! rtpeventpay name=pay ! "
+      "rtpeventdepay name=depay ! fakesink sync=false");
+  std::vector<guint64> counts;
+  for (int times = 0; times < 2; ++times) {
+    ASSERT_TRUE(pipeline.play()) << pipeline.error;
+    ASSERT_TRUE(pipeline.reaches(GST_STATE_READY));
+    for (const char* name : {"pay", "depay"}) counts.push_back(pipeline.stat(name, "events"));
+  }
+  EXPECT_GT(counts[0], 0U);
+  EXPECT_EQ(std::ranges::count(counts, counts[0]), 4);
 }
 
 TEST(RtpEventDepay, KeepsTheStatisticsOfItsBaseClass) {

@@ -399,15 +399,15 @@ static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
+  auto& priv = *GST_RTP_EVENT_DEPAY(element)->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *priv.statistics.lock() = {};
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_rtp_event_depay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    auto& priv = *GST_RTP_EVENT_DEPAY(element)->priv;
     priv.state.reset();
     priv.warn_of_second_sender.reset();
     priv.warn_of_rejected.reset();
     priv.late_level.reset();
-    *priv.statistics.lock() = {};
   }
   return result;
 }

@@ -357,14 +357,14 @@ static gboolean set_caps(GstRTPBasePayload* payload, GstCaps* caps) {
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
+  auto& priv = *GST_RTP_EVENT_PAY(element)->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *priv.sent.lock() = {};
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_rtp_event_pay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    auto& priv = *GST_RTP_EVENT_PAY(element)->priv;
     priv.timer.stop();
     priv.state.reset();
     priv.faults.reset();
-    *priv.sent.lock() = {};
   }
   return result;
 }
