@@ -23,8 +23,8 @@ constexpr int groups_of(int size, int count) {
 /// A compute shader.
 class Kernel {
  public:
-  /// `name` is for error messages. The source has no #version, and may call the
-  /// functions of shaders/prelude.comp. Throws Error if it does not compile.
+  /// `name` is for error messages. The source has no #version, and may use
+  /// shaders/prelude.comp. Throws Error if it does not compile.
   Kernel(const Context& gl, std::string_view name, std::string_view source);
   ~Kernel() { gl_.DeleteProgram(program_); }
   Kernel(const Kernel&) = delete;

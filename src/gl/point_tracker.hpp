@@ -61,7 +61,9 @@ class PointTracker {
   Kernel search_;
   Kernel spread_;
   Kernel motion_;
-  Buffer slopes_;  ///< of a level, then the number and the places of its blocks
+  /// Of a level, then the number and the places of its blocks: OpenGL ES guarantees four buffers to
+  /// a shader.
+  Buffer slopes_;
   std::list<Buffer> blocks_;  ///< of each level where they are not points, like points
 };
 

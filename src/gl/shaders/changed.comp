@@ -4,11 +4,9 @@ layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Before { uint before[]; };
 layout(std430, binding = 1) readonly buffer Now { uint now[]; };
-layout(std430, binding = 2) writeonly buffer Tracks { uvec2 tracks[]; };
+layout(std430, binding = 2) writeonly buffer Points { uvec2 points[]; };
 layout(location = 0) uniform int width;
 layout(location = 1) uniform int threshold;
-
-const uint none = 0x7fffffffu;
 
 void main() {
   int x = int(gl_GlobalInvocationID.x);
@@ -17,5 +15,5 @@ void main() {
   int word = y * ((width + 3) / 4) + x / 4;
   int shift = 8 * (x % 4);
   int change = int(now[word] >> shift & 255u) - int(before[word] >> shift & 255u);
-  tracks[y * width + x] = abs(change) > threshold ? uvec2(0) : uvec2(none);
+  points[y * width + x] = abs(change) > threshold ? uvec2(0) : uvec2(none);
 }

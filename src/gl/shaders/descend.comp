@@ -6,8 +6,6 @@ layout(std430, binding = 0) readonly buffer Coarser { uvec2 coarser[]; };
 layout(std430, binding = 1) buffer Blocks { uvec2 blocks[]; };
 layout(location = 0) uniform int width;  // in blocks
 
-const uint none = 0x7fffffffu;
-
 void main() {
   int x = int(gl_GlobalInvocationID.x);
   int y = int(gl_WorkGroupID.y);

@@ -7,8 +7,6 @@ layout(std430, binding = 1) writeonly buffer Blocks { uvec2 blocks[]; };
 layout(location = 0) uniform int width;  // in points or finer blocks
 layout(location = 1) uniform int height;
 
-const uint none = 0x7fffffffu;
-
 void main() {
   int blocks_across = (width + 1) / 2;
   int x = int(gl_GlobalInvocationID.x);

@@ -7,8 +7,6 @@ layout(std430, binding = 1) buffer Slopes { int slopes[]; };  // then the list, 
 layout(location = 0) uniform int width;                       // in blocks
 layout(location = 1) uniform int pixels;
 
-const uint none = 0x7fffffffu;
-
 shared int count;
 shared int start;
 

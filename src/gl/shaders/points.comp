@@ -3,15 +3,13 @@
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Picture { uint picture[]; };
-layout(std430, binding = 1) writeonly buffer Tracks { uvec2 tracks[]; };
+layout(std430, binding = 1) writeonly buffer Points { uvec2 points[]; };
 layout(location = 0) uniform int width;
-
-const uint none = 0x7fffffffu;
 
 void main() {
   int x = int(gl_GlobalInvocationID.x);
   int y = int(gl_WorkGroupID.y);
   if (x >= width) return;
   bool is_point = (picture[y * ((width + 3) / 4) + x / 4] >> (8 * (x % 4)) & 255u) != 0u;
-  tracks[y * width + x] = is_point ? uvec2(0) : uvec2(none);
+  points[y * width + x] = is_point ? uvec2(0) : uvec2(none);
 }

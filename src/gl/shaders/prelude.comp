@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Functions that any shader may call.
+// What any shader may use.
+
+// First word of a point or block that does not exist.
+const uint none = 0x7fffffffu;
 
 // Position p on a row of pixels, mirrored at the ends of the row until it is inside.
 int mirrored(int p, int size) {

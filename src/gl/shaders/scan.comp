@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Replaces each count by the sum of all counts before it, and appends the total. A single group.
+// Replaces each count by the sum of all counts before it, and stores the total. A single group.
 layout(local_size_x = 128) in;
 
 layout(std430, binding = 0) buffer Counts { uint counts[]; };

@@ -13,7 +13,6 @@ layout(location = 1) uniform int height;
 layout(location = 2) uniform int block_side;
 layout(location = 3) uniform int removes_lost;
 
-const uint none = 0x7fffffffu;
 const float scale = 1.0 / 1048576.0;
 const int window = 16;
 

@@ -4,11 +4,10 @@
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Blocks { uvec2 blocks[]; };
-layout(std430, binding = 1) buffer Tracks { uvec2 tracks[]; };
+layout(std430, binding = 1) buffer Points { uvec2 points[]; };
 layout(location = 0) uniform int width;
 layout(location = 1) uniform int height;
 
-const uint none = 0x7fffffffu;
 const ivec2 region = ivec2(64);  // in blocks
 
 uvec2 block(ivec2 at) {
@@ -26,13 +25,13 @@ vec2 approach(vec2 own, ivec2 from, ivec2 to) {
 
 void main() {
   ivec2 at = ivec2(gl_GlobalInvocationID.x, gl_WorkGroupID.y);
-  if (at.x >= width || tracks[at.y * width + at.x].x == none) return;
-  uvec2 track = block(at / 2);
-  if (track.x != none) {
-    vec2 own = uintBitsToFloat(track);
+  if (at.x >= width || points[at.y * width + at.x].x == none) return;
+  uvec2 point = block(at / 2);
+  if (point.x != none) {
+    vec2 own = uintBitsToFloat(point);
     ivec2 side = at % 2 * 2 - 1;
     vec2 flow = own + approach(own, at / 2, at / 2 + ivec2(side.x, 0));
-    track = floatBitsToUint(flow + approach(own, at / 2, at / 2 + ivec2(0, side.y)));
+    point = floatBitsToUint(flow + approach(own, at / 2, at / 2 + ivec2(0, side.y)));
   }
-  tracks[at.y * width + at.x] = track;
+  points[at.y * width + at.x] = point;
 }
