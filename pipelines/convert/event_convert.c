@@ -146,7 +146,7 @@ static int write_file(const char* in, const Reader* reader, const char* path,
   return 0;
 }
 
-/* Messages of a bag of ROS 2 that SQLite has not yet moved to the file are in a journal beside it.
+/* Messages of a ROS 2 bag that SQLite has not yet moved to the file are in a journal beside it.
  */
 static void warn_of_journal(const char* in) {
   g_autofree gchar* journal = g_strconcat(in, "-wal", NULL);

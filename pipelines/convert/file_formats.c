@@ -43,11 +43,11 @@ const Format formats[] = {
      "eventhdf5sink name=writer", "compression"},
     {".hdf5", "HDF5, written in the layout of Metavision", "application/x-hdf5",
      "eventhdf5sink name=writer format=metavision", NULL},
-    {".mcap", "MCAP, a bag of ROS 2", "application/x-mcap",
+    {".mcap", "MCAP, a ROS 2 bag", "application/x-mcap",
      "eventmcapenc name=writer ! filesink name=out", "format compression"},
     {".bin", "N-MNIST and N-Caltech101, read only", "application/x-atis-bin", NULL, NULL},
-    {".bag", "bag of ROS 1, read only", "application/x-rosbag", NULL, NULL},
-    {".db3", "bag of ROS 2 with SQLite, read only", "application/x-rosbag2-db3", NULL, NULL},
+    {".bag", "ROS 1 bag, read only", "application/x-rosbag", NULL, NULL},
+    {".db3", "ROS 2 bag with SQLite, read only", "application/x-rosbag2-db3", NULL, NULL},
     {NULL, NULL, NULL, NULL, NULL},
 };
 

@@ -17,7 +17,7 @@ struct CeilingFigures {
 };
 
 /// Estimates how similar a second recording of the same scene could be, from two halves of the
-/// first: each event belongs to either half by chance.
+/// first: each event belongs to either half at random.
 ///
 /// Correlations of the halves become those of the whole by the Spearman-Brown formula; the share of
 /// events with a match, and the distance to the nearest, as if twice as many events had come

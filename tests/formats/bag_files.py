@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Writes bags of ROS from the specifications of their formats, without this project's code:
+"""Writes ROS bags from the specifications of their formats, without this project's code:
   bag_files.py DIRECTORY
 The events are in events.bin (int64 t, uint16 x, y, p), the frames in frames.bin (int64 t, uint8
 value of all pixels).

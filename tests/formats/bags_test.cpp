@@ -465,8 +465,8 @@ TEST_F(Bags, AreRefusedWithAReason) {
     }
     return {};
   };
-  EXPECT_EQ(refusal({}), "this is not a bag of ROS");
-  EXPECT_EQ(refusal(Bytes(100, 'x')), "this is not a bag of ROS");
+  EXPECT_EQ(refusal({}), "this is not a ROS bag");
+  EXPECT_EQ(refusal(Bytes(100, 'x')), "this is not a ROS bag");
   const auto bytes = bytes_of(folder / "evt3-no-chunks.mcap");
   auto other = bytes;
   for (auto at = other.begin();;) {

@@ -356,7 +356,7 @@ GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_re
 /**
  * SECTION:element-eventmcapdec
  * @title: eventmcapdec
- * @short_description: reads MCAP files, bags of ROS 2
+ * @short_description: reads MCAP files, which are ROS 2 bags
  *
  * Reads events and images from MCAP files of ROS 2 and ROS 1, without ROS: messages
  * event_camera_msgs/EventPacket (with encodings evt3, evt2, evt21 and mono), dvs_msgs/EventArray
@@ -387,7 +387,7 @@ static std::unique_ptr<RecordingDecoder> make_bag_decoder(const GstCaps* /*caps*
 static const RecordingFormat mcap = {
     .type_name = "GstEventMcapDec",
     .long_name = "MCAP demuxer",
-    .description = "Reads events and images from MCAP files, bags of ROS 2",
+    .description = "Reads events and images from MCAP files, which are ROS 2 bags",
     .caps = "application/x-mcap",
     .has_many_streams = true,
     .has_triggers = true,
@@ -399,10 +399,10 @@ GST_ELEMENT_REGISTER_DEFINE(eventmcapdec, "eventmcapdec", GST_RANK_PRIMARY, even
 /**
  * SECTION:element-eventbagdec
  * @title: eventbagdec
- * @short_description: reads bags of ROS 1, and of ROS 2 with SQLite
+ * @short_description: reads ROS 1 bags, and ROS 2 bags with SQLite
  *
- * Reads events and images from bags of ROS 1 (`.bag`, version 2.0, with chunks compressed with
- * bzip2 or LZ4 or not at all), and from those of ROS 2 that are SQLite databases (`.db3`), without
+ * Reads events and images from ROS 1 bags (`.bag`, version 2.0, with chunks compressed with
+ * bzip2 or LZ4 or not at all), and from ROS 2 bags that are SQLite databases (`.db3`), without
  * ROS. It reads the same messages as eventmcapdec, and chooses topics in the same way.
  *
  * PTS are the stamps of the messages' headers. Databases need random access, so upstream should
@@ -418,7 +418,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventmcapdec, "eventmcapdec", GST_RANK_PRIMARY, even
 static const RecordingFormat bag = {
     .type_name = "GstEventBagDec",
     .long_name = "ROS bag demuxer",
-    .description = "Reads events and images from bags of ROS",
+    .description = "Reads events and images from ROS bags",
     .caps = "application/x-rosbag; application/x-rosbag2-db3",
     .has_many_streams = true,
     .has_triggers = true,

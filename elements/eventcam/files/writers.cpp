@@ -267,7 +267,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzenc, "eventnpzenc", GST_RANK_PRIMARY, event_
 /**
  * SECTION:element-eventmcapenc
  * @title: eventmcapenc
- * @short_description: writes MCAP files, bags of ROS 2
+ * @short_description: writes MCAP files, which are ROS 2 bags
  *
  * Writes events as an MCAP file of ROS 2: messages event_camera_msgs/EventPacket in the topic
  * `/event_camera/events`, with an index, for rosbag2, Foxglove and the tools of event_camera_msgs.
@@ -317,7 +317,7 @@ static const EventFileFormat::Variants mcap_compressions = {
 static const EventFileFormat mcap = {
     .type_name = "GstEventMcapEnc",
     .long_name = "MCAP writer",
-    .description = "Writes events as MCAP, a bag of ROS 2",
+    .description = "Writes events as MCAP, a ROS 2 bag",
     .caps = "application/x-mcap",
     .variants = &mcap_variants,
     .compressions = &mcap_compressions,

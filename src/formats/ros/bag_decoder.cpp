@@ -65,7 +65,7 @@ BagDecoder::BagDecoder(std::string topics) {
 void BagDecoder::choose_format(std::span<const std::uint8_t> start) {
   const auto* const found = std::ranges::find_if(
       formats, [&](const Format& format) { return has_at(0, format.magic, start); });
-  if (found == std::end(formats)) throw UnsupportedFormat("this is not a bag of ROS");
+  if (found == std::end(formats)) throw UnsupportedFormat("this is not a ROS bag");
   format_name_ = found->name;
   file_ = found->make([this](const BagTopic& topic) { return take_topic(topic); });
 }

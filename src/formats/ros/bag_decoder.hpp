@@ -14,7 +14,7 @@
 
 namespace eventcamera {
 
-/// Reads events and images from a bag of ROS: MCAP, ROS 1 version 2.0, or ROS 2 with SQLite, which
+/// Reads events and images from a ROS bag: MCAP, ROS 1 version 2.0, or ROS 2 with SQLite, which
 /// its first bytes tell.
 ///
 /// Each topic that is read is a stream, named by StreamInfo::source. Times are the stamps of the

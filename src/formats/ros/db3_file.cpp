@@ -42,7 +42,7 @@ bool Db3File::open(ByteSource& source) {
 void Db3File::read_topics() {
   constexpr std::size_t max_topics = 4096;
   if (!database_->has_table("topics") || !database_->has_table("messages"))
-    throw UnsupportedFormat("this SQLite database is not a bag of ROS 2");
+    throw UnsupportedFormat("this SQLite database is not a ROS 2 bag");
   auto rows =
       database_->query("SELECT id, name, type, serialization_format FROM topics ORDER BY id");
   while (rows.next() && topics_.size() < max_topics) {

@@ -16,7 +16,7 @@ namespace eventcamera {
 class SqliteDatabase;
 class SqliteRows;
 
-/// Reads bags of ROS 2 that are SQLite databases (github.com/ros2/rosbag2,
+/// Reads ROS 2 bags that are SQLite databases (github.com/ros2/rosbag2,
 /// rosbag2_storage_sqlite3): the tables topics and messages, whose rows are in the order of their
 /// recording. A pushed file is collected in memory, up to 256 MiB, and read at its end, because
 /// databases need random access. The position of a seek point is the ID of a message.

@@ -12,7 +12,7 @@
 
 namespace eventcamera {
 
-/// Reads bags of ROS 1, version 2.0: wiki.ros.org/Bags/Format/2.0.
+/// Reads ROS 1 bags, version 2.0: wiki.ros.org/Bags/Format/2.0.
 class RosbagFile final : public ChunkedBagFile {
  public:
   explicit RosbagFile(TakeTopic take_topic);
