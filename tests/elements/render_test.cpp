@@ -614,6 +614,15 @@ TEST_F(Render, IsFreedWhileInUse) {
   }
 }
 
+TEST(RenderPipeline, SaysWhatToDoIfDownstreamWantsAnotherSize) {
+  Pipeline pipeline(
+      "videotestsrc num-buffers=3 ! eventsim-diff ! eventrender ! "
+      "video/x-raw,width=32 ! fakesink");
+  EXPECT_FALSE(pipeline.play());
+  EXPECT_NE(pipeline.error.find("the sensor has 320x240 pixels"), std::string::npos)
+      << pipeline.error;
+}
+
 /// Players autoplug it.
 TEST_F(Render, IsADecoderOfVideo) {
   GstElementFactory* factory = gst_element_get_factory(h.element());

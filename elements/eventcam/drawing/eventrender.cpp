@@ -326,7 +326,14 @@ GstFlowReturn EventRender::choose_caps(GstCaps* downstream, GstCaps** result) co
                       state_->renderer.height(), nullptr);
   *result = gst_caps_intersect_full(downstream, ours, GST_CAPS_INTERSECT_FIRST);
   gst_caps_unref(ours);
-  return gst_caps_is_empty(*result) ? GST_FLOW_NOT_NEGOTIATED : GST_FLOW_OK;
+  if (!gst_caps_is_empty(*result)) return GST_FLOW_OK;
+  GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
+                    ("Cannot draw: the sensor has %dx%d pixels, and downstream does not take "
+                     "pictures of that size in a format of this element. Insert eventscale before "
+                     "this element, or videoconvertscale after it.",
+                     state_->renderer.width(), state_->renderer.height()),
+                    ("downstream takes %" GST_PTR_FORMAT, downstream));
+  return GST_FLOW_NOT_NEGOTIATED;
 }
 
 bool EventRender::set_video(const GstCaps* caps) {
