@@ -16,7 +16,7 @@ struct VideoDevice {
   std::string card;
   std::string fourcc;            ///< of its buffers
   SensorSize buffers = {};       ///< their width and height
-  std::string sensor = {};       ///< that it is linked to, such as "genx320 10-003c"
+  std::string sensor = {};       ///< that of its media device, such as "genx320 10-003c"
   std::string word_format = {};  ///< control evt_format of the sensor
 };
 

@@ -111,7 +111,8 @@ std::string value_of(const Device& device, const char* name) {
   return {};
 }
 
-/// Fills in the sensor if one of the media device's entities is the video device.
+/// Fills in the sensor, of which there should be one, if one of the media device's entities is the
+/// video device.
 void find_sensor(const Device& media, dev_t video, VideoDevice& found) {
   bool is_of_video = false;
   std::optional<media_entity_desc> sensor;
