@@ -86,8 +86,9 @@ TEST_P(Memory, DoesNotGrowFrameByFrame) {
     ASSERT_EQ(buffer != nullptr, draws || i > 0);
     if (i == frames / 10) after_some = Resources::now();
   }
-  // Less than a pointer per frame, and what a driver may allocate late.
-  const std::size_t once = is_on_gpu(element) ? 16384 : 2048;
+  // Less than a pointer per frame, and what may be allocated late: by a driver, or by a thread that
+  // gets most of a frame for the first time, because the machine is busy.
+  const std::size_t once = 16384;
   EXPECT_LE(Resources::now().heap, after_some.heap + static_cast<std::size_t>(frames) * 7 + once);
 }
 
