@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -13,7 +14,7 @@ namespace eventcamera {
 /// Limits the event rate. Every n-th event is kept, with n from the number of events in the last
 /// reference period or so far in this one, so what is dropped is spread over the picture and over
 /// the period. A flood that begins within a period keeps up to half more events than its share;
-/// later periods pay back, at most half of theirs.
+/// later periods pay back, at most half of theirs. Fractions of events add up.
 class RateFilter {
  public:
   struct Settings {
@@ -47,8 +48,8 @@ class RateFilter {
  private:
   void begin_period(Microseconds time, Microseconds period, double allowed) {
     const Microseconds skipped = is_first_ ? 1 : (time - end_) / period;
-    debt_ = std::max(0.0, debt_ + kept_ - allowed * static_cast<double>(1 + skipped));
-    budget_ = allowed - std::min(debt_, allowed / 2);
+    debt_ = std::max(-1.0, debt_ + kept_ - allowed * static_cast<double>(1 + skipped));
+    budget_ = std::min(allowed - std::min(debt_, allowed / 2), std::ceil(allowed));
     expected_ = skipped == 0 ? received_ : 0;
     received_ = 0;
     kept_ = 0;
@@ -62,7 +63,7 @@ class RateFilter {
   double received_ = 0;                                          ///< events so far
   double kept_ = 0;
   double budget_ = 0;  ///< events to keep in this period
-  double debt_ = 0;    ///< events kept in the past beyond what was allowed
+  double debt_ = -1;   ///< events kept in the past beyond what was allowed, at least -1
   double share_ = 0;   ///< of the next event that is kept
 };
 static_assert(Filter<RateFilter>);

@@ -21,6 +21,7 @@ using namespace streams;
 using eventcamera::DenoiseFilter;
 using eventcamera::DenoiseMethod;
 using eventcamera::HotPixelFilter;
+using eventcamera::Nanoseconds;
 using eventcamera::PixelPosition;
 using eventcamera::RateFilter;
 using eventcamera::RefractoryFilter;
@@ -317,6 +318,22 @@ TEST(Rate, IsUnlimitedAtZero) {
   const Events events = random_events(sensor, 10'000, 0, 1);
   RateFilter core(sensor);
   EXPECT_TRUE(filtered(core, events, {.max_rate = 0}, 100) == events);
+}
+
+TEST(Rate, AddsUpFractionsOfEvents) {
+  for (const Nanoseconds period : {10'000, 1'500'000}) {  // for 0.01 and 1.5 events
+    const auto kept_of = [&](Microseconds distance) {
+      Events events;
+      for (Microseconds t = 0; t < 10'000'000; t += distance)
+        events.push_back(AbsoluteEvent::at(1, 1, t, Polarity::on));
+      RateFilter core(sensor);
+      const RateFilter::Settings settings{.max_rate = 1000, .reference_period = period};
+      return rate(filtered(core, events, settings, 100'000), 0, 10'000'000);
+    };
+    EXPECT_EQ(kept_of(10'000), 100);
+    EXPECT_EQ(kept_of(1000), 1000);
+    for (const Microseconds distance : {2, 500}) EXPECT_NEAR(kept_of(distance), 1000, 2);
+  }
 }
 
 TEST(Rate, OfABurstAtOneTimeIsLimited) {
