@@ -36,6 +36,7 @@ struct State {
   SensorSize output{};
   /// Time of the last event.
   Microseconds passed = std::numeric_limits<Microseconds>::min() / 2;
+  Microseconds delay = 0;  ///< of the times that the filter sees
 };
 
 }  // namespace
@@ -96,21 +97,24 @@ static GstFlowReturn reject(gpointer self, EventFault fault, GstBuffer* buffer) 
 }
 
 /// Returns the start of a buffer on the time axis of the stream, after forgetting the past if time
-/// goes back. Rounded timestamps may overlap by a microsecond; the buffer then counts as later.
+/// goes back. Rounded timestamps may overlap by a microsecond; the buffer then counts as later, for
+/// a filter that must not see time go back.
 static Microseconds continued(gpointer self, LabelledEvents events, Microseconds start) {
   auto& priv = priv_of(self);
   auto& passed = priv.state->passed;
+  auto& delay = priv.state->delay;
   if (events.events.empty()) return start;
   const Microseconds overlap = passed - (start + events.events.front().t);
   if (overlap > 1) {
     GST_DEBUG_OBJECT(self, "time goes back by %" G_GINT64_FORMAT " us: forgetting the past",
                      gint64{overlap});
     priv.impl->forget();
-  } else if (overlap == 1) {
-    ++start;
+    delay = 0;
+  } else {
+    delay = std::max(delay + overlap, Microseconds{0});
   }
   passed = start + events.events.back().t;
-  return start;
+  return start + delay;
 }
 
 static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer) {

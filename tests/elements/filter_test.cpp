@@ -179,6 +179,17 @@ TEST_F(FilterTest, ForgetsWhereTimeGoesBack) {
   EXPECT_FALSE(passes(99 * ms));
   // Rounded timestamps may overlap by a microsecond.
   EXPECT_FALSE(passes(99 * ms - 1));
+  EXPECT_FALSE(passes(99 * ms - 1001));
+  EXPECT_TRUE(passes(99 * ms - 3001));
+}
+
+TEST_F(FilterTest, SeesOnlyLaterTimesWhereBuffersOverlap) {
+  h.push(buffer_of(0, {on(1000)}, 1 * ms));
+  EXPECT_TRUE(h.pull());
+  for (const GstClockTime start : {1, 2, 3, 4}) {
+    h.push(buffer_of(start * ms - GST_USECOND, {on(0), on(1001)}, 2 * ms));
+    EXPECT_FALSE(h.pull());
+  }
 }
 
 TEST_F(FilterTest, ForgetsWhereTheSensorChangesAndWhereItStops) {
