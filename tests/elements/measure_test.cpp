@@ -455,6 +455,23 @@ TEST_F(CompareTest, ComparesEachSegment) {
   EXPECT_FALSE(compare->message(GST_MESSAGE_ELEMENT));
 }
 
+TEST_F(CompareTest, ClassifiesWhereNoEventIsLeft) {
+  make();
+  begin();
+  GstBuffer* noise = buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms);
+  const GstEventCameraLabel label{.object_class = 0, .cause = 3, .reserved = 0};
+  gst_buffer_add_event_camera_label_meta(noise, &label, 1);
+  gst_harness_push(reference, noise);
+  gst_harness_push_event(candidate, gst_event_new_gap(0, 10 * ms));
+  end(reference);
+  end(candidate);
+  const auto* figures = conclude();
+  ASSERT_TRUE(figures);
+  const auto* classification = within(figures, "classification");
+  ASSERT_TRUE(classification);
+  EXPECT_EQ(count_in(classification, "true-negatives"), 1U);
+}
+
 TEST_F(CompareTest, EndsWithoutAnyEvent) {
   make("location=" + in_quotes(path("f.json")));
   begin();

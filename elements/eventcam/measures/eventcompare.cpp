@@ -186,7 +186,8 @@ GstStructure* structure_of(const StreamComparison& comparison) {
   put_structure(structure, "rate-curve", curve_of(comparison.rates()));
   const auto& reference = comparison.causes(StreamRole::reference);
   const auto& candidate = comparison.causes(StreamRole::candidate);
-  if (reference.all() > 0 && candidate.all() > 0)
+  const bool is_all_dropped = figures.streams[StreamRole::candidate].events == 0;
+  if (reference.all() > 0 && (candidate.all() > 0 || is_all_dropped))
     put_structure(structure, "classification",
                   structure_of(Classification::of(reference, candidate)));
   return structure;
