@@ -387,6 +387,27 @@ TEST_F(HotPixelTest, LeavesFilesAsTheyAreUnlessItFindsOthers) {
   EXPECT_EQ(text(), "# mine\n1 1\n");
 }
 
+TEST_F(HotPixelTest, WritesWhatItLearnedBeforeTheSensorChanges) {
+  Harness h(launch());
+  h.caps(small_sensor);
+  EXPECT_EQ(count_passed(h, 0, hot), 100U);
+  EXPECT_EQ(count_passed(h, 500 * ms, hot), 100U);
+  EXPECT_EQ(count_passed(h, 1000 * ms, hot), 0U);
+  h.caps("application/x-event-camera, format=XYTP, width=1, height=1");
+  EXPECT_EQ(text(), "# Hot pixels: column and row\n1 1\n");
+  h.caps(small_sensor);
+  EXPECT_EQ(count_passed(h, 1500 * ms, hot), 0U);
+}
+
+TEST_F(HotPixelTest, KeepsPixelsOutsideTheSensorInTheFile) {
+  write("9 1\n0 0\n");
+  Harness h(launch());
+  h.caps(small_sensor);
+  for (const GstClockTime pts : {0, 500, 1000}) count_passed(h, pts * ms, hot);
+  gst_element_set_state(h.element(), GST_STATE_READY);
+  EXPECT_EQ(text(), "# Hot pixels: column and row\n1 1\n9 1\n");
+}
+
 TEST_F(HotPixelTest, ReportsFilesThatItCannotWrite) {
   Harness h("eventhotpixel location=/nowhere/at/all.txt");
   h.caps(small_sensor);

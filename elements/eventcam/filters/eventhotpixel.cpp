@@ -11,10 +11,10 @@
  * #GstEventHotPixel:location is a file of hot pixels.
  *
  * With #GstEventHotPixel:location, the hot pixels are read from the file, if there is one, when the
- * stream begins, and written to it when the element stops, if others were found; without
- * #GstEventHotPixel:learn, they are only read. It is a text file with the column and row of a pixel
- * in each line. For a camera, learn once with the lens covered or in front of an even scene, and
- * use that file from then on.
+ * stream begins, and written to it when the element stops or the size of the sensor changes, if
+ * others were found; without #GstEventHotPixel:learn, they are only read. It is a text file with
+ * the column and row of a pixel in each line; those outside the sensor stay in it. For a camera,
+ * learn once with the lens covered or in front of an even scene, and use that file from then on.
  *
  * Hot pixels belong to the sensor: they are kept through flushes, gaps, new segments, DISCONT and
  * where time goes back. What was counted in the current period is forgotten after a flush and where
@@ -28,7 +28,9 @@
  * location=hot-pixels.txt ! eventrender ! videoconvert ! autovideosink
  * ]|
  */
+#include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -66,23 +68,30 @@ void write_hot_pixels(const std::string& location, const std::vector<PixelPositi
 class HotPixels final : public EventFilterOf<HotPixelFilter, Settings> {
  public:
   void start(eventcamera::SensorSize in, eventcamera::SensorSize out) override {
-    core_.reset();
+    stop();
     const auto [location, learn] = file();
     std::vector<PixelPosition> pixels;
     if (!location.empty() && !(learn && !std::filesystem::exists(location)))
       pixels = read_hot_pixels(location);
     // After the file: one that cannot be read must not be replaced on stop.
     EventFilterOf::start(in, out);
+    outside_.clear();
+    std::ranges::copy_if(pixels, std::back_inserter(outside_), [in](const PixelPosition& pixel) {
+      return pixel.x >= in.width || pixel.y >= in.height;
+    });
     core_->set_hot_pixels(std::move(pixels));
     read_ = core_->hot_pixels();
   }
 
   void stop() override {
+    if (!core_) return;
+    auto pixels = core_->hot_pixels();
+    EventFilterOf::stop();  // even if the file cannot be written
     const auto [location, learn] = file();
-    if (core_ && learn && !location.empty() &&
-        (core_->hot_pixels() != read_ || !std::filesystem::exists(location)))
-      write_hot_pixels(location, core_->hot_pixels());
-    EventFilterOf::stop();
+    if (!learn || location.empty() || (pixels == read_ && std::filesystem::exists(location)))
+      return;
+    pixels.insert(pixels.end(), outside_.begin(), outside_.end());
+    write_hot_pixels(location, pixels);
   }
 
  private:
@@ -95,7 +104,9 @@ class HotPixels final : public EventFilterOf<HotPixelFilter, Settings> {
     return {copy.location, copy.learn};
   }
 
-  std::vector<PixelPosition> read_;  ///< hot pixels of the file
+  // Of the file:
+  std::vector<PixelPosition> read_;     ///< hot pixels of the sensor
+  std::vector<PixelPosition> outside_;  ///< those of a larger one, which stay in the file
 };
 
 }  // namespace
