@@ -38,5 +38,7 @@ std::span<eventcamera::Label> add_labels(GstBuffer* buffer, gsize events) {
 void truncate_events(GstBuffer* buffer, gsize count) {
   if (auto* meta = gst_buffer_get_event_camera_label_meta(buffer))
     gst_event_camera_label_meta_truncate(meta, count);
+  else if (auto* invalid = gst_buffer_get_meta(buffer, GST_EVENT_CAMERA_LABEL_META_API_TYPE))
+    gst_buffer_remove_meta(buffer, invalid);  // the number of labels must not match by chance
   gst_buffer_set_size(buffer, static_cast<gssize>(count * sizeof(GstEventCameraEvent)));
 }

@@ -96,6 +96,16 @@ TEST_F(FilterTest, KeepsLabelsWithTheirEvents) {
   }
 }
 
+TEST_F(FilterTest, RemovesLabelsThatAreNotThoseOfTheEvents) {
+  const GstEventCameraLabel labels[2] = {};
+  GstBuffer* buffer = buffer_of(0, {on(0), on(5), on(6, 2)}, 20 * ms);
+  gst_buffer_add_event_camera_label_meta(buffer, labels, 2);
+  h.push(buffer);
+  const auto out = h.pull();
+  EXPECT_EQ(times_of(out), (Times{0, 6}));
+  EXPECT_FALSE(gst_buffer_get_event_camera_label_meta(out.get()));
+}
+
 TEST_F(FilterTest, TakesMemoryInPiecesAtAnyAddress) {
   const std::vector events = {on(0), on(5), on(6, 2)};
   GstBuffer* buffer = buffer_of(0, events, 20 * ms);
