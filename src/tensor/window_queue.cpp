@@ -28,8 +28,8 @@ void WindowQueue::drop_returned() {
   first_ = 0;
 }
 
-WindowQueue::Skipped WindowQueue::add(std::span<const Event> events, Microseconds base,
-                                      Nanoseconds start, Nanoseconds end) {
+WindowQueue::Added WindowQueue::add(std::span<const Event> events, Microseconds base,
+                                    Nanoseconds start, Nanoseconds end) {
   drop_returned();
   const auto clipped = std::ranges::find_if(
       events, [&](const Event& event) { return base + event.t >= start / microsecond; });
@@ -40,18 +40,30 @@ WindowQueue::Skipped WindowQueue::add(std::span<const Event> events, Microsecond
   const auto fitting = events.first(std::min(events.size(), max_events - (before - first_)));
   events_.resize(before + fitting.size());
   auto out = events_.begin() + static_cast<std::ptrdiff_t>(before);
-  Skipped skipped;
+  Added added;
   // In a local, because the events written might alias members.
   auto validator = validator_;
-  skipped.invalid = validator.take(fitting, base, end / microsecond - base,
-                                   [&](const AbsoluteEvent& event) { *out++ = event; });
+  const Microseconds max_t = end / microsecond - base;
+  added.invalid =
+      validator.take(fitting, base, max_t, [&](const AbsoluteEvent& event) { *out++ = event; });
   validator_ = validator;
-  skipped.excess = events.size() - fitting.size();
   events_.erase(out, events_.end());
 
-  reached_ = std::max(end, reached_.value_or(end));
+  // Of what does not fit, events of the next window are dropped, and later ones wait for it to go.
+  Nanoseconds complete = validator_.passed() * microsecond;
+  if (settings_.events == 0) complete = std::max(complete, *start_ + settings_.duration);
+  const auto rest = events.subspan(fitting.size());
+  const auto is_later = [&](const Event& event) {
+    return event.t <= max_t &&
+           std::max(base + event.t, validator_.passed()) >= complete / microsecond;
+  };
+  const auto waiting = of_intervals() ? rest.end() : std::ranges::find_if(rest, is_later);
+  added.excess = static_cast<std::size_t>(waiting - rest.begin());
+  added.waiting = rest.subspan(added.excess);
+  if (added.waiting.empty()) complete = end;
+  reached_ = std::max(complete, reached_.value_or(complete));
   if (of_intervals()) intervals_.push_back({*start_, *reached_, events_.size()});
-  return skipped;
+  return added;
 }
 
 /// Index of the first event, in the next window or later, that is not before `time`.

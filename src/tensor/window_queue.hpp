@@ -44,10 +44,11 @@ class WindowQueue {
     std::span<const AbsoluteEvent> events;  ///< valid until add() or reset()
   };
 
-  /// Dropped events of an interval, by reason.
-  struct Skipped {
-    InvalidEvents invalid{};
-    std::size_t excess = 0;  ///< more than max_events in a window
+  /// What became of the events of an interval.
+  struct Added {
+    InvalidEvents invalid{};           ///< dropped
+    std::size_t excess = 0;            ///< dropped: more than max_events in a window
+    std::span<const Event> waiting{};  ///< to be added in another call
   };
 
   WindowQueue(int width, int height, const WindowSettings& settings)
@@ -55,9 +56,9 @@ class WindowQueue {
 
   /// Adds an interval, and those of its events that are in [start, end]; their times are relative
   /// to `base`. Late events count as events of the end of the last window, or interval where
-  /// windows consist of intervals. Afterwards, call next() until there is no more window. Throws
-  /// std::bad_alloc.
-  Skipped add(std::span<const Event> events, Microseconds base, Nanoseconds start, Nanoseconds end);
+  /// windows consist of intervals. Afterwards, call next() until there is no more window, and add
+  /// the events that are waiting, if any, again. Throws std::bad_alloc.
+  Added add(std::span<const Event> events, Microseconds base, Nanoseconds start, Nanoseconds end);
 
   /// Returns the next window if it is complete.
   std::optional<Window> next();

@@ -76,6 +76,24 @@ class Tensor : public testing::Test {
   std::vector<AbsoluteEvent> events;
 };
 
+TEST_F(Tensor, HasAllEventsOfItsPartOfALongBuffer) {
+  begin("representation=histogram accumulation-time=500000000",
+        "application/x-event-camera, format=XYTP, width=1, height=1");
+  std::vector<Event> many;
+  for (std::uint32_t i = 0; i < 17'000'000; ++i)
+    many.push_back(Event::at(0, 0, i / 2, Polarity::on));
+  h->push(buffer_of(0, many, 8'500 * ms));
+  for (int i = 0; i < 17; ++i) {
+    const auto tensor = h->pull();
+    ASSERT_TRUE(tensor);
+    const auto counts = bytes_of(tensor.get());
+    EXPECT_EQ(reinterpret_cast<const float*>(counts.data())[0] +
+                  reinterpret_cast<const float*>(counts.data())[1],
+              1e6F);
+  }
+  EXPECT_EQ(h->warning(), "");
+}
+
 TEST_F(Tensor, IsOneOfEachBufferByDefault) {
   begin("");
   push_columns(0, 1);

@@ -37,15 +37,15 @@ class Windows : public testing::Test {
   explicit Windows(const WindowSettings& settings = {}) : queue(100, 1, settings) {}
 
   /// Adds an interval with events at these times, and takes the windows that it completes.
-  WindowQueue::Skipped add(Nanoseconds start, Nanoseconds end,
-                           const std::vector<Microseconds>& times = {}) {
+  WindowQueue::Added add(Nanoseconds start, Nanoseconds end,
+                         const std::vector<Microseconds>& times = {}) {
     std::vector<Event> events;
     for (const auto time : times)
       events.push_back(Event::at(next_column++, 0, static_cast<std::uint32_t>(time - start / 1000),
                                  Polarity::on));
-    const auto skipped = queue.add(events, start / 1000, start, end);
+    const auto added = queue.add(events, start / 1000, start, end);
     while (const auto window = queue.next()) found.push_back(found_of(*window));
-    return skipped;
+    return added;
   }
   void finish() {
     if (const auto window = queue.finish()) found.push_back(found_of(*window));
@@ -211,6 +211,42 @@ TEST_F(ByTime, AreBounded) {
   EXPECT_EQ(queue.add(many, 0, 0, 1 * ms).excess, 0U);
   EXPECT_EQ(queue.add(many, 0, 0, 1 * ms).excess, 0U);
   EXPECT_EQ(queue.add(many, 0, 0, 1 * ms).excess, many.size());
+}
+
+/// Sizes of the windows of 17 million events at 2 MHz in one interval.
+std::vector<std::size_t> sizes_of_long_interval(WindowQueue& queue) {
+  std::vector<Event> events;
+  for (std::uint32_t i = 0; i < 17'000'000; ++i)
+    events.push_back(Event::at(0, 0, i / 2, Polarity::on));
+  std::vector<std::size_t> sizes;
+  for (std::span<const Event> rest = events; !rest.empty();) {
+    const auto added = queue.add(rest, 0, 0, 8'500 * ms);
+    EXPECT_EQ(added.excess + added.invalid.outside + added.invalid.unsorted, 0U);
+    while (const auto window = queue.next()) sizes.push_back(window->events.size());
+    rest = added.waiting;
+  }
+  EXPECT_FALSE(queue.finish());
+  return sizes;
+}
+
+TEST(LongIntervals, AreCutIntoWindowsOfAllTheirEvents) {
+  WindowQueue by_time(1, 1, {.duration = 50 * ms});
+  EXPECT_EQ(sizes_of_long_interval(by_time), std::vector<std::size_t>(170, 100'000));
+  WindowQueue by_count(1, 1, {.events = 50'000});
+  EXPECT_EQ(sizes_of_long_interval(by_count), std::vector<std::size_t>(340, 50'000));
+}
+
+TEST(LongIntervals, LoseWhatIsTooMuchForAWindowOnly) {
+  std::vector<Event> events(WindowQueue::max_events + 5, Event::at(0, 0, 0, Polarity::on));
+  events.push_back(Event::at(0, 0, 1'000, Polarity::on));
+  WindowQueue queue(1, 1, {.duration = 1 * ms});
+  const auto added = queue.add(events, 0, 0, 2 * ms);
+  EXPECT_EQ(added.excess, 5U);
+  EXPECT_EQ(added.waiting.size(), 1U);
+  EXPECT_EQ(queue.next()->events.size(), WindowQueue::max_events);
+  EXPECT_FALSE(queue.next());
+  EXPECT_TRUE(queue.add(added.waiting, 0, 0, 2 * ms).waiting.empty());
+  EXPECT_EQ(queue.next()->events.size(), 1U);
 }
 
 TEST_F(ByTime, BeginAgainAfterAReset) {

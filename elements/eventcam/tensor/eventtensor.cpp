@@ -209,20 +209,23 @@ static GstFlowReturn add(GstEventTensor* self, std::span<const eventcamera::Even
   if (interval.end < start || (interval.end == start && interval.start < start)) return GST_FLOW_OK;
   const GstFlowReturn result = approach(self, {start, interval.end});
   if (result != GST_FLOW_OK) return result;
-  const auto skipped = priv.state->windows.add(events, base, static_cast<Nanoseconds>(start),
+  do {
+    const auto added = priv.state->windows.add(events, base, static_cast<Nanoseconds>(start),
                                                static_cast<Nanoseconds>(interval.end));
-  priv.faults.warn(self, skipped.invalid, buffer);
-  if (skipped.excess > 0)
-    priv.warn_of_excess(
-        self,
-        {GST_STREAM_ERROR_FAILED, "Cannot use all events: there are more than " +
-                                      std::to_string(WindowQueue::max_events) +
-                                      " in a window; skipping the rest. Shorten the windows."},
-        std::to_string(skipped.excess) + " events skipped");
-  while (const auto window = priv.state->windows.next()) {
-    const GstFlowReturn pushed = push_tensor(self, *window);
-    if (pushed != GST_FLOW_OK) return pushed;
-  }
+    priv.faults.warn(self, added.invalid, buffer);
+    if (added.excess > 0)
+      priv.warn_of_excess(
+          self,
+          {GST_STREAM_ERROR_FAILED, "Cannot use all events: there are more than " +
+                                        std::to_string(WindowQueue::max_events) +
+                                        " in a window; skipping the rest. Shorten the windows."},
+          std::to_string(added.excess) + " events skipped");
+    while (const auto window = priv.state->windows.next()) {
+      const GstFlowReturn pushed = push_tensor(self, *window);
+      if (pushed != GST_FLOW_OK) return pushed;
+    }
+    events = added.waiting;
+  } while (!events.empty());
   return GST_FLOW_OK;
 }
 
