@@ -206,10 +206,10 @@ TEST(Scale, PassesEventsOfTheSameSize) {
 }
 
 TEST(Scale, KeepsTheShapeWhereOneSideIsFree) {
-  const std::pair<const char*, const char*> sizes[] = {{"width=4", "4x2"},
-                                                       {"height=8", "16x8"},
-                                                       {"width=[1,6], height=[1,3]", "6x3"},
-                                                       {"width=[1,16384]", "8x4"}};
+  const std::pair<const char*, const char*> sizes[] = {
+      {"width=4", "4x2"},      {"height=8", "16x8"},      {"width=[1,6], height=[1,3]", "6x3"},
+      {"width=[1,4]", "4x2"},  {"height=[1,2]", "4x2"},   {"width={4,2}", "4x2"},
+      {"height={1,2}", "4x2"}, {"width=[1,16384]", "8x4"}};
   for (const auto& [downstream, size] : sizes) {
     Harness h("eventscale");
     h.caps(sensor, std::string("application/x-event-camera, ") + downstream);

@@ -21,6 +21,10 @@
  * application/x-event-camera,width=320,height=240 ! eventrender ! videoconvert ! autovideosink
  * ]|
  */
+#include <algorithm>
+#include <cmath>
+
+#include "gst/base/owned.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/filter/changed_caps.hpp"
 #include "gst/filter/eventfilter.hpp"
@@ -46,23 +50,33 @@ static GstCaps* transform_caps(GstBaseTransform*, GstPadDirection, GstCaps* caps
   return limited;
 }
 
-/// Chooses the size that is nearest to that of the other side, or of its shape.
+/// Chooses the side `first` nearest to what it was, then `second`, nearest to the same shape.
+/// Returns by how much the shape differs, as a factor.
+static double choose_size(GstStructure* to, const char* first, int from_first, const char* second,
+                          int from_second) {
+  int chosen_first = 0;
+  int chosen_second = 0;
+  gst_structure_fixate_field_nearest_int(to, first, from_first);
+  gst_structure_get_int(to, first, &chosen_first);
+  const double scale = static_cast<double>(chosen_first) / from_first;
+  gst_structure_fixate_field_nearest_int(to, second,
+                                         static_cast<int>(std::lround(from_second * scale)));
+  gst_structure_get_int(to, second, &chosen_second);
+  const double stretch = chosen_second / (from_second * scale);
+  return std::max(stretch, 1 / stretch);
+}
+
+/// Chooses the width or the height nearest to that of the other side, whichever keeps the shape.
 static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection, GstCaps* caps, GstCaps* othercaps) {
   othercaps = gst_caps_make_writable(gst_caps_truncate(othercaps));
   GstStructure* to = gst_caps_get_structure(othercaps, 0);
   GstEventCameraInfo from;
   if (!gst_event_camera_info_from_caps(&from, caps)) return gst_caps_fixate(othercaps);
-  const auto scaled = [](int side, int scale, int by) {
-    return static_cast<int>(gst_util_uint64_scale_int_round(static_cast<guint64>(side), scale, by));
-  };
-  int width = from.width;
-  int height = from.height;
-  if (gst_structure_get_int(to, "width", &width))
-    height = scaled(from.height, width, from.width);
-  else if (gst_structure_get_int(to, "height", &height))
-    width = scaled(from.width, height, from.height);
-  gst_structure_fixate_field_nearest_int(to, "width", width);
-  gst_structure_fixate_field_nearest_int(to, "height", height);
+  const OwnedCaps by_height(gst_caps_copy(othercaps));
+  GstStructure* other = gst_caps_get_structure(by_height.get(), 0);
+  if (choose_size(to, "width", from.width, "height", from.height) >
+      choose_size(other, "height", from.height, "width", from.width))
+    gst_caps_replace(&othercaps, by_height.get());
   return gst_caps_fixate(othercaps);
 }
 
