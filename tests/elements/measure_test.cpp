@@ -210,6 +210,37 @@ TEST_F(StatsTest, MeasuresEachSegment) {
   EXPECT_FALSE(h.message(GST_MESSAGE_ELEMENT));
 }
 
+TEST_F(StatsTest, CountsOnlyWhatIsInTheSegment) {
+  Harness h("eventstats");
+  h.caps(small_sensor);
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = 50 * ms;
+  segment.stop = 80 * ms;
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  std::vector<Event> events;
+  std::vector<GstEventCameraLabel> labels;
+  for (std::uint32_t t = 0; t < 100'000; t += 1000) {
+    events.push_back(Event::at(1, 0, t, Polarity::on));
+    labels.push_back(
+        {.object_class = 0, .cause = t < 50'000 ? guint8{1} : guint8{3}, .reserved = 0});
+  }
+  GstBuffer* buffer = buffer_of(0, events, 100 * ms);
+  gst_buffer_add_event_camera_label_meta(buffer, labels.data(), labels.size());
+  h.push(buffer);
+  h.push(buffer_of(100 * ms, events, 100 * ms));
+  gst_harness_push_event(h.get(), gst_event_new_gap(200 * ms, 100 * ms));
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  const auto message = h.message(GST_MESSAGE_ELEMENT);
+  const auto* figures = structure_of(message);
+  ASSERT_TRUE(figures);
+  EXPECT_EQ(count_in(figures), 30U);
+  EXPECT_EQ(count_in(figures, "light-events"), 0U);
+  EXPECT_EQ(time_in(figures, "start"), gint64{50 * ms});
+  EXPECT_EQ(time_in(figures, "end"), gint64{80 * ms});
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+}
+
 TEST_F(StatsTest, MeasuresEachSensorOnItsOwn) {
   Harness h("eventstats");
   h.caps(small_sensor);

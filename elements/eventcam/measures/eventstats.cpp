@@ -7,7 +7,7 @@
  * Passes events through and posts element messages `eventstats`: after every
  * #GstEventStats:interval of stream time with the statistics since the last one, and at EOS, at the
  * end of the segment in a segment seek, or on stop with those of the whole stream or segment.
- * Intervals end at buffer boundaries.
+ * Intervals end at buffer boundaries; what lies outside the segment does not count.
  *
  * - `cumulative` (#gboolean): %TRUE for the statistics of the whole stream or segment;
  * - `start`, `end` (#gint64): the time covered, in stream time (ns);
@@ -59,6 +59,7 @@ GST_DEBUG_CATEGORY_STATIC(event_stats_debug);
 #define GST_CAT_DEFAULT event_stats_debug
 
 using eventcamera::CauseCounts;
+using eventcamera::Event;
 using eventcamera::EventStatistics;
 using eventcamera::EventValidator;
 using eventcamera::LastTimes;
@@ -189,10 +190,21 @@ static void start_over(GstEventStats* self) {
 
 /* events */
 
+/// The part of an interval that is in the segment, if there is one.
+static std::optional<EventInterval> clip(GstEventStats* self, EventInterval interval) {
+  const auto& segment = GST_BASE_TRANSFORM(self)->segment;
+  const gboolean is_inside = gst_segment_clip(&segment, GST_FORMAT_TIME, interval.start,
+                                              interval.end, &interval.start, &interval.end);
+  return is_inside ? std::optional(interval) : std::nullopt;
+}
+
 /// Adds an interval. Gaps between intervals count as time without events; if time goes backwards,
 /// no inter-event interval spans the discontinuity.
-static void cover(GstEventStats* self, Nanoseconds start, Nanoseconds end) {
+static void cover(GstEventStats* self, const EventInterval& interval) {
   auto& measurement = *self->priv->measurement;
+  const auto& segment = GST_BASE_TRANSFORM(self)->segment;
+  const Nanoseconds start = stream_time(segment, interval.start);
+  const Nanoseconds end = stream_time(segment, interval.end);
   if (measurement.end && start < *measurement.end - static_cast<Nanoseconds>(event_resolution)) {
     GST_DEBUG_OBJECT(self, "stream time goes back from %" GST_STIME_FORMAT " to %" GST_STIME_FORMAT,
                      GST_STIME_ARGS(*measurement.end), GST_STIME_ARGS(start));
@@ -216,17 +228,27 @@ static void post_if_due(GstEventStats* self, Measurement& measurement) {
   measurement.recent.restart();
 }
 
-/// May throw.
+/// Counts the events of a buffer that are in the clipped part of the whole interval. May throw.
 static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buffer,
-                  Nanoseconds start, Nanoseconds end) {
+                  const EventInterval& whole, const EventInterval& clipped) {
   const MappedEvents mapped(buffer);
   if (!mapped) {
     self->priv->faults.warn(self, EventFault::partial_event, buffer);
     return;
   }
-  const auto labels = labels_of(buffer);
+  const auto all = mapped.events();
+  const auto time_of = [&](const Event& event) { return whole.start + event.t * GST_USECOND; };
+  const auto first = std::ranges::find_if(
+      all, [&](const Event& event) { return time_of(event) + event_resolution > clipped.start; });
+  const auto last = std::ranges::find_if(all.rbegin(), all.rend(), [&](const Event& event) {
+    return clipped.end == whole.end || time_of(event) < clipped.end;
+  });
+  const std::span events(first, last.base());
+  auto labels = labels_of(buffer);
+  if (!labels.empty())
+    labels = labels.subspan(static_cast<std::size_t>(first - all.begin()), events.size());
   const auto skipped = measurement.validator.take(
-      mapped.events(), start / 1000, (end - start) / 1000,
+      events, stream_time(GST_BASE_TRANSFORM(self)->segment, whole.start) / 1000, length_of(whole),
       [&](const eventcamera::AbsoluteEvent& event) {
         measurement.concluded = false;
         const auto interval = measurement.last_times.take(event);
@@ -248,13 +270,14 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
     return GST_FLOW_OK;
   }
   if (!measurement) return GST_FLOW_NOT_NEGOTIATED;
-  const Nanoseconds start = stream_time(transform->segment, interval->start);
-  const Nanoseconds end = stream_time(transform->segment, interval->end);
-  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at stream time %" GST_STIME_FORMAT,
-                 gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent), GST_STIME_ARGS(start));
+  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+                 gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent),
+                 GST_TIME_ARGS(interval->start));
+  const auto clipped = clip(self, *interval);
+  if (!clipped) return GST_FLOW_OK;
   return reported(self, [&] {
-    cover(self, start, end);
-    count(self, *measurement, buffer, start, end);
+    cover(self, *clipped);
+    count(self, *measurement, buffer, *interval, *clipped);
     post_if_due(self, *measurement);
     return GST_FLOW_OK;
   });
@@ -268,8 +291,9 @@ static void take_gap(GstEventStats* self, GstEvent* event) {
   gst_event_parse_gap(event, &start, &duration);
   if (!measurement || !GST_CLOCK_TIME_IS_VALID(duration) || start > G_MAXINT64) return;
   const GstClockTime end = start + std::min(duration, GstClockTime{G_MAXINT64} - start);
-  const auto& segment = GST_BASE_TRANSFORM(self)->segment;
-  cover(self, stream_time(segment, start), stream_time(segment, end));
+  const auto clipped = clip(self, {start, end});
+  if (!clipped) return;
+  cover(self, *clipped);
   post_if_due(self, *measurement);
 }
 
