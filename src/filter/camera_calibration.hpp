@@ -23,7 +23,7 @@ struct CameraCalibration {
   double cx = 0;  ///< principal point, in pixels
   double cy = 0;
   std::array<double, 5> distortion{};
-  SensorSize size{};  ///< 0x0 if the file does not say
+  SensorSize size{};  ///< sides that the file does not say are 0
 
   /// A point of the picture, in pixels from the centre of the first one.
   struct Point {

@@ -315,10 +315,21 @@ TEST_F(FileTest, CalibrationOfAnotherSizeIsAnError) {
   write(calibration("0.", "image_width: 346\nimage_height: 260\n"));
   const auto error = error_of("eventundistort" + location());
   EXPECT_NE(error.find("346 x 260 pixels, but the sensor has 8 x 4"), std::string::npos) << error;
+  write(calibration("0.", "image_height: 3\n"));
+  EXPECT_NE(error_of("eventundistort" + location()).find("8 x 3 pixels"), std::string::npos);
   write("camera: [");
   EXPECT_NE(error_of("eventundistort" + location()).find("line"), std::string::npos);
   EXPECT_NE(error_of("eventundistort location=/nowhere/at/all.yaml").find("/nowhere"),
             std::string::npos);
+}
+
+TEST_F(FileTest, CalibrationMayHaveOneSideOnly) {
+  for (const char* side : {"image_width: 8\n", "image_height: 4\n"}) {
+    write(calibration("0.", side));
+    Harness h("eventundistort" + location());
+    h.caps(sensor);
+    EXPECT_EQ(passed(h, {on(1, 1)}), (Pixels{{1, 1}})) << side;
+  }
 }
 
 TEST(Geometry, CombinesInOneLine) {

@@ -46,9 +46,11 @@ constexpr std::size_t max_file_size = 1 << 20;
 CameraCalibration read_calibration(const std::string& location, SensorSize sensor) {
   return read_named_file("the calibration", location, max_file_size, [&](const std::string& yaml) {
     const auto calibration = eventcamera::parse_calibration(yaml);
-    if (calibration.size != SensorSize{} && calibration.size != sensor)
-      throw std::invalid_argument("it is for " + in_pixels(calibration.size) +
-                                  ", but the sensor has " + in_pixels(sensor));
+    const auto [width, height] = calibration.size;
+    const SensorSize size{width != 0 ? width : sensor.width, height != 0 ? height : sensor.height};
+    if (size != sensor)
+      throw std::invalid_argument("it is for " + in_pixels(size) + ", but the sensor has " +
+                                  in_pixels(sensor));
     return calibration;
   });
 }
