@@ -50,8 +50,7 @@ LabelledEvents HotPixelFilter::filter(LabelledEvents events, Microseconds start,
   });
 }
 
-/// Median of the events of the pixels around one; the upper one at the border, where the number of
-/// pixels may be even.
+/// Median of the events of the pixels around one; the upper one where their number is even.
 std::uint32_t HotPixelFilter::median_around(int x, int y) const {
   std::array<std::uint32_t, 8> counts;
   auto end = counts.begin();
