@@ -31,7 +31,7 @@ Nanoseconds StreamComparison::end() const {
 }
 
 InvalidEvents StreamComparison::add(StreamRole role, std::span<const Event> events,
-                                    Nanoseconds start, Nanoseconds end,
+                                    Microseconds base, Nanoseconds start, Nanoseconds end,
                                     std::span<const Label> labels) {
   auto& arriving = arriving_[role];
   if (!arriving.start) {
@@ -40,7 +40,7 @@ InvalidEvents StreamComparison::add(StreamRole role, std::span<const Event> even
   }
   arriving.is_labelled |= !labels.empty();
   const auto skipped = arriving.validator.take(
-      events, start / 1000, (end - start) / 1000,
+      events, base, end / 1000 - base,
       [&](const AbsoluteEvent& event) { arriving.waiting.push_back(event); }, labels);
   arriving.end = std::max(arriving.end, end);
   if (this->start()) take_until(this->end() / 1000);

@@ -36,10 +36,10 @@ class StreamComparison {
   /// The stream that lags behind; its events are needed next.
   StreamRole behind() const;
 
-  /// Adds the sorted events of [start, end] of one stream, with times relative to `start`, and
-  /// their labels, if they have any. Returns what was skipped.
-  InvalidEvents add(StreamRole role, std::span<const Event> events, Nanoseconds start,
-                    Nanoseconds end, std::span<const Label> labels = {});
+  /// Adds the sorted events of [start, end] of one stream, with times relative to `base`, and their
+  /// labels, if they have any. Returns what was skipped.
+  InvalidEvents add(StreamRole role, std::span<const Event> events, Microseconds base,
+                    Nanoseconds start, Nanoseconds end, std::span<const Label> labels = {});
 
   ComparisonFigures figures() const;
   const EventMap& map(StreamRole role) const { return similarity_.statistics(role).map(); }

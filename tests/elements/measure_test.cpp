@@ -486,6 +486,31 @@ TEST_F(CompareTest, ComparesEachSegment) {
   EXPECT_FALSE(compare->message(GST_MESSAGE_ELEMENT));
 }
 
+TEST_F(CompareTest, ComparesOnlyWhatIsInTheSegments) {
+  make();
+  begin();
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = 50 * ms;
+  segment.stop = 80 * ms;
+  std::vector<Event> events;
+  for (std::uint32_t t = 0; t < 100'000; t += 1000)
+    events.push_back(Event::at(1, 0, t, Polarity::on));
+  for (auto* h : {reference, candidate}) {
+    gst_harness_push_event(h, gst_event_new_segment(&segment));
+    gst_harness_push(h, buffer_of(0, events, 100 * ms));
+    end(h);
+  }
+  const auto* figures = conclude();
+  ASSERT_TRUE(figures);
+  EXPECT_EQ(time_in(figures, "start"), gint64{50 * ms});
+  EXPECT_EQ(time_in(figures, "end"), gint64{80 * ms});
+  for (const char* role : {"reference", "candidate"})
+    EXPECT_EQ(count_in(within(figures, role)), 30U) << role;
+  ASSERT_EQ(passed.size(), 1U);
+  EXPECT_EQ(events_of(passed[0].get()).size(), 100U);
+}
+
 TEST_F(CompareTest, ClassifiesWhereNoEventIsLeft) {
   make();
   begin();

@@ -58,7 +58,7 @@ class Feed {
     for (; taken_ < stream_.size() && stream_[taken_].t <= until; ++taken_)
       events.push_back({static_cast<std::uint32_t>(stream_[taken_].t - at_), stream_[taken_].x,
                         stream_[taken_].y_p});
-    EXPECT_EQ(comparison.add(role_, events, at_ * 1000, until * 1000), InvalidEvents{});
+    EXPECT_EQ(comparison.add(role_, events, at_, at_ * 1000, until * 1000), InvalidEvents{});
     at_ = until;
   }
 
@@ -390,9 +390,9 @@ TEST(Comparison, HasNothingToSayOfStreamsThatDoNotMeet) {
   EXPECT_EQ(comparison.behind(), StreamRole::reference);
   EXPECT_EQ(comparison.figures().end, 0);
   const std::vector events = {Event::at(1, 1, 5, Polarity::on)};
-  comparison.add(StreamRole::reference, events, 0, 1'000'000);
+  comparison.add(StreamRole::reference, events, 0, 0, 1'000'000);
   EXPECT_EQ(comparison.behind(), StreamRole::candidate);
-  comparison.add(StreamRole::candidate, events, 5'000'000, 6'000'000);
+  comparison.add(StreamRole::candidate, events, 5'000, 5'000'000, 6'000'000);
   EXPECT_EQ(comparison.behind(), StreamRole::reference);
   const auto figures = comparison.figures();
   EXPECT_EQ(figures.streams[StreamRole::reference].events, 0U);
@@ -405,15 +405,16 @@ TEST(Comparison, CountsCausesInTheCommonTimeOnly) {
   for (std::uint32_t t = 500; t < 20'000; t += 1000)
     events.push_back(Event::at(1, 1, t, Polarity::on));
   const std::vector<Label> light(events.size(), {.cause = Cause::light});
-  comparison.add(StreamRole::reference, events, 0, 20'000'000, light);
+  comparison.add(StreamRole::reference, events, 0, 0, 20'000'000, light);
   EXPECT_EQ(comparison.causes(StreamRole::reference).all(), 0U);
-  comparison.add(StreamRole::candidate, std::span(events).first(10), 5'000'000, 15'000'000,
+  comparison.add(StreamRole::candidate, std::span(events).first(10), 5'000, 5'000'000, 15'000'000,
                  std::span(light).first(10));
   for (const auto role : both_roles) {
     EXPECT_EQ(comparison.causes(role)[Cause::light], 10U);
     EXPECT_EQ(comparison.causes(role).all(), 10U);
   }
-  comparison.add(StreamRole::candidate, std::span(events).first(10), 20'000'000, 30'000'000);
+  comparison.add(StreamRole::candidate, std::span(events).first(10), 20'000, 20'000'000,
+                 30'000'000);
   EXPECT_EQ(comparison.causes(StreamRole::reference).all(), 15U);
 }
 
@@ -424,9 +425,9 @@ TEST(Comparison, SurvivesEventsBeyondThePictureAndOutOfOrder) {
                               Event::at(0, 0, 4'000'000'000, Polarity::on)};
   for (const auto role : both_roles) {
     const InvalidEvents invalid{.outside = 2, .unsorted = 1};
-    EXPECT_EQ(comparison.add(role, events, 1'000'000, 2'000'000), invalid);
-    EXPECT_EQ(comparison.add(role, events, 0, 1'000'000), invalid);
-    EXPECT_EQ(comparison.add(role, events, -5'000'000, 9'000'000), invalid);
+    EXPECT_EQ(comparison.add(role, events, 1'000, 1'000'000, 2'000'000), invalid);
+    EXPECT_EQ(comparison.add(role, events, 0, 0, 1'000'000), invalid);
+    EXPECT_EQ(comparison.add(role, events, -5'000, -5'000'000, 9'000'000), invalid);
   }
   const auto figures = comparison.figures();
   EXPECT_EQ(figures.streams[StreamRole::reference].events,

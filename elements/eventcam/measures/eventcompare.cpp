@@ -5,9 +5,9 @@
  * @short_description: measures the similarity of two event streams
  *
  * Compares the stream on the pad `candidate`, which it passes through, with the one on the pad
- * `reference`, over the time that both cover. The two are synchronized by stream time, and their
- * sensors must have the same size. At EOS of the candidate, at the end of its segment in a segment
- * seek, or on stop, it posts an element message `eventcompare`:
+ * `reference`, over the time that both cover in their segments. The two are synchronized by stream
+ * time, and their sensors must have the same size. At EOS of the candidate, at the end of its
+ * segment in a segment seek, or on stop, it posts an element message `eventcompare`:
  *
  * - `start`, `end` (#gint64): the time covered by both, in stream time (ns);
  * - `reference`, `candidate` (#GstStructure): the statistics of each, as in #GstEventStats;
@@ -51,6 +51,7 @@
  */
 #include <optional>
 
+#include "elements/eventcam/measures/clipped_events.hpp"
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/authors.hpp"
@@ -218,11 +219,14 @@ void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
   }
   GST_LOG_OBJECT(pads_[role], "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                  mapped.events().size(), GST_TIME_ARGS(interval->start));
-  if (!mapped.events().empty()) concluded_ = reported_ = false;
   const GstSegment segment = segment_of(pads_[role]);
-  const auto skipped =
-      comparison_->add(role, mapped.events(), stream_time(segment, interval->start),
-                       stream_time(segment, interval->end), labels_of(buffer));
+  const auto clipped = clip(*interval, segment);
+  if (!clipped) return;
+  const auto [events, labels] = ClippedEvents(mapped, buffer, *interval, *clipped);
+  if (!events.empty()) concluded_ = reported_ = false;
+  const auto skipped = comparison_->add(role, events, stream_time(segment, interval->start) / 1000,
+                                        stream_time(segment, clipped->start),
+                                        stream_time(segment, clipped->end), labels);
   warn(skipped, buffer);
 }
 

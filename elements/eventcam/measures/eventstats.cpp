@@ -42,6 +42,7 @@
 #include <limits>
 #include <optional>
 
+#include "elements/eventcam/measures/clipped_events.hpp"
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
@@ -59,7 +60,6 @@ GST_DEBUG_CATEGORY_STATIC(event_stats_debug);
 #define GST_CAT_DEFAULT event_stats_debug
 
 using eventcamera::CauseCounts;
-using eventcamera::Event;
 using eventcamera::EventStatistics;
 using eventcamera::EventValidator;
 using eventcamera::LastTimes;
@@ -190,14 +190,6 @@ static void start_over(GstEventStats* self) {
 
 /* events */
 
-/// The part of an interval that is in the segment, if there is one.
-static std::optional<EventInterval> clip(GstEventStats* self, EventInterval interval) {
-  const auto& segment = GST_BASE_TRANSFORM(self)->segment;
-  const gboolean is_inside = gst_segment_clip(&segment, GST_FORMAT_TIME, interval.start,
-                                              interval.end, &interval.start, &interval.end);
-  return is_inside ? std::optional(interval) : std::nullopt;
-}
-
 /// Adds an interval. Gaps between intervals count as time without events; if time goes backwards,
 /// no inter-event interval spans the discontinuity.
 static void cover(GstEventStats* self, const EventInterval& interval) {
@@ -236,17 +228,8 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
     self->priv->faults.warn(self, EventFault::partial_event, buffer);
     return;
   }
-  const auto all = mapped.events();
-  const auto time_of = [&](const Event& event) { return whole.start + event.t * GST_USECOND; };
-  const auto first = std::ranges::find_if(
-      all, [&](const Event& event) { return time_of(event) + event_resolution > clipped.start; });
-  const auto last = std::ranges::find_if(all.rbegin(), all.rend(), [&](const Event& event) {
-    return clipped.end == whole.end || time_of(event) < clipped.end;
-  });
-  const std::span events(first, last.base());
-  auto labels = labels_of(buffer);
-  if (!labels.empty())
-    labels = labels.subspan(static_cast<std::size_t>(first - all.begin()), events.size());
+  const auto [events, labels] = ClippedEvents(mapped, buffer, whole, clipped);
+  const bool is_labelled = !labels.empty();
   const auto skipped = measurement.validator.take(
       events, stream_time(GST_BASE_TRANSFORM(self)->segment, whole.start) / 1000, length_of(whole),
       [&](const eventcamera::AbsoluteEvent& event) {
@@ -254,7 +237,7 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
         const auto interval = measurement.last_times.take(event);
         for (auto* part : {&measurement.cumulative, &measurement.recent}) {
           part->statistics.add(event, interval);
-          if (!labels.empty()) part->causes.add(event.cause);
+          if (is_labelled) part->causes.add(event.cause);
         }
       },
       labels);
@@ -273,7 +256,7 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
   GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                  gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent),
                  GST_TIME_ARGS(interval->start));
-  const auto clipped = clip(self, *interval);
+  const auto clipped = clip(*interval, transform->segment);
   if (!clipped) return GST_FLOW_OK;
   return reported(self, [&] {
     cover(self, *clipped);
@@ -291,7 +274,7 @@ static void take_gap(GstEventStats* self, GstEvent* event) {
   gst_event_parse_gap(event, &start, &duration);
   if (!measurement || !GST_CLOCK_TIME_IS_VALID(duration) || start > G_MAXINT64) return;
   const GstClockTime end = start + std::min(duration, GstClockTime{G_MAXINT64} - start);
-  const auto clipped = clip(self, {start, end});
+  const auto clipped = clip({start, end}, GST_BASE_TRANSFORM(self)->segment);
   if (!clipped) return;
   cover(self, *clipped);
   post_if_due(self, *measurement);
