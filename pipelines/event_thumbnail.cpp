@@ -10,10 +10,12 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "gst/base/event_buffer.hpp"
@@ -204,8 +206,13 @@ int main(int argc, char** argv) {
   }
   if (!find_plugin()) return 1;
   const char* in = options.files[0];
+  const char* out = options.files[1];
+  if (std::error_code none; std::filesystem::equivalent(in, out, none)) {
+    std::fprintf(stderr, "%s and %s are the same file\n", in, out);
+    return 2;
+  }
   try {
-    write_bytes(options.files[1], draw_recording(in, options.size).draw().png());
+    write_bytes(out, draw_recording(in, options.size).draw().png());
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s: %s\n", in, error.what());
     return 1;

@@ -159,6 +159,14 @@ head -c 100 ball.raw >header.raw
 ! "$BUILD/pipelines/event-thumbnail" header.raw thumbnail.png 2>reason || fail "a thumbnail without events"
 grep -qx "header.raw: no events found" reason || fail "$(cat reason)"
 
+# Not in place of the recording, under another name of it either.
+ln -s ball.raw link.png
+for out in ball.raw link.png; do
+  code=0
+  "$BUILD/pipelines/event-thumbnail" ball.raw $out 2>reason || code=$?
+  [ $code -eq 2 ] && grep -qx "ball.raw and $out are the same file" reason || fail "status $code: $(cat reason)"
+done
+
 # Effects run as webcam applications run them.
 for effect in "$data"/gnome-video-effects/*.effect; do
   for key in Name Comment PipelineDescription; do
