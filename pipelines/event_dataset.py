@@ -18,6 +18,7 @@ import os
 import re
 import shlex
 import shutil
+import struct
 import subprocess
 import sys
 import time
@@ -37,6 +38,8 @@ except ImportError as missing:
 HERE = os.path.dirname(os.path.realpath(__file__))
 STEP = re.compile(r"^(\d+) of (\d+) steps")
 MAX_TOLD = 20  # lines about videos of a kind
+LOCK_SIZE = 1 << 60  # bytes that stand for all videos; a part locks its share of them
+FLOCK = struct.Struct("hhqqi4x")  # of the C library
 
 
 class VideosDone(Progress):
@@ -158,10 +161,12 @@ def stale_videos(videos, records, output):
 
 
 def locked(output, part):
-    """Refuses to work beside another process; returns what keeps others away until it is closed."""
-    lock = open(os.path.join(output, ".lock-{}-of-{}".format(*part)), "w", encoding="utf-8")
+    """Refuses to work beside another process on the same videos; returns what keeps others away until it and its
+    copies in other processes are closed."""
+    lock = open(os.path.join(output, ".lock"), "w", encoding="utf-8")
+    start, end = (place * LOCK_SIZE // part[1] for place in (part[0] - 1, part[0]))
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.fcntl(lock, fcntl.F_OFD_SETLK, FLOCK.pack(fcntl.F_WRLCK, os.SEEK_SET, start, end - start, 0))
     except BlockingIOError:
         raise RuntimeError(f"another event-dataset works in {output}; wait for it, or name another folder") from None
     return lock
@@ -298,7 +303,7 @@ def make_one(args, recipe):
 
 
 def remove_clips(args, videos):
-    """Of videos that are made, in case a job was killed before it did so."""
+    """In case a job was killed before it did so."""
     for video in videos:
         folder = clips_folder(args, video.name)
         shutil.rmtree(folder, ignore_errors=True)
@@ -365,8 +370,10 @@ def verify_all(args, recipe):
     expect_own_folder(args.output, videos)
     os.makedirs(args.output, exist_ok=True)
     with locked(args.output, args.part) as lock:
-        for folder in records_folder(args), clips_root(args):
-            shutil.rmtree(os.path.join(args.output, folder), ignore_errors=True)
+        remove_clips(args, present)
+        for video in present:
+            with contextlib.suppress(FileNotFoundError):
+                os.remove(path_in(args.output, records_folder(args), video.name, "json"))
         if present:
             make(args, present, lock)
         records = records_of(args, present)

@@ -72,13 +72,19 @@ def event_dataset(*words, status=0):
     return done.stdout
 
 
-def kill_once_there_is(pattern, *words):
-    """Kills the program, and its jobs, when it has made a file of this pattern."""
+def stop_once_there_is(pattern, *words):
+    """Stops the program, and its jobs, when it has made a file of this pattern. Returns it."""
     program = subprocess.Popen([PROGRAM, *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                                start_new_session=True)
     while not glob.glob(pattern):
         assert program.poll() is None, f"{words} ended with status {program.returncode}"
         time.sleep(0.02)
+    os.killpg(program.pid, signal.SIGSTOP)
+    return program
+
+
+def kill_once_there_is(pattern, *words):
+    program = stop_once_there_is(pattern, *words)
     os.killpg(program.pid, signal.SIGKILL)
     program.wait()
 
@@ -276,6 +282,22 @@ class DataSets(unittest.TestCase):
         printed = event_dataset(recipe_of("parts", RECIPE + "min-frames: 4"), status=1)
         self.assertIn("1: the recipe has changed; making it again", printed)
         self.assertIn("0 made, 0 unchanged, 3 refused, 1 failed", printed)
+
+    def test_are_made_and_verified_in_parts_at_the_same_time(self):
+        for number in range(4):
+            make_video(f"parallel/videos/{number}.mkv", frames=3)
+        recipe = recipe_of("parallel")
+        for words, pattern in {(recipe,): "unfinished/*", ("verify", recipe): "verified/*.json"}.items():
+            first = stop_once_there_is(path_of(f"parallel/recipe/{pattern}"), *words, "--part", "1/2",
+                                       "--retries", "0")
+            try:
+                for part in ("1/1", "1/3", "2/3"):
+                    self.assertIn("another event-dataset works in", event_dataset(*words, "--part", part, status=1))
+                event_dataset(*words, "--part", "2/2")
+            finally:
+                os.killpg(first.pid, signal.SIGCONT)
+            self.assertEqual(first.wait(), 0)
+        self.assertEqual(len(hashes("parallel")), 4)
 
 
 class Outputs(unittest.TestCase):
