@@ -7,7 +7,7 @@
 
 The folder beside the recipe, of its name, gets the events, a manifest of all hashes, lists of the parts,
 statistics and a page of pictures. A second call makes only what is missing or has changed. "verify" makes
-the events again, keeps none, and compares their hashes with those of the manifest."""
+the events again, keeps none, and compares their hashes, and those of the files in data/, with the manifest."""
 import argparse
 import concurrent.futures
 import contextlib
@@ -141,17 +141,22 @@ def reason_to_make(video, record, output):
 
 
 def stale_videos(videos, records, output):
-    """The videos that have to be made, without their records; says which have changed."""
+    """The videos that have to be made, without their records and events; says which have changed."""
     stale = []
     for video in videos:
-        reason = reason_to_make(video, records[video.name], output)
+        record = records[video.name]
+        reason = reason_to_make(video, record, output)
         if not reason:
             continue
         stale.append(video)
         if reason != "missing":
             print(f"{video.name}: {reason}; making it again", file=sys.stderr)
-        for path in (path_in(output, "records", video.name, "json"),
-                     path_in(output, "data", video.name, extension_of(video.recipe))):
+        paths = {path_in(output, "records", video.name, "json"),
+                 path_in(output, "data", video.name, extension_of(video.recipe))}
+        if record and "written" in record:
+            written_as = os.path.splitext(record["written"]["path"])[1].removeprefix(".")
+            paths.add(path_in(output, "data", video.name, written_as))
+        for path in paths:
             if os.path.exists(path):
                 os.remove(path)
     return stale
@@ -386,6 +391,10 @@ def verify_all(args, recipe):
         difference = difference_of(expected[name], record) if record else failure_of(args, name)
         if difference:
             differences.append(f"{name}: {difference}")
+    with concurrent.futures.ThreadPoolExecutor(args.cores) as pool:
+        found = pool.map(lambda video: is_damaged(expected[video.name]["written"], args.output), present)
+        differences += [f"{video.name}: its file of events is not that of the manifest"
+                        for video, damaged in zip(present, found) if damaged]
     tell("different", differences)
     print(f"{len(present)} videos of the manifest compared, {len(differences)} differences")
     return 1 if differences else 0
@@ -404,6 +413,12 @@ def difference_of(expected, record):
     if expected["versions"] != record["versions"]:
         return f"other events, by {record['versions']} instead of {expected['versions']}"
     return "other events, by the same versions"
+
+
+def is_damaged(written, output):
+    """True if a file of events is there, and is not what was written."""
+    path = os.path.join(output, written["path"])
+    return os.path.exists(path) and hash_of(path) != written["sha256"]
 
 
 def main():

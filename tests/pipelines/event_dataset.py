@@ -135,6 +135,22 @@ class DataSets(unittest.TestCase):
         printed = event_dataset("verify", recipe, "--manifest", path_of(f"{folder}/other.json"), status=1)
         self.assertIn("run/four: other events, by the same versions", printed)
         self.assertIn("run/three's: the input has changed since the manifest", printed)
+        self.check_damage(folder, recipe)
+
+    def check_damage(self, folder, recipe):
+        """Only verify sees it in a file of the same size. No file stays from another output."""
+        damaged = path_of(f"{folder}/recipe/data/run/four.npz")
+        with open(damaged, "r+b") as file:
+            file.seek(-100, os.SEEK_END)
+            file.write(b"damage")
+        self.assertIn("0 made, 3 unchanged", event_dataset(recipe))
+        self.assertRegex(event_dataset("verify", recipe, status=1),
+                         "different: run/four: its file of events is not that of the manifest\n.*, 1 differences")
+        os.remove(damaged)
+        self.assertIn("3 videos of the manifest compared, 0 differences", event_dataset("verify", recipe))
+        event_dataset(recipe_of(folder, RECIPE.replace("npz", "csv")))
+        for path in glob.glob(glob.escape(path_of(f"{folder}/recipe/data")) + "/*/*"):
+            self.assertTrue(path.endswith(".csv"), path)
 
     def check_reports(self, folder, made):
         parts = {}
