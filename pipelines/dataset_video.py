@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Simulates one video of a data set, and records what it was made from: hashes, parameters, figures, versions."""
+import contextlib
 import hashlib
 import json
 import os
@@ -20,6 +21,8 @@ from gst_eventcamera.tensors import TENSOR_CAPS, tensor_of
 SAME_BYTES = {"h5": "commit-interval=0", "hdf5": "commit-interval=0"}
 PREVIEW_SIDE = 160  # pixels
 MAX_KEPT = 16  # arrays of events
+# Failures of the machine in any element, such as a full disk; a writer may keep events in TMPDIR.
+MACHINE_ERRORS = Gst.ResourceError.NO_SPACE_LEFT, Gst.ResourceError.WRITE, Gst.ResourceError.OPEN_WRITE
 
 
 class Refused(Exception):
@@ -147,8 +150,6 @@ def record_of(video, output, keep=True, clips=None):
         except Refused as reason:
             return record | {"refused": str(reason)}
         except ec.PipelineError as failure:
-            if failure.element == "file":  # such as a full disk
-                raise
             return record | {"refused": f"corrupt or not supported: {failure}"}
         written = {"path": f"data/{video.name}.{extension_of(video.recipe)}", "size": os.path.getsize(path),
                    "sha256": hash_of(path)}
@@ -179,7 +180,8 @@ def simulate(video, path, clips):
 
     rest = f"tee name=events ! queue ! {writer}  events. ! queue ! {SINK}"
     # One thread, since there is a job for each processor.
-    with clips.playing(rest) if clips else video.playing(rest, threads=1) as pipeline:
+    playing = clips.playing(rest) if clips else video.playing(rest, threads=1)
+    with playing as pipeline, machine_errors_told_apart(pipeline):
         frames, decoders = (clips.frames, clips.decoders) if clips else (Frames(), decoders_of(pipeline))
         pipeline.gaps_as_buffers()
         if not clips:
@@ -204,6 +206,22 @@ def simulate(video, path, clips):
     if array:
         array.close()
     return figures.described(len(frames.times)), png_of(picture_of(figures.busiest())), frames.warnings(), sorted(decoders)
+
+
+@contextlib.contextmanager
+def machine_errors_told_apart(pipeline):
+    """Raises them as RuntimeError instead of PipelineError, since the video is not at fault."""
+    errors = []
+    bus = pipeline.element("events").get_parent().get_bus()
+    bus.enable_sync_message_emission()
+    bus.connect("sync-message::error", lambda _, message: errors.append(message.parse_error()[0]))
+    try:
+        yield
+    except ec.PipelineError as failure:
+        if failure.element == "file" or any(error.matches(Gst.ResourceError.quark(), code)
+                                            for error in errors for code in MACHINE_ERRORS):
+            raise RuntimeError(str(failure)) from None
+        raise
 
 
 def decoders_of(pipeline):

@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 import unittest
+import unittest.mock
 
 if not os.path.exists(os.path.join(os.environ["GI_TYPELIB_PATH"], "GstEventCamera-1.0.typelib")):
     print("built without introspection: no Python")
@@ -269,6 +270,10 @@ class DataSets(unittest.TestCase):
         self.assertRegex(printed, "failed: one: .*Is a directory")
         self.assertIn("1 made, 0 unchanged, 0 refused, 1 failed", printed)
         os.rmdir(path_of("failing/recipe/previews/one.png"))
+        with unittest.mock.patch.dict(os.environ, TMPDIR="/nowhere"):
+            printed = event_dataset(path_of("failing/recipe.yaml"), "--video", "one", "--file",
+                                    path_of("failing/videos/one.mkv"), status=1)
+        self.assertRegex(printed, "^error: .*Cannot keep events in a temporary file in /nowhere")
         self.assertIn("1 made, 1 unchanged", event_dataset(path_of("failing/recipe.yaml"), "--part", "1/1"))
         os.remove(path_of("failing/recipe/data/one.npz"))
         os.remove(path_of("failing/recipe/snakemake.log"))
