@@ -146,4 +146,15 @@ for option in --profile --map; do
 done
 refused "recorded.raw is read, so it cannot be written" scene.mkv recorded.raw --map ./recorded.raw
 refused "nothing to compare from" scene.mkv recorded.raw --element eventsim-frame --from 5
+
+# A checkout asks for the Debian packages that the Python package depends on.
+mkdir none
+printf '#!/bin/sh\n' >none/dpkg-query
+chmod +x none/dpkg-query
+for group in calibrate dataset pipelines; do
+  PATH=$PWD/none:$PATH "$SOURCE/install-packages" --check $group 2>missing || true
+  for package in $(sed -n '/^Package: python3-gst-eventcamera/,/^Suggests/s/^ *\(python3-[a-z]*\),$/\1/p' "$SOURCE/debian/control"); do
+    grep -qw "$package" missing || fail "$group lacks $package"
+  done
+done
 echo "all thresholds were recovered"
