@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/python3 -B
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Finds the contrast thresholds at which a simulator generates as many ON and OFF events from a
 video as a real camera recorded of the same scene; for eventsim-dvs also its response, upsampling,
@@ -476,3 +476,5 @@ if __name__ == "__main__":
         main()
     except (RuntimeError, OSError, GLib.Error) as failure:
         sys.exit(f"error: {failure}")
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -442,4 +442,5 @@ if __name__ == "__main__":
     except (RuntimeError, OSError) as failure:
         sys.exit(f"error: {failure}")
     except KeyboardInterrupt:
-        sys.exit("interrupted; run the same command to resume")
+        print("interrupted; run the same command to resume", file=sys.stderr)
+        sys.exit(130)

@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/python3 -B
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Compares simulated events with those that a real camera recorded of the same scene, beside the noise
 ceiling: how similar a second recording by the same camera would be.
@@ -340,3 +340,5 @@ if __name__ == "__main__":
         main()
     except (RuntimeError, OSError, GLib.Error) as failure:
         sys.exit(f"error: {failure}")
+    except KeyboardInterrupt:
+        sys.exit(130)

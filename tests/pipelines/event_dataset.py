@@ -253,6 +253,11 @@ class DataSets(unittest.TestCase):
         for number in range(4):
             make_video(f"killed/videos/{number}.mkv")
         recipe = recipe_of("killed")
+        interrupted = stop_once_there_is(path_of("killed/recipe/unfinished/*"), recipe, "--cores", "1")
+        for number in (signal.SIGINT, signal.SIGCONT):
+            os.killpg(interrupted.pid, number)
+        self.assertEqual(interrupted.wait(), 130)
+        shutil.rmtree(path_of("killed/recipe"))
         records = path_of("killed/recipe/records/*.json")
         kill_once_there_is(records, recipe, "--cores", "1")  # videos are made in any order
         before = {record: os.stat(record).st_mtime_ns for record in glob.glob(records)}

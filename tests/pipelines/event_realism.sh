@@ -101,3 +101,22 @@ for wrong in -5 nan inf 1e20 soon; do
 done
 touch empty.txt
 refused "empty.txt: no pictures; give a line" real1.raw real2.raw --video empty.txt --html page.html
+
+# Ctrl-C ends the programs quietly. They leave no compiled files.
+cat >sitecustomize.py <<'PYTHON'
+import argparse
+
+
+def interrupt(*_):
+    raise KeyboardInterrupt
+
+
+argparse.ArgumentParser.parse_args = interrupt
+PYTHON
+for program in event-calibrate event-realism; do
+  code=0
+  PYTHONPATH=$PWD:$PYTHONPATH PYTHONDONTWRITEBYTECODE= PYTHONPYCACHEPREFIX=$PWD/compiled \
+    "$BUILD/pipelines/$program" 2>errors || code=$?
+  [ $code -eq 130 ] && [ ! -s errors ] || fail "$program: status $code: $(cat errors)"
+  [ ! -e compiled ] || fail "$program leaves compiled files"
+done
