@@ -2,6 +2,7 @@
 """Running GStreamer pipelines, with failures as exceptions."""
 from __future__ import annotations
 
+import atexit
 import math
 import os
 import sys
@@ -31,6 +32,9 @@ MAX_WAIT = Gst.SECOND // 10
 
 # The process that plays pipelines. One that it forks has GStreamer's state without its threads.
 _playing_process: Optional[int] = None
+
+# Those that the end of the program stops.
+_open: set[Pipeline] = set()
 
 
 class PipelineError(RuntimeError):
@@ -67,7 +71,7 @@ def _warn(text: str) -> None:
 
 class Pipeline:
     """A pipeline whose output reaches its appsink named `out`. A context manager: leaving it stops the
-    pipeline."""
+    pipeline, and so does the end of the program."""
 
     def __init__(self, description: str) -> None:
         try:
@@ -81,10 +85,13 @@ class Pipeline:
         self._error: Optional[PipelineError] = None
 
     def __enter__(self) -> Pipeline:
+        _open.add(self)
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._pipeline.set_state(Gst.State.NULL)
+        _open.discard(self)
+        if _playing_process == os.getpid():  # else there is no thread that could stop
+            self._pipeline.set_state(Gst.State.NULL)
 
     def element(self, name: str) -> Gst.Element:
         return self._pipeline.get_by_name(name)
@@ -183,6 +190,13 @@ class Pipeline:
         """Returns when all sinks of a playing pipeline have reached the end."""
         while not self._ended:
             self.raise_error(MAX_WAIT)
+
+
+@atexit.register
+def _stop_all() -> None:
+    """Later, Python ends threads while they hold the lock of the pad whose probe they run."""
+    for pipeline in list(_open):
+        pipeline.__exit__()
 
 
 def property_limits(element: str) -> dict[str, tuple[float, float]]:

@@ -331,6 +331,13 @@ class Simulators(unittest.TestCase):
         _, errors = program.communicate(timeout=30)
         self.assertIn("KeyboardInterrupt", errors)
 
+    def test_the_end_of_the_program_stops_the_pipeline(self):
+        program = ("import gst_eventcamera as ec, time\n"
+                   "chunks = ec.live('videotestsrc pattern=black ! eventsim-diff')\n"
+                   "next(chunks)\n"
+                   "time.sleep(0.5)")  # until the pipeline waits for the loop
+        subprocess.run([sys.executable, "-c", program], check=True, timeout=30)
+
 
 class Tensors(unittest.TestCase):
     def test_a_voxel_grid_is_that_of_e2vid(self):
