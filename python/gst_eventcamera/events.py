@@ -91,8 +91,9 @@ class Events(np.ndarray):
 
 
 def join(chunks: Iterable[Events]) -> Events:
-    """One array of chunks that follow each other: from the start of the first to the end of the last, with
-    labels if all events have them. The chunk itself if there is only one.
+    """One array of chunks that follow each other: from the start of the first to the end of the last, with the
+    largest size of their sensors, which readers of files without a size enlarge, and labels if all events have
+    them. The chunk itself if there is only one.
 
     np.concatenate() would lose the size of the sensor, the times and the labels."""
     parts = list(chunks)
@@ -100,8 +101,8 @@ def join(chunks: Iterable[Events]) -> Events:
         return parts[0]
     if not parts:
         return Events(0)
-    first = parts[0]
-    events = Events(sum(map(len, parts)), first.width, first.height, first.start, parts[-1].end)
+    width, height = max(part.width for part in parts), max(part.height for part in parts)
+    events = Events(sum(map(len, parts)), width, height, parts[0].start, parts[-1].end)
     np.concatenate(parts, out=events)
     filled = [part for part in parts if len(part) > 0]
     if filled and all(part.cause is not None for part in filled):

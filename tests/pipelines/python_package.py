@@ -281,6 +281,16 @@ class Recordings(unittest.TestCase):
         self.assertIsNone(ec.join([events, self.events]).cause)
         self.assertEqual(len(ec.join([])), 0)
 
+    def test_knows_the_size_that_all_events_need(self):
+        path = path_of("growing.npy")
+        events = np.zeros(3_000_000, ec.EVENT)
+        events["t"] = np.arange(len(events))
+        events["x"][-9:], events["y"][-9:] = 1199, 699
+        np.save(path, events)
+        self.assertLess(ec.stream(path).width, 1200)  # as far as it is read
+        for read in ec.read(path), ec.read(path, 2.9), ec.join(ec.stream(path)):
+            self.assertEqual((read.width, read.height), (1280, 720))
+
     def test_copies_are_complete(self):
         events = random_events(100, 1000)
         events.start, events.end = 1.0, 2.0
