@@ -6,7 +6,8 @@ import numpy as np
 
 from .pipeline import Gst
 
-# A video that lasts so much less than its file says, in seconds and as a share, was cut off.
+# A video that lasts so much less than its file says, in seconds and as a share, was cut off, unless other streams of
+# the file go on for so many seconds.
 CUT_OFF = 1.0, 0.1
 # Intervals between frames may differ so much from their median; containers round times to milliseconds.
 STEADY = 0.25
@@ -16,20 +17,38 @@ class Frames:
     """What is to know of the frames of a video, from their times and flags.
 
     times: PTS of the frames, in nanoseconds.
-    corrupted: how many have the flag CORRUPTED."""
+    corrupted: how many have the flag CORRUPTED.
+    shown: for how long the last one is, in nanoseconds; 0 if not known.
+    others_end: that of the other streams of the file, such as audio, in nanoseconds; 0 if there are none."""
 
     def __init__(self) -> None:
         self.times: list[int] = []
-        self.corrupted = 0
+        self.corrupted = self.shown = self.others_end = 0
 
     def watch(self, pad: Gst.Pad) -> None:
         def look(_: Gst.Pad, info: Gst.PadProbeInfo) -> Gst.PadProbeReturn:
             buffer = info.get_buffer()
             self.times.append(buffer.pts)
             self.corrupted += bool(buffer.get_flags() & Gst.BufferFlags.CORRUPTED)
+            self.shown = buffer.duration if buffer.duration != Gst.CLOCK_TIME_NONE else 0
             return Gst.PadProbeReturn.OK
 
+        def look_at_other(_: Gst.Pad, info: Gst.PadProbeInfo) -> Gst.PadProbeReturn:
+            if info.get_buffer().pts != Gst.CLOCK_TIME_NONE:
+                self.others_end = max(self.others_end, info.get_buffer().pts)
+            return Gst.PadProbeReturn.OK
+
+        def watch_other(_: Gst.Element, stream: Gst.Pad) -> None:
+            caps = stream.get_current_caps()
+            if caps and not caps.get_structure(0).get_name().startswith(("video/", "image/")):
+                stream.add_probe(Gst.PadProbeType.BUFFER, look_at_other)
+
+        def watch_demuxer(_: Gst.Bin, __: Gst.Bin, element: Gst.Element) -> None:
+            if "Demuxer" in element.get_metadata("klass"):
+                element.connect("pad-added", watch_other)
+
         pad.add_probe(Gst.PadProbeType.BUFFER, look)
+        pad.get_parent_element().get_parent().connect("deep-element-added", watch_demuxer)
 
     def fault(self, min_frames: int, duration: float, pictures: int) -> str:
         """Why the video cannot be used, such as "corrupt: 2 of 90 frames"; empty if it can.
@@ -43,8 +62,9 @@ class Frames:
             return f"corrupt: {self.corrupted} of {count} frames"
         if count < min_frames:
             return f"too short: {count} frames of at least {min_frames}"
-        missing = duration - (self.times[-1] - self.times[0]) / 1e9
-        if missing > CUT_OFF[0] and missing > CUT_OFF[1] * duration:
+        end = self.times[-1] + max(self.shown, self.times[-1] - self.times[-2])
+        missing = duration - (end - self.times[0]) / 1e9
+        if missing > CUT_OFF[0] and missing > CUT_OFF[1] * duration and self.others_end - end <= CUT_OFF[0] * 1e9:
             return f"corrupt: its frames end {missing:.1f} s before the {duration:.1f} s of the file"
         return ""
 

@@ -349,6 +349,33 @@ class Simulators(unittest.TestCase):
         subprocess.run([sys.executable, "-c", program], check=True, timeout=30)
 
 
+class Videos(unittest.TestCase):
+    def make(self, name, frames, framerate, more=""):
+        subprocess.run([os.environ["GST_LAUNCH"], "-q", *(
+            f"matroskamux name=mux ! filesink location={path_of(name)} videotestsrc pattern=ball num-buffers={frames}"
+            f" ! video/x-raw,format=GRAY8,width=64,height=48,framerate={framerate} ! mux. {more}").split()], check=True)
+
+    def played(self, name):
+        recipe = path_of("recipe.yaml")
+        with open(recipe, "w", encoding="utf-8") as file:
+            file.write(f"{{videos: {name}, simulator: eventsim-dvs, output: npz}}")
+        return sum(chunk.end - chunk.start for chunk in ec.Dataset(recipe)[0])
+
+    def test_may_be_shorter_than_their_file(self):
+        audio = "audiotestsrc samplesperbuffer=4410 num-buffers={} ! mux."
+        self.make("slow.mkv", 3, "1/2")
+        self.make("sound.mkv", 75, "25/1", audio.format(50))
+        self.assertAlmostEqual(self.played("slow.mkv"), 4)
+        self.assertAlmostEqual(self.played("sound.mkv"), 2.96, places=2)
+
+    def test_may_not_be_cut_off(self):
+        for name, more in ("silent", ""), ("sound", "audiotestsrc samplesperbuffer=4410 num-buffers=40 ! mux."):
+            self.make("whole.mkv", 100, "25/1", more)
+            os.truncate(path_of("whole.mkv"), os.path.getsize(path_of("whole.mkv")) // 3)
+            with self.subTest(name), self.assertRaisesRegex(ec.PipelineError, "whole: corrupt: its frames end 2.* s before"):
+                self.played("whole.mkv")
+
+
 class Tensors(unittest.TestCase):
     def test_a_voxel_grid_is_that_of_e2vid(self):
         events = random_events(20_000, 300_000)
