@@ -220,7 +220,7 @@ def expect_limits(elements: str) -> None:
             element, limits = word, property_limits(word) if Gst.ElementFactory.find(word) else {}
         low, high = limits.get(name, (-math.inf, math.inf))
         try:
-            number = float(value)
+            number = float(value.strip('"'))
         except ValueError:
             continue
         if not low <= number <= high and math.isfinite(low):

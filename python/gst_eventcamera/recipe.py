@@ -22,7 +22,8 @@ Value = float | int | str | bool
 
 MAX_RECIPE = 1 << 20  # bytes
 MAX_NUMBER = 64  # characters
-NUMBERS = {"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"}
+FLOAT = "tag:yaml.org,2002:float"
+NUMBERS = {"tag:yaml.org,2002:int", FLOAT}
 MAX_SEED = 2**64 - 1
 MAX_DRAWS = 1000
 PICTURES = {".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".png": "image/png"}
@@ -53,6 +54,10 @@ class _Loader(yaml.SafeLoader):
         if twice := {name for name in names if names.count(name) > 1}:
             raise RecipeError(f"line {node.start_mark.line + 1}: {min(map(str, twice))} is given twice")
         return super().construct_mapping(node, deep)
+
+
+# YAML 1.1 takes 1e9 for text; YAML 1.2 does not.
+_Loader.add_implicit_resolver(FLOAT, re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+$"), list("-+0123456789"))
 
 
 def uniform_number(*key: str | int) -> float:
@@ -334,7 +339,7 @@ def _parameters(recipe: Mapping[str, Any], simulator: str) -> dict[str, Value | 
         if isinstance(value, dict):
             parameters[name] = _distribution(where, value, limits[name])
         elif isinstance(value, (int, float, str, bool)):
-            if not isinstance(value, (bool, str)):
+            if _is_number(limits[name]) or not isinstance(value, (bool, str)):
                 _expect_number(where, value, *limits[name])
             parameters[name] = value
         else:
@@ -346,6 +351,11 @@ def _parameters(recipe: Mapping[str, Any], simulator: str) -> dict[str, Value | 
                 any(isinstance(one, (str, bool)) for one in other.values)):
             raise RecipeError(f"parameters: {name}: relative-to needs a parameter that is a number and not relative")
     return parameters
+
+
+def _is_number(limits: tuple[float, float]) -> bool:
+    """Whether a property of these limits is one."""
+    return math.isfinite(limits[0])
 
 
 def _distribution(where: str, given: Mapping[Any, Any], limits: tuple[float, float]) -> Distribution:
@@ -367,6 +377,8 @@ def _distribution(where: str, given: Mapping[Any, Any], limits: tuple[float, flo
         raise needs
     if (kind == "log-uniform" and numbers[0] <= 0) or (kind == "normal" and numbers[1] < 0):
         raise needs
+    if relative_to is None and _is_number(limits) and len(numbers) != len(values):
+        raise RecipeError(f"{where}: {reprlib.repr(values)} are not all numbers from {limits[0]:g} to {limits[1]:g}")
     if relative_to is not None and (not isinstance(relative_to, str) or len(numbers) != len(values)):
         raise RecipeError(f"{where}: relative-to needs the name of a parameter, and numbers to multiply it with")
     bounded = numbers[:1] if kind == "normal" else numbers

@@ -349,6 +349,24 @@ class Simulators(unittest.TestCase):
         subprocess.run([sys.executable, "-c", program], check=True, timeout=30)
 
 
+class Recipes(unittest.TestCase):
+    def parameter(self, value, name="positive-threshold"):
+        recipe = path_of("number.yaml")
+        with open(recipe, "w", encoding="utf-8") as file:
+            file.write(f"{{videos: x, simulator: eventsim-dvs, parameters: {{{name}: {value}}}}}")
+        return ec.Recipe.load(recipe).drawn("x")[name]
+
+    def test_numbers_have_exponents_and_limits(self):
+        for value in "2e-1", "2E-1", "+20.e-2", "{choice: [2e-1]}", "{uniform: [2e-1, 0.2]}":
+            self.assertEqual(self.parameter(value), 0.2, value)
+        self.assertEqual(self.parameter("{choice: [gen4]}", "preset"), "gen4")
+        for value in "1e9", "-1e9", '"1e9"', '"0.2"', "true", "{choice: [0.2, 1e9]}", '{choice: [0.2, "0.3"]}':
+            with self.assertRaisesRegex(ec.RecipeError, "parameters: positive-threshold: .*0.001 to 10"):
+                self.parameter(value)
+        with self.assertRaisesRegex(ec.PipelineError, 'denoise="1e9": it must be from 0 to 255'):
+            ec.simulate("/nowhere", 'eventsim-dvs denoise="1e9"')
+
+
 class Videos(unittest.TestCase):
     def make(self, name, frames, framerate, more=""):
         subprocess.run([os.environ["GST_LAUNCH"], "-q", *(
