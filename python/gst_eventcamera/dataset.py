@@ -15,7 +15,7 @@ import numpy as np
 
 from .events import Events
 from .frames import Frames
-from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, events_of, property_limits, quoted
+from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, duration_of, events_of, property_limits, quoted
 from .recipe import PICTURES, TENSORS, Recipe, Value, Window, is_picture
 from .sources import LUMA, SINK
 from .tensors import TENSOR_CAPS, tensor_of
@@ -140,13 +140,6 @@ def pictures_of(folder: str) -> list[str]:
     in_order = sorted(names, key=lambda name: [(int(part), "") if part.isdecimal() else (0, part)
                                                for part in re.split(r"(\d+)", name)])
     return [os.path.join(folder, name) for name in in_order]
-
-
-def duration_of(pipeline: Pipeline) -> float:
-    """In seconds; 0 if not known."""
-    with contextlib.suppress(PipelineError):
-        return pipeline.duration()
-    return 0.0
 
 
 def _framerate(recipe: Recipe) -> str:

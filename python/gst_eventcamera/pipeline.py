@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import math
 import os
 import sys
@@ -62,9 +63,9 @@ def _text_of(message: Gst.Message, error: GLib.Error, cause: Optional[str]) -> s
 
 
 def _warn(text: str) -> None:
-    """Of the line that calls the package."""
+    """Of the line that calls the package, be it through a cached property."""
     level, frame = 1, sys._getframe()
-    while frame.f_back and frame.f_globals.get("__package__") == __package__:
+    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in (__package__, "functools"):
         level, frame = level + 1, frame.f_back
     warnings.warn(text, PipelineWarning, stacklevel=level)
 
@@ -197,6 +198,13 @@ def _stop_all() -> None:
     """Later, Python ends threads while they hold the lock of the pad whose probe they run."""
     for pipeline in list(_open):
         pipeline.__exit__()
+
+
+def duration_of(pipeline: Pipeline) -> float:
+    """In seconds; 0 if not known."""
+    with contextlib.suppress(PipelineError):
+        return pipeline.duration()
+    return 0.0
 
 
 def property_limits(element: str) -> dict[str, tuple[float, float]]:

@@ -8,6 +8,7 @@ import functools
 import itertools
 import math
 import os
+import sys
 import uuid
 from typing import Iterator, Optional, overload
 
@@ -15,8 +16,8 @@ import numpy as np
 
 from .events import Events, join
 from .pipeline import (
-    EVENT_CAPS, LABEL, GLib, Gst, GstEventCamera, Pipeline, PipelineError, events_of, given_size, quoted,
-    sensor_size)
+    EVENT_CAPS, LABEL, GLib, Gst, GstEventCamera, Pipeline, PipelineError, duration_of, events_of, given_size,
+    quoted, sensor_size)
 from .sources import SINK
 
 # Elements that write a file, by its extension.
@@ -53,8 +54,9 @@ class Stream:
         past the end is empty.
 
     Iterating yields an Events array a window, empty where nothing happened; only one is in memory. The
-    window that the recording ends in is the last one. Indexing and slices seek in the file. Raises
-    PipelineError if the file cannot be read, and ValueError for other lengths and parts."""
+    window that the recording ends in is the last one. Indexing and slices seek in the file. The duration, len(),
+    and indices from the end look for the end of the recording, once: a file without an index is read to its end.
+    Raises PipelineError if the file cannot be read, and ValueError for other lengths and parts."""
 
     path: str
     window: float = 0.033
@@ -72,17 +74,17 @@ class Stream:
     @property
     def width(self) -> int:
         """Of the sensor, in pixels."""
-        return self._properties[0]
+        return self._size[0]
 
     @property
     def height(self) -> int:
         """Of the sensor, in pixels."""
-        return self._properties[1]
+        return self._size[1]
 
     @property
     def duration(self) -> float:
         """Of the part, in seconds."""
-        return self._length(self._properties[2])
+        return self._length(self._whole)
 
     def _length(self, whole: float) -> float:
         """Of the part, of a recording of so many seconds."""
@@ -94,7 +96,9 @@ class Stream:
         _expect_part(start, end)
         first = self.start + start
         lasts = [last for last in (self.end, None if end is None else self.start + end) if last is not None]
-        return dataclasses.replace(self, start=first, end=max(first, min(lasts)) if lasts else None)
+        part = dataclasses.replace(self, start=first, end=max(first, min(lasts)) if lasts else None)
+        vars(part).update({name: known for name, known in vars(self).items() if name in ("_size", "_whole")})
+        return part
 
     def _windows(self, seconds: float) -> int:
         """The number of windows that begin within so many seconds."""
@@ -111,14 +115,16 @@ class Stream:
 
     def __getitem__(self, index: int | slice) -> Events | Stream:
         if isinstance(index, slice):
-            first, last, step = index.indices(len(self))
+            is_from_end = min(index.start or 0, index.stop or 0) < 0
+            first, last, step = index.indices(len(self) if is_from_end else sys.maxsize)
             if step != 1:
                 raise ValueError("a slice of a stream has no step")
-            return self.between(first * self.window, max(first, last) * self.window)
+            return self.between(first * self.window, None if index.stop is None else max(first, last) * self.window)
         first = index + len(self) if index < 0 else index
-        if not 0 <= first < len(self):
-            raise IndexError(f"window {index} of {len(self)}")
-        return next(iter(self.between(first * self.window, (first + 1) * self.window)))
+        if first >= 0:
+            for events in self.between(first * self.window, (first + 1) * self.window):
+                return events
+        raise IndexError(f"the stream has no window {index}")
 
     def __iter__(self) -> Iterator[Events]:
         window = round(self.window * 1e6)
@@ -188,11 +194,24 @@ class Stream:
             element.set_property("buffer-duration", round(self.window * 1e6) * 1000)
 
     @functools.cached_property
-    def _properties(self) -> tuple[int, int, float]:
-        """Width, height and duration of the recording, read once."""
+    def _size(self) -> tuple[int, int]:
+        """Width and height of the sensor."""
         with self._open() as pipeline:
             pipeline.set_state(Gst.State.PAUSED)
-            return (*sensor_size(pipeline.caps()), pipeline.duration())
+            return sensor_size(pipeline.caps())
+
+    @functools.cached_property
+    def _whole(self) -> float:
+        """The duration of the recording, which readers may estimate or not know until they have read its end."""
+        with self._open() as pipeline:
+            pipeline.gaps_as_buffers()
+            pipeline.set_state(Gst.State.PAUSED)
+            for start in max(duration_of(pipeline) - 1e-6, 0), 0:  # all of it, if nothing is at its end
+                pipeline.seek(start, None)
+                if sum(1 for _ in pipeline.samples()) > 0:
+                    break
+                pipeline.set_state(Gst.State.PAUSED)
+            return pipeline.duration()
 
 
 def _expect_part(start: float, end: Optional[float]) -> None:
@@ -217,7 +236,7 @@ def read(path: str | os.PathLike[str], start: float = 0, end: Optional[float] = 
         events = join(part._play(pipeline))
         if events.width == 0:
             events.width, events.height = sensor_size(pipeline.caps())
-        events.end = events.start + part._length(pipeline.duration())
+        events.end = max(events.end, events.start + part._length(duration_of(pipeline)))
     return events
 
 

@@ -154,11 +154,32 @@ class Recordings(unittest.TestCase):
 
     def test_learns_the_duration_once(self):
         stream = ec.stream(self.path, window=0.05)
-        with unittest.mock.patch.object(internals.Pipeline, "duration", autospec=True,
-                                        side_effect=internals.Pipeline.duration) as duration:
+        with unittest.mock.patch.object(recordings, "duration_of", side_effect=recordings.duration_of) as duration:
             for i in (0, 3, -1):
                 self.assertGreater(len(stream[i]), 0)
+            self.assertEqual(len(stream[-3:]), 3)
         self.assertEqual(duration.call_count, 1)
+
+    def test_learns_durations_that_are_estimates_or_not_known(self):
+        events = ec.Events(6_000_100, WIDTH, HEIGHT)
+        events["t"] = np.append(np.arange(6_000_000) // 2, np.arange(3_000_000, 13_000_000, 100_000))
+        for name in "xyp":
+            events[name] = 1
+        ec.write(path_of("short.raw"), events)
+        np.savez(path_of("none.npz"), **{name: events[name] for name in "txyp"})
+        ec.write(path_of("long.csv"), events[:3_000_000])
+        for name, duration in ("short.raw", 12.900001), ("none.npz", 12.900001), ("long.csv", 1.5):
+            stream = ec.stream(path_of(name))
+            windows = sum(1 for _ in stream)
+            with self.subTest(name):
+                self.assertAlmostEqual(stream[windows - 1].start, (windows - 1) * 0.033)
+                self.assertAlmostEqual(stream[-1].start, (windows - 1) * 0.033)
+                self.assertEqual((stream.duration, len(stream), len(stream[2:])), (duration, windows, windows - 2))
+                self.assertEqual(len(list(stream[-3:])), 3)
+                self.assertAlmostEqual(ec.read(path_of(name), 0, 0.2).end, 0.2)
+                for index in windows, windows + 1, -windows - 1:
+                    with self.assertRaises(IndexError):
+                        stream[index]
 
     def test_streams_in_constant_memory(self):
         path = path_of("long.raw")
@@ -390,7 +411,7 @@ class Videos(unittest.TestCase):
         for name, more in ("silent", ""), ("sound", "audiotestsrc samplesperbuffer=4410 num-buffers=40 ! mux."):
             self.make("whole.mkv", 100, "25/1", more)
             os.truncate(path_of("whole.mkv"), os.path.getsize(path_of("whole.mkv")) // 3)
-            with self.subTest(name), self.assertRaisesRegex(ec.PipelineError, "whole: corrupt: its frames end 2.* s before"):
+            with self.subTest(name), self.assertRaisesRegex(ec.PipelineError, "corrupt: its frames end 2.* s before"):
                 self.played("whole.mkv")
 
 
