@@ -32,9 +32,7 @@ void StreamSimulation::reported(const Work& work) {
   const auto failure = [this](const std::exception& error) {
     state_.reset();
     stream_.discontinuous = true;
-    return report_of(error,
-                     "Not enough memory for the events of a frame. Raise the thresholds, or lower "
-                     "interpolated-frames.",
+    return report_of(error, "Not enough memory for the events of a frame. Raise the thresholds.",
                      "The simulation failed.");
   };
   if (!catch_exceptions(element_, failure, work)) stream_.flow = GST_FLOW_ERROR;
@@ -120,7 +118,7 @@ void StreamSimulation::restore_at_start() {
 /// Updates controlled properties to their values at `time`, a timestamp of the segment.
 void StreamSimulation::sync_controlled_properties(GstClockTime time) {
   const GstSegment& segment = element_->segment;
-  if (segment.format != GST_FORMAT_TIME) return;  // e.g. from appsrc
+  if (segment.format != GST_FORMAT_TIME) return;  // before the first segment
   const auto stream_time = gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, time);
   if (GST_CLOCK_TIME_IS_VALID(stream_time))
     gst_object_sync_values(GST_OBJECT(element_), stream_time);
@@ -130,7 +128,7 @@ void StreamSimulation::sync_controlled_properties(GstClockTime time) {
 /// What the interval since the last frame may need is kept.
 void StreamSimulation::advance_companions(GstClockTime time) {
   const GstSegment& segment = element_->segment;
-  const auto last = state_->draws ? std::nullopt : state_->simulator().last_time();
+  const auto last = state_->simulator().last_time();
   const auto from = running_time_of(
       segment, std::min(time, static_cast<GstClockTime>(last.value_or(Nanoseconds{G_MAXINT64}))));
   const auto until = running_time_of(segment, time);
@@ -287,9 +285,10 @@ bool StreamSimulation::take_gap(GstEvent* event) {
   advance_companions(pts + (has_end ? std::min(duration, G_MAXINT64 - pts) : 0));
   const auto start = state_->simulator().last_time();
   if (!start || state_->draws) return true;
+  // The next frame must come later, by an interval if that is known.
   const auto frame = static_cast<GstClockTime>(timing.interval());
   const GstClockTime rest =
-      GST_CLOCK_TIME_IS_VALID(duration) && duration > frame ? duration - frame : 0;
+      GST_CLOCK_TIME_IS_VALID(duration) && frame > 0 && duration > frame ? duration - frame : 0;
   if (pts > G_MAXINT64 || rest > G_MAXINT64 - pts) return false;
   const auto end = static_cast<Nanoseconds>(pts + rest);
   if (end <= *start) return false;

@@ -86,9 +86,10 @@ class OwnFlow {
 };
 
 struct FlowInput : TwoInputs {
-  explicit FlowInput(const std::string& launch, const std::string& dimensions = "2:96:64:1")
+  explicit FlowInput(const std::string& launch, const std::string& dimensions = "2:96:64:1",
+                     const char* out = GST_EVENT_CAMERA_MEDIA_TYPE)
       : TwoInputs(launch, "sink", "flow_sink") {
-    gst_harness_set_sink_caps_str(first.get(), GST_EVENT_CAMERA_MEDIA_TYPE);
+    gst_harness_set_sink_caps_str(first.get(), out);
     gst_harness_set_src_caps_str(first.get(),
                                  "video/x-raw, format=GRAY8, width=96, height=64, framerate=25/1");
     gst_harness_set_src_caps_str(second.get(),
@@ -149,6 +150,15 @@ TEST(FlowTensors, ReplaceTheFlowThatTheSimulatorFinds) {
         events_of_given_flow(simulator.launch, [](int) { return Image<Flow>(width, height); });
     EXPECT_FALSE(still == expected) << simulator.launch;
   }
+}
+
+TEST(FlowTensors, AreUsedForPictures) {
+  FlowInput simulator("eventsim-dense", "2:96:64:1", "video/x-raw, format=GRAY8");
+  for (int i = 0; i < frame_count; ++i) {
+    EXPECT_EQ(simulator.push_flow(i, Image<Flow>(width, height)), GST_FLOW_OK);
+    EXPECT_EQ(simulator.push_frame(i), GST_FLOW_OK);
+  }
+  EXPECT_EQ(simulator.text_of_next(GST_MESSAGE_WARNING), "");
 }
 
 TEST(FlowTensors, AreNotUsedWithoutMotion) {

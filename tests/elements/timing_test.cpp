@@ -297,6 +297,17 @@ TEST_P(EveryElement, HoldsTheLastFrameThroughAGapOfTheVideo) {
   expect_interval(110 * GST_MSECOND, 150 * GST_MSECOND);
 }
 
+TEST_P(EveryElement, GoesOnAfterAGapInVideoOfAnyFramerate) {
+  h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=0/1");
+  flash(0);
+  gst_harness_push_event(h.get(), gst_event_new_gap(40 * GST_MSECOND, 80 * GST_MSECOND));
+  flash(120 * GST_MSECOND);
+  EXPECT_EQ(h.warning(), "");
+  const auto events = h.pull();
+  ASSERT_TRUE(events);
+  EXPECT_EQ(GST_BUFFER_PTS(events.get()) + GST_BUFFER_DURATION(events.get()), 120 * GST_MSECOND);
+}
+
 TEST_P(EveryElement, RefusesToRunBackwards) {
   h.caps(video);
   flash(0);
