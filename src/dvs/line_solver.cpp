@@ -189,17 +189,21 @@ class Lines {
     rises_ = hn::Or(hn::Gt(change, zero), hn::And(is_constant_, hn::Gt(first, reference)));
     first_ = upright(first);
     rise_ = upright(change);
-    threshold_ = hn::IfThenElse(rises_, pixels_.load(row, Candidates::positive),
-                                pixels_.load(row, Candidates::negative));
+    const auto positive = pixels_.load(row, Candidates::positive);
+    const auto negative = pixels_.load(row, Candidates::negative);
+    threshold_ = hn::IfThenElse(rises_, positive, negative);
+    threshold_behind_ = hn::IfThenElse(rises_, negative, positive);
     reference_ = upright(reference);
     ready_ = pixels_.load(row, Candidates::refractory_left);
     crosses_ = pixels_.exist();
+    is_beyond_ = hn::And(crosses_, hn::Le(first_, hn::Sub(reference_, threshold_behind_)));
   }
 
   /// Finds the next crossing of each pixel. Returns false if there is none.
   bool advance(const RowToSolve& row, Events& events) {
     const Doubles doubles;
     const auto zero = all(0);
+    if (HWY_UNLIKELY(!hn::AllFalse(doubles, is_beyond_))) return fall_back(row, events);
     const auto level = hn::Add(reference_, threshold_);
     crosses_ = hn::And(crosses_, hn::Le(level, hn::Add(last(), all(rounding))));
     if (hn::AllFalse(doubles, crosses_)) return false;
@@ -220,6 +224,17 @@ class Lines {
   }
 
  private:
+  /// Crossings at the start of signals that recede from a level they are beyond, because the
+  /// threshold has been lowered.
+  bool fall_back(const RowToSolve& row, Events& events) {
+    const auto fires = hn::And(is_beyond_, hn::Ge(all(0), ready_));
+    reference_ = hn::IfThenElse(is_beyond_, hn::Sub(reference_, threshold_behind_), reference_);
+    ready_ = hn::IfThenElse(fires, all(row.dynamics.gap), ready_);
+    events.add(pixels_, fires, hn::Not(rises_), hn::FirstN(Doubles(), 0), all(0));
+    is_beyond_ = hn::And(is_beyond_, hn::Le(first_, hn::Sub(reference_, threshold_behind_)));
+    return true;
+  }
+
   /// Turns signals that fall upside down, and back.
   Values upright(Values value) const { return hn::IfThenElse(rises_, value, hn::Neg(value)); }
   Values last() const { return hn::Add(first_, rise_); }
@@ -227,10 +242,12 @@ class Lines {
   Pixels pixels_;
   Mask rises_;
   Mask is_constant_;
-  Mask crosses_;  ///< in all passes so far
-  Values fall_;   ///< of the references
-  Values first_;  ///< signals at the start of the sub-interval
-  Values rise_;   ///< of the signals, including the fall of the references
+  Mask crosses_;             ///< in all passes so far
+  Mask is_beyond_;           ///< the level behind, from the start
+  Values threshold_behind_;  ///< of the other polarity
+  Values fall_;              ///< of the references
+  Values first_;             ///< signals at the start of the sub-interval
+  Values rise_;              ///< of the signals, including the fall of the references
   Values threshold_;
   Values reference_;
   Values ready_;  ///< earliest time of the next event

@@ -179,6 +179,8 @@ Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
                              .at(sub_interval.duration))
                    : to;
     if (x % 7 == 0) pixels.refractory_left[x] = 9000;
+    // As where thresholds have been lowered.
+    if (x % 11 == 3) pixels.reference[x] = from + (x % 2 == 0 ? 0.7F : -0.7F);
     const auto i = candidates.count++;
     candidates.x[i] = x;
     candidates.shade[i] = shade;
