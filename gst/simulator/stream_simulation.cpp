@@ -113,6 +113,23 @@ void StreamSimulation::restore_at_start() {
   configure();
   method().restore(simulator, G_OBJECT(element_));
   stream_.continuation.restored(simulator.last_time());
+  if (const auto time = simulator.last_time()) extend_segment(static_cast<GstClockTime>(*time));
+}
+
+/// Lets the segment begin at `start`, if that is earlier; times in it stay what they are. Sinks
+/// drop what begins before, as the first interval after a state does in a clip of its own.
+void StreamSimulation::extend_segment(GstClockTime start) {
+  GstSegment& segment = element_->segment;
+  if (segment.format != GST_FORMAT_TIME || start >= segment.start) return;
+  const guint64 earlier = segment.start - start;
+  segment.start = start;
+  segment.offset += earlier;
+  if (GST_CLOCK_TIME_IS_VALID(segment.time)) segment.time -= std::min(segment.time, earlier);
+  GstPad* const src = GST_BASE_TRANSFORM_SRC_PAD(element_);
+  const OwnedEvent last(gst_pad_get_sticky_event(src, GST_EVENT_SEGMENT, 0));
+  GstEvent* const extended = gst_event_new_segment(&segment);
+  if (last) gst_event_set_seqnum(extended, gst_event_get_seqnum(last.get()));
+  gst_pad_push_event(src, extended);
 }
 
 /// Updates controlled properties to their values at `time`, a timestamp of the segment.

@@ -99,6 +99,7 @@ class StreamSimulation {
   void configure();
   SimulatorSettings begin_interval();
   void restore_at_start();
+  void extend_segment(GstClockTime start);
   void sync_controlled_properties(GstClockTime time);
   void advance_companions(GstClockTime time);
   bool accept_time(GstBuffer* frame);

@@ -99,6 +99,33 @@ TEST(Clips, JoinWithoutASeamAtAGap) {
   EXPECT_EQ(joined, whole);
 }
 
+/// As that of a clip in a file of its own, which begins with its first frame.
+TEST(Clips, LetTheirSegmentBeginWithTheState) {
+  {
+    Harness h(noisy + "final-state=" + in_quotes(state()));
+    start(h);
+    push_frames(h, 0, 4);
+    gst_harness_push_event(h.get(), gst_event_new_eos());
+  }
+  Harness h(noisy + "initial-state=" + in_quotes(state()));
+  start(h);
+  const GstClockTime state_time = GST_SECOND + 120 * GST_MSECOND;
+  GstSegment in;
+  gst_segment_init(&in, GST_FORMAT_TIME);
+  in.start = in.position = in.time = state_time + 40 * GST_MSECOND;
+  gst_harness_push_event(h.get(), gst_event_new_segment(&in));
+  push_frames(h, 4, 6);
+  const auto seam = h.pull();
+  ASSERT_TRUE(seam);
+  EXPECT_EQ(GST_BUFFER_PTS(seam.get()), state_time);
+  GstSegment out;
+  while (const auto event = h.pull_event(GST_EVENT_SEGMENT))
+    gst_event_copy_segment(event.get(), &out);
+  EXPECT_EQ(out.start, state_time);
+  for (const auto to_time : {gst_segment_to_running_time, gst_segment_to_stream_time})
+    EXPECT_EQ(to_time(&out, GST_FORMAT_TIME, in.start), to_time(&in, GST_FORMAT_TIME, in.start));
+}
+
 TEST(Clips, WarnIfAllFramesAreBeforeTheState) {
   for (const bool has_state : {false, true}) {
     Harness h(noisy + "final-state=" + in_quotes(state()) +
