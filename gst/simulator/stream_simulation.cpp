@@ -408,6 +408,8 @@ void StreamSimulation::end() {
   for (auto* companion : companions()) companion->end();
   if (!state_) return;
   warn_of_no_progress();
+  reported([&] { restore_at_start(); });  // a clip without frames passes the state on
+  if (!state_) return;
   const auto save = method().save;
   auto& simulator = state_->simulator();
   if (save != nullptr && simulator.last_time())

@@ -99,6 +99,25 @@ TEST(Clips, JoinWithoutASeamAtAGap) {
   EXPECT_EQ(joined, whole);
 }
 
+TEST(Clips, WithoutFramesPassTheStateOn) {
+  Harness first(noisy + "final-state=" + in_quotes(state()));
+  start(first);
+  push_frames(first, 0, 4);
+  gst_harness_push_event(first.get(), gst_event_new_eos());
+  const auto passed = recording_files::Folder::path("passed");
+  Harness empty(noisy + "initial-state=" + in_quotes(state()) +
+                " final-state=" + in_quotes(passed));
+  start(empty);
+  gst_harness_push_event(empty.get(), gst_event_new_eos());
+  EXPECT_EQ(empty.error() + empty.warning(), "");
+  const auto bytes_at = [](const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  EXPECT_FALSE(bytes_at(passed).empty());
+  EXPECT_TRUE(bytes_at(passed) == bytes_at(state()));
+}
+
 /// As that of a clip in a file of its own, which begins with its first frame.
 TEST(Clips, LetTheirSegmentBeginWithTheState) {
   {
