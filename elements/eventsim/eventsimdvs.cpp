@@ -238,7 +238,8 @@ const Setting table[] = {
      &DvsSettings::exposure_pulse, 0, 10, controllable},
     {"exposure-lead", "Exposure lead",
      "Time from the start of a frame's exposure, and of exposure-pulse, to the frame's timestamp "
-     "(ns); if longer than the time between frames, there is no pulse",
+     "(ns); less than 100000 counts as that; if longer than the time between frames, there is no "
+     "pulse",
      &DvsSettings::exposure_lead, 0, max_time, controllable},
     {"pixel-latency", "Pixel latency",
      "Time from the threshold crossing to the event, when the refractory period begins (ns). "
