@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Simulates one video of a data set, and records what it was made from: hashes, parameters, figures, versions."""
-import contextlib
 import hashlib
 import json
 import os
@@ -150,6 +149,8 @@ def record_of(video, output, keep=True, clips=None):
         except Refused as reason:
             return record | {"refused": str(reason)}
         except ec.PipelineError as failure:
+            if is_of_machine(failure):
+                raise
             return record | {"refused": f"corrupt or not supported: {failure}"}
         written = {"path": f"data/{video.name}.{extension_of(video.recipe)}", "size": os.path.getsize(path),
                    "sha256": hash_of(path)}
@@ -180,8 +181,7 @@ def simulate(video, path, clips):
 
     rest = f"tee name=events ! queue ! {writer}  events. ! queue ! {SINK}"
     # One thread, since there is a job for each processor.
-    playing = clips.playing(rest) if clips else video.playing(rest, threads=1)
-    with playing as pipeline, machine_errors_told_apart(pipeline):
+    with clips.playing(rest) if clips else video.playing(rest, threads=1) as pipeline:
         frames, decoders = (clips.frames, clips.decoders) if clips else (Frames(), decoders_of(pipeline))
         pipeline.gaps_as_buffers()
         if not clips:
@@ -208,20 +208,10 @@ def simulate(video, path, clips):
     return figures.described(len(frames.times)), png_of(picture_of(figures.busiest())), frames.warnings(), sorted(decoders)
 
 
-@contextlib.contextmanager
-def machine_errors_told_apart(pipeline):
-    """Raises them as RuntimeError instead of PipelineError, since the video is not at fault."""
-    errors = []
-    bus = pipeline.element("events").get_parent().get_bus()
-    bus.enable_sync_message_emission()
-    bus.connect("sync-message::error", lambda _, message: errors.append(message.parse_error()[0]))
-    try:
-        yield
-    except ec.PipelineError as failure:
-        if failure.element == "file" or any(error.matches(Gst.ResourceError.quark(), code)
-                                            for error in errors for code in MACHINE_ERRORS):
-            raise RuntimeError(str(failure)) from None
-        raise
+def is_of_machine(failure):
+    """True if the video is not at fault."""
+    return failure.element == "file" or (failure.error is not None and any(
+        failure.error.matches(Gst.ResourceError.quark(), code) for code in MACHINE_ERRORS))
 
 
 def decoders_of(pipeline):

@@ -41,11 +41,13 @@ _open: set[Pipeline] = set()
 class PipelineError(RuntimeError):
     """A pipeline failed; the text is that of the element: what failed, on what, what to do.
 
-    element: the name of the element, empty if the pipeline could not be made."""
+    element: the name of the element, empty if the pipeline could not be made.
+    error: the element's error, with its domain and code, if it posted one."""
 
-    def __init__(self, text: str, element: str = "") -> None:
+    def __init__(self, text: str, element: str = "", error: Optional[GLib.Error] = None) -> None:
         super().__init__(text)
         self.element = element
+        self.error = error
 
 
 class PipelineWarning(UserWarning):
@@ -137,7 +139,8 @@ class Pipeline:
             if message.type == Gst.MessageType.EOS:
                 self._ended = True
             elif not self._error:
-                self._error = PipelineError(_text_of(message, *message.parse_error()), message.src.get_name())
+                error, cause = message.parse_error()
+                self._error = PipelineError(_text_of(message, error, cause), message.src.get_name(), error)
 
     def set_state(self, state: Gst.State) -> None:
         """Returns when it is reached; at once for PLAYING. Raises PipelineError in a process that was forked from
