@@ -358,7 +358,8 @@ def options():
     parser.add_argument("recording")
     parser.add_argument("--element", type=element_of, default=PROFILED,
                         help=f"a simulator and its properties (default: {PROFILED})")
-    for name, what in (("from", "start of the calibration (default: the second frame)"), ("to", "end of the calibration"),
+    for name, what in (("from", "start of the calibration (default: the second frame)"),
+                       ("to", "end of the calibration"),
                        ("measure-from", "start of the comparison"),
                        ("measure-to", "end of the comparison")):
         parser.add_argument("--" + name, type=seconds, metavar="SECONDS", help=what)
@@ -458,7 +459,8 @@ def main():
     simulated = simulate(video, element)
     figures = compare(video, recorded, simulated, measured)
     if args.lag == "find" and not is_found:
-        print("One frame interval does not tell when frames show the scene: at their timestamps, unless --lag says when.")
+        print("One frame interval does not tell when frames show the scene: at their timestamps, unless --lag says"
+              " when.")
     if lag != 0:
         print(f"Frames show the scene {lag * 1000:.1f} ms later than their timestamps.")
     if hidden >= 0.005:

@@ -2,7 +2,6 @@
 #include "gst/base/seek_request.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
@@ -52,9 +51,9 @@ bool SeekRequest::apply(GstSegment& segment) const {
 SeekRequest SeekRequest::from_start(gint64 duration) const {
   SeekRequest request = *this;
   const auto count = [duration](GstSeekType& type, gint64& position) {
-    if (std::exchange(type, type == GST_SEEK_TYPE_END ? GST_SEEK_TYPE_SET : type) ==
-        GST_SEEK_TYPE_END)
-      position = position < 0 ? std::max<gint64>(duration + position, 0) : duration;
+    if (type != GST_SEEK_TYPE_END) return;
+    type = GST_SEEK_TYPE_SET;
+    position = position < 0 ? std::max<gint64>(duration + position, 0) : duration;
   };
   count(request.start_type_, request.start_);
   count(request.stop_type_, request.stop_);

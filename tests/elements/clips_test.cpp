@@ -50,6 +50,14 @@ std::string state() {
   return recording_files::Folder::path("state");
 }
 
+/// The state after four frames.
+void write_state() {
+  Harness h(noisy + "final-state=" + in_quotes(state()));
+  start(h);
+  push_frames(h, 0, 4);
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+}
+
 TEST(Clips, JoinWithoutASeam) {
   std::vector<Output> whole;
   Harness one(noisy);
@@ -100,10 +108,7 @@ TEST(Clips, JoinWithoutASeamAtAGap) {
 }
 
 TEST(Clips, WithoutFramesPassTheStateOn) {
-  Harness first(noisy + "final-state=" + in_quotes(state()));
-  start(first);
-  push_frames(first, 0, 4);
-  gst_harness_push_event(first.get(), gst_event_new_eos());
+  write_state();
   const auto passed = recording_files::Folder::path("passed");
   Harness empty(noisy + "initial-state=" + in_quotes(state()) +
                 " final-state=" + in_quotes(passed));
@@ -120,12 +125,7 @@ TEST(Clips, WithoutFramesPassTheStateOn) {
 
 /// As that of a clip in a file of its own, which begins with its first frame.
 TEST(Clips, LetTheirSegmentBeginWithTheState) {
-  {
-    Harness h(noisy + "final-state=" + in_quotes(state()));
-    start(h);
-    push_frames(h, 0, 4);
-    gst_harness_push_event(h.get(), gst_event_new_eos());
-  }
+  write_state();
   Harness h(noisy + "initial-state=" + in_quotes(state()));
   start(h);
   const GstClockTime state_time = GST_SECOND + 120 * GST_MSECOND;
@@ -157,12 +157,7 @@ TEST(Clips, WarnIfAllFramesAreBeforeTheState) {
 }
 
 TEST(Clips, ContinueAgainAfterASeek) {
-  {
-    Harness h(noisy + "final-state=" + in_quotes(state()));
-    start(h);
-    push_frames(h, 0, 4);
-    gst_harness_push_event(h.get(), gst_event_new_eos());
-  }
+  write_state();
   Harness h(noisy + "initial-state=" + in_quotes(state()));
   start(h);
   std::vector<Output> outputs[2];

@@ -327,6 +327,11 @@ class HotPixelTest : public testing::Test {
     return "eventhotpixel location=" + in_quotes(file.string()) + settings;
   }
   void write(const std::string& text) const { std::ofstream(file) << text; }
+  void learn(Harness& h) const {
+    EXPECT_EQ(count_passed(h, 0, hot), 100U);
+    EXPECT_EQ(count_passed(h, 500 * ms, hot), 100U);
+    EXPECT_EQ(count_passed(h, 1000 * ms, hot), 0U);
+  }
   std::string text() const {
     std::stringstream text;
     text << std::ifstream(file).rdbuf();
@@ -349,9 +354,7 @@ TEST_F(HotPixelTest, LearnsWritesAndKeepsThemThroughEverything) {
   {
     Harness h(launch());
     h.caps(small_sensor);
-    EXPECT_EQ(count_passed(h, 0, hot), 100U);
-    EXPECT_EQ(count_passed(h, 500 * ms, hot), 100U);
-    EXPECT_EQ(count_passed(h, 1000 * ms, hot), 0U);
+    learn(h);
     flush({h.get()});
     push_segment(h.get());
     EXPECT_EQ(count_passed(h, 0, hot), 0U);
@@ -400,9 +403,7 @@ TEST_F(HotPixelTest, LeavesFilesAsTheyAreUnlessItFindsOthers) {
 TEST_F(HotPixelTest, WritesWhatItLearnedBeforeTheSensorChanges) {
   Harness h(launch());
   h.caps(small_sensor);
-  EXPECT_EQ(count_passed(h, 0, hot), 100U);
-  EXPECT_EQ(count_passed(h, 500 * ms, hot), 100U);
-  EXPECT_EQ(count_passed(h, 1000 * ms, hot), 0U);
+  learn(h);
   h.caps("application/x-event-camera, format=XYTP, width=1, height=1");
   EXPECT_EQ(text(), "# Hot pixels: column and row\n1 1\n");
   h.caps(small_sensor);
