@@ -390,9 +390,11 @@ class Recipes(unittest.TestCase):
 
 class Videos(unittest.TestCase):
     def make(self, name, frames, framerate, more=""):
-        subprocess.run([os.environ["GST_LAUNCH"], "-q", *(
-            f"matroskamux name=mux ! filesink location={path_of(name)} videotestsrc pattern=ball num-buffers={frames}"
-            f" ! video/x-raw,format=GRAY8,width=64,height=48,framerate={framerate} ! mux. {more}").split()], check=True)
+        subprocess.run([os.environ["GST_LAUNCH"], "-q", "matroskamux", "name=mux", "!",
+                        "filesink", f"location={path_of(name)}", *(
+                            f"videotestsrc pattern=ball num-buffers={frames}"
+                            f" ! video/x-raw,format=GRAY8,width=64,height=48,framerate={framerate}"
+                            f" ! mux. {more}").split()], check=True)
 
     def played(self, name):
         recipe = path_of("recipe.yaml")
