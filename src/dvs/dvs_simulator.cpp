@@ -162,6 +162,8 @@ class PixelSimulator final : public DvsSimulator {
     keep_causes();
     adopt(settings_, true);
     settle();
+    for (int y = 0; y < format().height; ++y)
+      std::fill_n(pixels_.row(y).refractory_left, format().width, 0.0F);
   }
 
   void simulate(const LumaView& frame, const StepTimes& interval, const Settings&,

@@ -150,7 +150,6 @@ void PixelArray::settle(int y, const DvsSettings& settings, const Random& random
     pixels.signal[x] = pixels.target[x];
     pixels.reference[x] =
         static_cast<float>(pixels.target[x] - mismatch.leaked(number, traits, noise_rate));
-    pixels.refractory_left[x] = 0;
     if (pixels.growth_end[x] != 0) pixels.growth_end[x] = 0;
     pixels.noise_budget[x] = draw_noise_budget(random, number, Purpose::first_noise, 0);
   }

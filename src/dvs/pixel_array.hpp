@@ -110,7 +110,7 @@ class PixelArray {
   void change_traits(int y, const DvsSettings& from, const DvsSettings& to, const Random& random);
 
   /// Resets a row as if its target had been constant for a long time, and draws its initial noise
-  /// budgets.
+  /// budgets. Refractory periods go on.
   void settle(int y, const DvsSettings& settings, const Random& random);
 
   /// Writes all pixels to a StateWriter, or reads them from a StateReader; without the leak, which

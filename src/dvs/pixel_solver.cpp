@@ -39,8 +39,7 @@ class Pixel {
         negative_(pixels_.negative[x]),
         leak_(pixels_.leak[x] + sub_interval_.rise / sub_interval_.duration),
         ready_(pixels_.refractory_left[x]),
-        released_(ready_),
-        held_(settings_.refractory_reset == RefractoryReset::signal && ready_ > 0),
+        holds_(settings_.refractory_reset == RefractoryReset::signal),
         growth_end_(adaptation_.is_on() ? pixels_.growth_end[x] : 0),
         noise_{light.expected_noise, static_cast<double>(pixels_.noise_budget[x])} {
     // A falling reference is equivalent to a rising signal.
@@ -53,11 +52,10 @@ class Pixel {
     TrajectoryPoint now{0, above_leak_.offset + above_leak_.lag};
     int happened = 0;
     for (; happened < max_events; ++happened) {
-      if (held_) {
-        if (released_ > end_.t) break;
-        now = at(released_);
+      if (holds_ && ready_ > now.t) {
+        if (ready_ > end_.t) break;
+        now = at(ready_);
         reference_ = now.value;
-        held_ = false;
       }
       const double noise = noise_.next(end_.t);
       const auto crossing = adaptation_.is_on() ? first_crossing(crossings, now)
@@ -152,9 +150,7 @@ class Pixel {
       t = std::max(crossed, t + dynamics_.latency_jitter * jitter);
     }
     if (!std::isinf(positive_)) row_.add_event(x_, t, polarity, cause);
-    released_ = t + dynamics_.refractory_period;
-    ready_ = std::max(released_, t + min_gap);
-    held_ = settings_.refractory_reset == RefractoryReset::signal;
+    ready_ = t + dynamics_.gap;
     if (settings_.threshold_jitter > 0 && !std::isinf(positive_)) {
       const auto next = Mismatch(settings_, random_).next_thresholds(number_, draw_++);
       positive_ = next.positive;
@@ -167,8 +163,7 @@ class Pixel {
     pixels_.reference[x_] = static_cast<float>(reference_ - leak_ * end_.t);
     pixels_.positive[x_] = static_cast<float>(positive_);
     pixels_.negative[x_] = static_cast<float>(negative_);
-    const double left = (held_ ? released_ : ready_) - end_.t;
-    pixels_.refractory_left[x_] = static_cast<float>(std::max(0.0, left));
+    pixels_.refractory_left[x_] = static_cast<float>(std::max(0.0, ready_ - end_.t));
     pixels_.noise_budget[x_] = noise_.left();
     if (adaptation_.is_on()) pixels_.growth_end[x_] = growth_end_;
   }
@@ -190,10 +185,9 @@ class Pixel {
   double reference_;
   double positive_;
   double negative_;
-  double leak_;      ///< fall of the reference per microsecond
-  double ready_;     ///< earliest time of the next event
-  double released_;  ///< end of the refractory period
-  bool held_;        ///< in reset until released_
+  double leak_;   ///< fall of the reference per microsecond
+  double ready_;  ///< earliest time of the next event
+  bool holds_;    ///< a reset holds the reference at the signal until then
   double growth_end_;
   ShotNoise noise_;
 };

@@ -26,15 +26,13 @@ struct PixelDynamics {
   explicit PixelDynamics(const DvsSettings& settings)
       : adaptation(settings),
         thresholds(mean_thresholds(settings)),
-        refractory_period(in_microseconds(settings.refractory_period)),
-        gap(std::max(refractory_period, min_gap)),
+        gap(std::max(in_microseconds(settings.refractory_period), min_gap)),
         latency(in_microseconds(settings.pixel_latency)),
         latency_jitter(in_microseconds(settings.pixel_latency_jitter)) {}
 
   Adaptation adaptation;
   ContrastThresholds thresholds;  ///< means
-  double refractory_period;
-  double gap;  ///< minimum time between two events without latency
+  double gap;                     ///< from an event until the pixel is ready for the next one
   double latency;
   double latency_jitter;
 };

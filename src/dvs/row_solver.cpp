@@ -121,9 +121,6 @@ struct Trajectories {
   }
 };
 
-/// Column::released of pixels that are not held.
-constexpr double not_held = -1;
-
 class RowSolver {
  public:
   RowSolver(const RowToSolve& row, UnsolvedPixels& unsolved)
@@ -203,10 +200,7 @@ class RowSolver {
     store(Column::reference, hn::Mul(sign, load(Candidates::reference)));
     store(Column::to_far, hn::IfThenElse(is_upright, positive, negative));
     store(Column::to_near, hn::IfThenElse(is_upright, negative, positive));
-    const auto ready = load(Candidates::refractory_left);
-    store(Column::ready, ready);
-    if (holds_)
-      store(Column::released, hn::IfThenElse(hn::Gt(ready, all(0)), ready, all(not_held)));
+    store(Column::ready, load(Candidates::refractory_left));
   }
 
   /// Finds the next event of each pixel; stores pixels that have none.
@@ -232,13 +226,13 @@ class RowSolver {
     const auto ready = load(Column::ready);
     const auto noise = load(Column::next_noise);
     const auto sign = load(Column::sign);
-    // A reset holds the reference at the signal until it is released, which may be after the end.
-    const auto released = holds_ ? load(Column::released) : all(not_held);
-    const auto stays_held = hn::Gt(released, end.t);
-    const auto is_released = hn::And(hn::Ge(released, all(0)), hn::Not(stays_held));
+    // A reset holds the reference at the signal until the pixel is ready, maybe after the end.
+    const auto held_until = holds_ ? ready : all(0);
+    const auto stays_held = hn::Gt(held_until, end.t);
+    const auto is_released = hn::And(hn::Gt(held_until, now.t), hn::Not(stays_held));
     if (!hn::AllFalse(doubles, is_released)) {
-      now.value = hn::IfThenElse(is_released, trajectories.at(released, now), now.value);
-      now.t = hn::IfThenElse(is_released, released, now.t);
+      now.value = hn::IfThenElse(is_released, trajectories.at(ready, now), now.value);
+      now.t = hn::IfThenElse(is_released, ready, now.t);
       reference = hn::IfThenElse(is_released, now.value, reference);
       hn::StoreU(reference, doubles, unsolved_.column(Column::reference) + i);
     }
@@ -338,10 +332,6 @@ class RowSolver {
     keep(Column::to_near, to_near);
     keep(Column::next_noise, next_noise);
     keep(Column::ready, hn::IfThenElse(fires, hn::Add(emitted, all(row_.dynamics.gap)), ready));
-    if (holds_) {
-      const auto rested = hn::Add(emitted, all(row_.dynamics.refractory_period));
-      keep(Column::released, hn::IfThenElse(fires, rested, all(not_held)));
-    }
     return hn::CountTrue(doubles, happens);
   }
 
@@ -422,8 +412,7 @@ class RowSolver {
     const double reference =
         unsolved_.column(Column::sign)[i] * unsolved_.column(Column::reference)[i];
     pixels.reference[x] = static_cast<float>(reference - fall_of(x) * duration_);
-    const bool stays_held = holds_ && unsolved_.column(Column::released)[i] > duration_;
-    const double ready = unsolved_.column(stays_held ? Column::released : Column::ready)[i];
+    const double ready = unsolved_.column(Column::ready)[i];
     pixels.refractory_left[x] = static_cast<float>(std::max(0.0, ready - duration_));
     auto& noise = unsolved_.noise[index];
     noise.skip(row_.random, row_.pixels.first_number + static_cast<std::uint64_t>(x),

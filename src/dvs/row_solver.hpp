@@ -26,10 +26,9 @@ class UnsolvedPixels {
     slope,
     bandwidth,
     reference,
-    to_far,    ///< from the reference to the far level
-    to_near,   ///< from the near level to the reference
-    ready,     ///< earliest time of the next event
-    released,  ///< end of the reset that holds the reference; before 0 if none does
+    to_far,   ///< from the reference to the far level
+    to_near,  ///< from the near level to the reference
+    ready,    ///< earliest time of the next event
     next_noise,
     columns
   };

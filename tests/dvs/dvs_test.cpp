@@ -481,23 +481,32 @@ TEST(Dvs, HasTheSpreadOfThresholdsThatIsSet) {
 }
 
 TEST(Dvs, RestsForTheRefractoryPeriod) {
-  for (const auto reset : {RefractoryReset::level, RefractoryReset::signal}) {
-    DvsSettings settings{.cutoff_frequency = 500,
-                         .threshold_jitter = 0.02,
-                         .leak_rate = 50,
-                         .shot_noise_rate = 200,
-                         .refractory_period = 3'000'000,
-                         .refractory_reset = reset,
-                         .pixel_latency = 700'000,
-                         .pixel_latency_jitter = 300'000};
+  for (int i = 0; i < 16; ++i) {
+    const auto is_set = [i](int bit) { return (i >> bit & 1) != 0; };
+    const int period = is_set(0) ? 3000 : 0;  // microseconds
+    // Without a period, signals so steep that they cross many levels in a microsecond.
+    const Nanoseconds frame_time = is_set(0) ? 7'000'000 : 500;
+    DvsSettings settings{
+        .cutoff_frequency = is_set(0) ? 500.0 : 0.0,
+        .threshold_jitter = is_set(1) ? 0.02 : 0,
+        .leak_rate = 50,
+        .shot_noise_rate = 200,
+        .refractory_period = period * 1000,
+        .refractory_reset = is_set(2) ? RefractoryReset::signal : RefractoryReset::level,
+        .pixel_latency = is_set(3) ? frame_time / 10 : 0,
+        .pixel_latency_jitter = is_set(3) ? frame_time / 20 : 0};
     Playback playback({40, 30, 8}, settings);
-    for (int i = 0; i < 60; ++i)
-      playback.push(scene::noise<std::uint8_t>(40, 30, 8, static_cast<unsigned>(i)), 8,
-                    i * 7'000'000);
-    ASSERT_GT(playback.events.size(), 40'000U);
+    for (int frame = 0; frame < 60; ++frame) {
+      settings.response = frame < 50 ? Response::lin_log : Response::log;  // other units
+      playback.set(settings);
+      playback.push(scene::noise<std::uint8_t>(40, 30, 8, static_cast<unsigned>(frame)), 8,
+                    frame * frame_time);
+    }
+    ASSERT_GT(playback.events.size(), 20'000U);
     for (const auto& [place, events] : by_pixel(playback.events))
-      for (std::size_t i = 1; i < events.size(); ++i)
-        ASSERT_GE(events[i].t - events[i - 1].t, 3000);
+      for (std::size_t k = 1; k < events.size(); ++k)
+        ASSERT_GE(events[k].t - events[k - 1].t, std::max(period, 1))
+            << testing::PrintToString(settings);
   }
 }
 
