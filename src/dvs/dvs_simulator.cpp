@@ -45,7 +45,7 @@ bool have_same_response(const DvsSettings& a, const DvsSettings& b) {
 }
 
 /// A state begins with this; the last character is the version of its format.
-constexpr std::array<char, 8> state_magic{'D', 'V', 'S', 'S', 'T', 'A', 'T', '2'};
+constexpr std::array<char, 8> state_magic{'D', 'V', 'S', 'S', 'T', 'A', 'T', '3'};
 
 /// Hash of all settings. Does not compile unless it lists each of them.
 std::uint64_t hash_of(const DvsSettings& settings) {
@@ -135,6 +135,9 @@ class PixelSimulator final : public DvsSimulator {
     plans_.serialize(archive);
     archive.value(clock_, is_within(0.0, max_state_clock));
     archive.value(gain_, is_within(1 / max_total_gain, max_total_gain));
+    std::uint8_t is_narrow = is_narrow_ ? 1 : 0;
+    archive.value(is_narrow, is_within<std::uint8_t>(0, 1));
+    if constexpr (Archive::is_reading) is_narrow_ = is_narrow == 1;
     archive.image(last_, is_anything);
     pulse_.serialize(archive);
     pixels_.serialize(archive);

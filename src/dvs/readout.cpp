@@ -16,32 +16,35 @@ void Readout::reset() {
   std::fill(waiting_.begin(), waiting_.end(), Waiting{0});
   std::fill(rows_.begin(), rows_.end(), Row{});
   queue_first_ = queue_count_ = 0;
-  idle_from_ = 0;
+  unfinished_ = 0;
 }
 
 void Readout::read(std::span<const Event> in, double duration, double events_per_second,
                    EventBuckets& out) {
-  const double time_per_event = 1e6 / events_per_second;
+  constexpr double min_rate = 1e-9;  // an event in 30 years; a lower one makes no difference
+  const double time_per_event = 1e6 / std::max(events_per_second, min_rate);
+  double idle_from = unfinished_ * time_per_event;  // microseconds after the start of the interval
   out.reset(1, 1);
   auto& left = out.bucket(1, 0);
   // Reads rows until `time`.
   const auto serve_until = [&](double time) {
-    while (queue_count_ > 0 && idle_from_ < time) {
+    while (queue_count_ > 0 && idle_from < time) {
       const int row = row_queue_[queue_first_];
       queue_first_ = (queue_first_ + 1) % row_queue_.size();
       --queue_count_;
       const int count = rows_[static_cast<std::size_t>(row)].count;
-      serve(row, static_cast<std::uint32_t>(idle_from_), left);
-      idle_from_ += count * time_per_event;
+      serve(row, static_cast<std::uint32_t>(idle_from), left);
+      idle_from += count * time_per_event;
     }
   };
   for (const auto& event : in) {
     serve_until(event.t);
-    if (queue_count_ == 0) idle_from_ = std::max<double>(idle_from_, event.t);
+    if (queue_count_ == 0) idle_from = std::max<double>(idle_from, event.t);
     admit(event);
   }
   serve_until(duration);
-  idle_from_ = std::max(0.0, idle_from_ - duration);
+  unfinished_ =
+      std::clamp((idle_from - duration) / time_per_event, 0.0, static_cast<double>(width_));
   sort_within_spans(left, 0);
 }
 

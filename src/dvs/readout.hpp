@@ -67,13 +67,13 @@ class Readout {
   std::vector<int> row_queue_;  ///< ring of the rows with waiting events
   std::size_t queue_first_ = 0;
   std::size_t queue_count_ = 0;
-  double idle_from_ = 0;  ///< microseconds after the start of the interval
+  double unfinished_ = 0;  ///< events of the row being read out, which is not in rows_
 };
 
 template <class Archive>
 void Readout::serialize(Archive& archive) {
   if constexpr (Archive::is_reading) reset();
-  archive.value(idle_from_, is_within(0.0, max_state_time));
+  archive.value(unfinished_, is_within(0.0, static_cast<double>(width_)));
   // In the order in which they are read, which admits them again.
   std::vector<Event> events;
   for (std::size_t i = 0; i < queue_count_; ++i) {

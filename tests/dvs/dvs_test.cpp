@@ -841,6 +841,16 @@ TEST(Dvs, ReadsOutNoMoreThanItCan) {
     ASSERT_TRUE(slow[i].t != slow[i - 1].t || slow[i].y == slow[i - 1].y);
 }
 
+TEST(Dvs, ReadsOutAllThatWaitsOnceItCan) {
+  Playback playback({40, 30, 8}, DvsSettings{.max_rate = 10});
+  playback.push(flat(40, 30, 100), 8, 0);
+  playback.push(flat(40, 30, 130), 8, scene::frame_time);
+  EXPECT_EQ(playback.events.size(), 40U);  // whose readout takes 4 s
+  playback.set({});
+  playback.push(flat(40, 30, 130), 8, 2 * scene::frame_time);
+  EXPECT_EQ(playback.events.size(), 40U * 30U);
+}
+
 TEST(Dvs, FollowsMotion) {
   const auto at = [](int left) { return scene::square(160, 90, left, 30, 24, 220, 30); };
   const auto play = [&](Upsampling upsampling) {

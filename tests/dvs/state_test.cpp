@@ -151,6 +151,28 @@ TEST(State, IsRefusedIfOfOthers) {
   EXPECT_EQ(fault_of(state, format, others), "it is of other properties");
 }
 
+TEST(State, HasAReadoutOfAnyRate) {
+  const LumaFormat format{40, 30, 8};
+  for (const double rate : {1e12, 1.0, 1e-12, 1e-320}) {
+    const DvsSettings settings{.max_rate = rate};
+    EXPECT_EQ(fault_of(played(format, settings).simulator().state(), format, settings), "") << rate;
+  }
+}
+
+TEST(State, HasTheRangeOfLuma) {
+  const DvsSettings settings{.overexposed_light = 4};
+  const auto white = flat(40, 30, 235);
+  auto luma = scene::luma(white);
+  luma.is_narrow = true;
+  Playback before({40, 30, 8}, settings);
+  before.simulator().push(luma, 0, {});
+  Playback after({40, 30, 8}, settings);
+  after.simulator().restore(before.simulator().state());
+  const auto* held = after.simulator().hold_until(scene::frame_time);
+  ASSERT_NE(held, nullptr);
+  EXPECT_EQ(held->size(), 0U);
+}
+
 /// With the right checksum.
 std::vector<std::uint8_t> sealed(std::vector<std::uint8_t> state) {
   const std::size_t size = state.size() - sizeof(std::uint64_t);
