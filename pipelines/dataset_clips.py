@@ -129,6 +129,7 @@ class ClipFrames(Frames):
     def watch(self, pad):
         pad.add_probe(Gst.PadProbeType.BUFFER | Gst.PadProbeType.EVENT_DOWNSTREAM | Gst.PadProbeType.EVENT_FLUSH,
                       self._look)
+        self.watch_others(pad)
 
     def _look(self, pad, info):
         if not info.type & Gst.PadProbeType.BUFFER:
@@ -148,6 +149,7 @@ class ClipFrames(Frames):
             self.before.append([buffer.pts, self._hash_of(buffer)])
         else:
             self.times.append(buffer.pts)
+            self.shown = buffer.duration if buffer.duration != Gst.CLOCK_TIME_NONE else 0
             self.corrupted += buffer.has_flags(Gst.BufferFlags.CORRUPTED)
             if self.end is not None and time >= self.end - MARGIN:
                 self.last.append([buffer.pts, self._hash_of(buffer)])
@@ -193,7 +195,8 @@ def make_clip(video, folder, cuts, number):
     events = os.path.join(folder, f"{number}.events")
     os.replace(file.name, events)
     record |= {"size": os.path.getsize(events), "problem": record.get("problem", frames.problem), "times": frames.times,
-               "corrupted": frames.corrupted, "before": frames.before, "last": frames.last}
+               "corrupted": frames.corrupted, "shown": frames.shown, "others_end": frames.others_end,
+               "before": frames.before, "last": frames.last}
     write_record(os.path.join(folder, f"{number}.json"), record)
 
 
@@ -253,6 +256,7 @@ class Clips:
         self.frames = Frames()
         self.frames.times = [time for record in self._records for time in record["times"]]
         self.frames.corrupted = sum(record["corrupted"] for record in self._records)
+        self.frames.shown, self.frames.others_end = self._records[-1]["shown"], self._records[-1]["others_end"]
         if np.any(np.diff(np.array(self.frames.times, np.int64)) <= 0):
             raise NotJoinable("the times of its frames do not increase")
 

@@ -33,6 +33,11 @@ class Frames:
             self.shown = buffer.duration if buffer.duration != Gst.CLOCK_TIME_NONE else 0
             return Gst.PadProbeReturn.OK
 
+        pad.add_probe(Gst.PadProbeType.BUFFER, look)
+        self.watch_others(pad)
+
+    def watch_others(self, pad: Gst.Pad) -> None:
+        """Watches the other streams of the file whose frames pass the pad."""
         def look_at_other(_: Gst.Pad, info: Gst.PadProbeInfo) -> Gst.PadProbeReturn:
             if info.get_buffer().pts != Gst.CLOCK_TIME_NONE:
                 self.others_end = max(self.others_end, info.get_buffer().pts)
@@ -47,7 +52,6 @@ class Frames:
             if "Demuxer" in element.get_metadata("klass"):
                 element.connect("pad-added", watch_other)
 
-        pad.add_probe(Gst.PadProbeType.BUFFER, look)
         pad.get_parent_element().get_parent().connect("deep-element-added", watch_demuxer)
 
     def fault(self, min_frames: int, duration: float, pictures: int) -> str:

@@ -380,11 +380,11 @@ class Clips(unittest.TestCase):
 
     CUTS = [1, 2, 3]
 
-    def make_video(self, folder, framerate=25):
+    def make_video(self, folder, framerate=25, more=""):
         path = path_of(f"{folder}/videos/coded.mp4")
         launch(f"videotestsrc pattern=ball motion=sweep num-buffers={4 * framerate + 8}"
                f" ! video/x-raw,format=I420,width=64,height=48,framerate={framerate}/1"
-               f" ! x264enc key-int-max=40 ! mp4mux ! filesink {shlex.quote('location=' + path)}")
+               f" ! x264enc key-int-max=40 ! mp4mux name=mux ! filesink {shlex.quote('location=' + path)} {more}")
         return path
 
     def folder_of_clips(self, video):
@@ -416,6 +416,14 @@ class Clips(unittest.TestCase):
                 joined = record_of(video, path_of("clips/made"), clips=clips)
                 self.assertEqual(joined, record_of(video, path_of("clips/whole")))
                 self.assertGreater(joined["figures"]["events"], 1000)
+
+    def test_may_have_longer_audio(self):
+        video = self.video("simulator: eventsim-diff\noutput: npz")
+        self.make_video("clips", more="audiotestsrc samplesperbuffer=4410 num-buffers=80 ! avenc_aac ! mux.")
+        clips = dataset_clips.Clips(video, self.folder_of_clips(video), self.CUTS)
+        joined = record_of(video, path_of("clips/made"), clips=clips)
+        self.assertNotIn("refused", joined)
+        self.assertEqual(joined, record_of(video, path_of("clips/whole")))
 
     def test_are_made_in_jobs_that_go_on_after_a_kill(self):
         self.make_video("jobs")
