@@ -138,7 +138,7 @@ constexpr GParamFlags fixed = {};
 constexpr double max_time = GST_SECOND;
 
 /// A property stored in a member of DvsSettings.
-struct Setting {
+struct PixelProperty {
   const char* name;
   const char* nick;
   const char* blurb;
@@ -152,7 +152,7 @@ struct Setting {
   GType (*type)() = nullptr;  ///< for enums
 };
 
-const Setting table[] = {
+const PixelProperty pixel_properties[] = {
     {"denoise", "Denoise",
      "Remove camera noise from each frame first: smooth differences between neighbouring pixels of "
      "up to this size, and keep larger ones such as edges (grey levels, white is 255; 0 = off, 8 "
@@ -257,18 +257,20 @@ const Setting table[] = {
 };
 
 /// Settings that come from one source.
-struct Given {
+struct Overrides {
   DvsSettings settings;
-  std::bitset<std::size(table)> which;
+  std::bitset<std::size(pixel_properties)> is_set;
 
   void take(std::size_t i, const GValue* value) {
-    std::visit([&](auto member) { read_value(value, settings.*member); }, table[i].member);
-    which[i] = true;
+    std::visit([&](auto member) { read_value(value, settings.*member); },
+               pixel_properties[i].member);
+    is_set[i] = true;
   }
   void override(DvsSettings& others) const {
-    for (std::size_t i = 0; i < which.size(); ++i)
-      if (which[i])
-        std::visit([&](auto member) { others.*member = settings.*member; }, table[i].member);
+    for (std::size_t i = 0; i < is_set.size(); ++i)
+      if (is_set[i])
+        std::visit([&](auto member) { others.*member = settings.*member; },
+                   pixel_properties[i].member);
   }
 };
 
@@ -279,69 +281,70 @@ std::runtime_error error_in(const std::string& profile, const std::string& setti
 }
 
 /// Takes a setting from text. Returns false if it has no such value.
-bool take_text(Given& given, const Setting& setting, const std::string& text, GObjectClass* klass) {
-  GParamSpec* spec = g_object_class_find_property(klass, setting.name);
+bool take_text(Overrides& overrides, const PixelProperty& property, const std::string& text,
+               GObjectClass* klass) {
+  GParamSpec* spec = g_object_class_find_property(klass, property.name);
   GValue value = G_VALUE_INIT;
   g_value_init(&value, spec->value_type);
   const bool is_valid = !text.empty() && gst_value_deserialize(&value, text.c_str()) != FALSE &&
                         g_param_value_validate(spec, &value) == FALSE;
-  if (is_valid) given.take(static_cast<std::size_t>(&setting - table), &value);
+  if (is_valid) overrides.take(static_cast<std::size_t>(&property - pixel_properties), &value);
   g_value_unset(&value);
   return is_valid;
 }
 
 /// Reads the settings in a camera profile. Throws std::runtime_error.
-Given read_profile(const std::string& path, GObjectClass* klass) {
-  Given given;
+Overrides read_profile(const std::string& path, GObjectClass* klass) {
+  Overrides overrides;
   for (const auto& [name, text] : read_camera_profile(path, "eventsim-dvs")) {
-    const auto* setting = std::ranges::find(table, name, &Setting::name);
-    if (setting == std::end(table))
+    const auto* property = std::ranges::find(pixel_properties, name, &PixelProperty::name);
+    if (property == std::end(pixel_properties))
       throw error_in(path, name, ", which eventsim-dvs does not have.");
-    if (!take_text(given, *setting, text, klass))
+    if (!take_text(overrides, *property, text, klass))
       throw error_in(path, name,
                      " to a value that it cannot have; see gst-inspect-1.0 eventsim-dvs.");
   }
-  return given;
+  return overrides;
 }
 
 /// User-settable values.
-struct Choice {
+struct Settings {
   DvsPreset preset = DvsPreset::ideal;
   std::string profile;
-  Given profiled;     ///< override the preset
-  std::string fault;  ///< why the profile could not be read, if so
-  Given overriding;   ///< override both
+  Overrides of_profile;       ///< override the preset
+  std::string profile_error;  ///< why the profile could not be read, if so
+  Overrides of_properties;    ///< override both
   std::string initial_state;
   std::string final_state;
 
-  DvsSettings settings() const {
+  DvsSettings dvs_settings() const {
     auto settings = eventcamera::settings_of(preset);
-    profiled.override(settings);
-    overriding.override(settings);
+    of_profile.override(settings);
+    of_properties.override(settings);
     return settings;
   }
 
   void take_profile(const GValue* value, GObjectClass* klass) {
     read_value(value, profile);
-    profiled = {};
-    fault = {};
+    of_profile = {};
+    profile_error = {};
     if (profile.empty()) return;
     try {
-      profiled = read_profile(profile, klass);
+      of_profile = read_profile(profile, klass);
     } catch (const std::runtime_error& error) {
-      fault = error.what();
+      profile_error = error.what();
     }
   }
 };
 
 }  // namespace
 
-static Guarded<Choice>& choice_of(GObject* object) {
-  return event_simulator_settings<Choice>(object);
+static Guarded<Settings>& settings_of(GObject* object) {
+  return event_simulator_settings<Settings>(object);
 }
 
 template <class Value>
-static GParamSpec* spec_of(const Setting& s, Value value) {
+static GParamSpec* spec_of(const PixelProperty& s, Value value) {
   const auto flags = static_cast<GParamFlags>(mutable_playing_flags | s.over_time);
   if constexpr (std::is_same_v<Value, double>)
     return g_param_spec_double(s.name, s.nick, s.blurb, s.min, s.max, value, flags);
@@ -360,17 +363,17 @@ static GParamSpec* spec_of(const Setting& s, Value value) {
 }
 
 static void install_properties(GObjectClass* klass) {
-  const Choice defaults;
-  Properties<choice_of> properties(klass);
+  const Settings defaults;
+  Properties<settings_of> properties(klass);
   properties.add(
-      &Choice::preset,
+      &Settings::preset,
       g_param_spec_enum("preset", "Preset",
                         "Camera model: sets all properties of the pixel, except those that are set "
                         "explicitly, before or after",
                         preset_type(), static_cast<int>(defaults.preset), mutable_playing_flags));
   properties.add(
-      [klass](Choice& choice, const GValue* value) { choice.take_profile(value, klass); },
-      [](Choice& choice, GValue* value) { write_value(choice.profile, value); },
+      [klass](Settings& settings, const GValue* value) { settings.take_profile(value, klass); },
+      [](Settings& settings, GValue* value) { write_value(settings.profile, value); },
       g_param_spec_string(
           "profile", "Camera profile",
           "File of settings that event-calibrate fitted to a camera, which override "
@@ -378,36 +381,37 @@ static void install_properties(GObjectClass* klass) {
           "after",
           "", mutable_ready_flags));
   properties.add(
-      &Choice::initial_state,
+      &Settings::initial_state,
       g_param_spec_string("initial-state", "Initial state",
                           "File of the state to continue from, which final-state wrote: frames up "
                           "to its time are skipped, and the next events are those of a video "
                           "without a cut. Read when a stream begins, as after a seek; all other "
                           "properties and the size of the frames must be the same",
                           "", mutable_playing_flags));
-  properties.add(&Choice::final_state,
+  properties.add(&Settings::final_state,
                  g_param_spec_string("final-state", "Final state",
                                      "File that the state of all pixels is written to at the end "
                                      "of the stream; one that exists is replaced",
                                      "", mutable_playing_flags));
-  for (std::size_t i = 0; i < std::size(table); ++i) {
+  for (std::size_t i = 0; i < std::size(pixel_properties); ++i) {
     const auto add = [&](auto member) {
-      properties.add([i](Choice& choice, const GValue* value) { choice.overriding.take(i, value); },
-                     [member](Choice& choice, GValue* value) {
-                       write_value(choice.settings().*member, value);
-                     },
-                     spec_of(table[i], defaults.settings().*member));
+      properties.add(
+          [i](Settings& settings, const GValue* value) { settings.of_properties.take(i, value); },
+          [member](Settings& settings, GValue* value) {
+            write_value(settings.dvs_settings().*member, value);
+          },
+          spec_of(pixel_properties[i], defaults.dvs_settings().*member));
     };
-    std::visit(add, table[i].member);
+    std::visit(add, pixel_properties[i].member);
   }
 }
 
 static void configure(eventcamera::IntervalSimulator& simulator, GObject* object) {
-  static_cast<DvsSimulator&>(simulator).set(choice_of(object).copy().settings());
+  static_cast<DvsSimulator&>(simulator).set(settings_of(object).copy().dvs_settings());
 }
 
 static void restore(eventcamera::IntervalSimulator& simulator, GObject* object) {
-  const auto location = choice_of(object).copy().initial_state;
+  const auto location = settings_of(object).copy().initial_state;
   if (location.empty()) return;
   auto& dvs_simulator = static_cast<DvsSimulator&>(simulator);
   try {
@@ -423,7 +427,7 @@ static void restore(eventcamera::IntervalSimulator& simulator, GObject* object) 
 }
 
 static void save(eventcamera::IntervalSimulator& simulator, GObject* object) {
-  const auto location = choice_of(object).copy().final_state;
+  const auto location = settings_of(object).copy().final_state;
   if (location.empty()) return;
   const auto bytes = static_cast<DvsSimulator&>(simulator).state();
   try {
@@ -438,7 +442,7 @@ static void save(eventcamera::IntervalSimulator& simulator, GObject* object) {
 }
 
 static std::string fault_of(GObject* object) {
-  return choice_of(object).copy().fault;
+  return settings_of(object).copy().profile_error;
 }
 
 static const EventSimulatorMethod dvs = {
@@ -451,7 +455,9 @@ static const EventSimulatorMethod dvs = {
     .labels = true,
     .takes_flow = true,
     .create = in_system_memory<eventcamera::make_dvs_simulator>,
-    .make_settings = []() -> std::shared_ptr<void> { return std::make_shared<Guarded<Choice>>(); },
+    .make_settings = []() -> std::shared_ptr<void> {
+      return std::make_shared<Guarded<Settings>>();
+    },
     .install_properties = install_properties,
     .configure = configure,
     .restore = restore,
