@@ -20,7 +20,7 @@ G_DECLARE_DERIVABLE_TYPE(GstEventReader, gst_event_reader, GST, EVENT_READER, Gs
 
 struct _GstEventReaderClass {
   GstElementClass parent_class;
-  const RecordingFormat* format;
+  const EventReaderFormat* format;
 };
 
 G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventReader, gst_event_reader, GST_TYPE_ELEMENT,
@@ -88,7 +88,7 @@ static void gst_event_reader_class_init(GstEventReaderClass* klass) {
 }
 
 static void format_class_init(gpointer klass, gpointer data) {
-  const auto& format = *static_cast<const RecordingFormat*>(data);
+  const auto& format = *static_cast<const EventReaderFormat*>(data);
   GST_EVENT_READER_CLASS(klass)->format = &format;
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   // A demuxer even of a single stream: its pad is added once the header has given the caps, and
@@ -107,6 +107,6 @@ static void format_class_init(gpointer klass, gpointer data) {
   }
 }
 
-GType event_reader_type(const RecordingFormat& format) {
+GType event_reader_type(const EventReaderFormat& format) {
   return row_type(GST_TYPE_EVENT_READER, format.type_name, format_class_init, &format);
 }

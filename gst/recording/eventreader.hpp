@@ -1,7 +1,46 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include "gst/recording/recording_format.hpp"
+#include <gst/gst.h>
+
+#include <memory>
+
+#include "gst/recording/format_settings.hpp"
+#include "src/formats/recording_decoder.hpp"
+
+/// A recording format, and the element that reads it: bytes in, streams of events and video out.
+///
+/// Events come in buffers of duration `buffer-duration`; a silence of any length is one GAP. PTS
+/// are the times of the file, so that they survive when written again. The segments of all streams
+/// start at the first event or frame of the file, so that running time and stream time are 0 there
+/// and streams are in sync. A file with negative times is shifted to start at 0.
+///
+/// Bytes are pulled if upstream supports it, as filesrc does: duration and seeking are then exact
+/// for files up to 16 MiB and those that store their duration; the duration of other files is
+/// estimated until their end has been read. In push mode, seeking works if upstream can seek in
+/// bytes.
+///
+/// Source pads appear once their streams are known. An element with a single stream has a pad
+/// "src", which it keeps after a stop; others have pads "events_%u" and "video_%u".
+///
+/// Triggers and IMU samples precede the events of their interval; see sensor_events.hpp.
+///
+/// Words without a header may arrive in a TIME segment, as from an encoder or a network. Times are
+/// then upstream's: the clock of the words is shifted so that the first event of a buffer lies
+/// within that buffer's interval.
+struct EventReaderFormat {
+  const char* type_name;
+  const char* long_name;
+  const char* description;
+  const char* caps;  ///< input caps
+  bool has_many_streams = false;
+  bool has_triggers = false;  ///< announced to writers, although a file may have none
+  void (*add_properties)(FormatProperties& properties) = nullptr;
+
+  /// Creates a reader for a file or a stream with these caps; `caps` is null if unknown. May throw.
+  std::unique_ptr<eventcamera::RecordingDecoder> (*make_decoder)(const GstCaps* caps,
+                                                                 const FormatSettings& settings);
+};
 
 /// Returns the element type that reads `format`, which must have static storage duration.
-GType event_reader_type(const RecordingFormat& format);
+GType event_reader_type(const EventReaderFormat& format);

@@ -36,7 +36,7 @@ namespace {
 
 /// User-settable values.
 struct Settings {
-  EventFileFormat::Choice choice;
+  EventWriterFormat::Choice choice;
   guint mtu = G_MAXUINT;
 };
 
@@ -79,7 +79,7 @@ G_DECLARE_DERIVABLE_TYPE(GstEventWriter, gst_event_writer, GST, EVENT_WRITER, Gs
 
 struct _GstEventWriterClass {
   GstElementClass parent_class;
-  const EventFileFormat* format;
+  const EventWriterFormat* format;
 };
 
 G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventWriter, gst_event_writer, GST_TYPE_ELEMENT,
@@ -95,7 +95,7 @@ static Guarded<Settings>& settings_of(GObject* object) {
   return priv_of(GST_EVENT_WRITER(object)).settings;
 }
 
-static const EventFileFormat& format_of(GstEventWriter* self) {
+static const EventWriterFormat& format_of(GstEventWriter* self) {
   return *GST_EVENT_WRITER_GET_CLASS(self)->format;
 }
 
@@ -510,8 +510,8 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 
 /* type */
 
-static EventFileFormat::Choice default_choice(const EventFileFormat& format) {
-  EventFileFormat::Choice choice;
+static EventWriterFormat::Choice default_choice(const EventWriterFormat& format) {
+  EventWriterFormat::Choice choice;
   if (format.variants != nullptr) choice.variant = format.variants->default_value;
   if (format.compressions != nullptr) choice.compression = format.compressions->default_value;
   return choice;
@@ -549,13 +549,13 @@ static void gst_event_writer_class_init(GstEventWriterClass* klass) {
 }
 
 /// Specification of the enum property that selects a variant.
-static GParamSpec* spec_of(const EventFileFormat::Variants& variants) {
+static GParamSpec* spec_of(const EventWriterFormat::Variants& variants) {
   return g_param_spec_enum(variants.property, variants.nick, variants.blurb, variants.type(),
                            variants.default_value, mutable_ready_flags);
 }
 
 static void format_class_init(gpointer klass, gpointer data) {
-  const auto& format = *static_cast<const EventFileFormat*>(data);
+  const auto& format = *static_cast<const EventWriterFormat*>(data);
   GST_EVENT_WRITER_CLASS(klass)->format = &format;
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   Properties<settings_of> properties(object_class);
@@ -587,6 +587,6 @@ static void format_class_init(gpointer klass, gpointer data) {
                                         format.description, EVENTSIM_AUTHORS);
 }
 
-GType event_writer_type(const EventFileFormat& format) {
+GType event_writer_type(const EventWriterFormat& format) {
   return row_type(GST_TYPE_EVENT_WRITER, format.type_name, format_class_init, &format);
 }

@@ -15,7 +15,7 @@
 /// stream. Written times are those of the PTS. A flush starts the file over, as in filesink. Header
 /// fields that are only known at the end are written if downstream can seek. A stop without EOS
 /// warns of the events that the format writes at the end.
-struct EventFileFormat {
+struct EventWriterFormat {
   /// Enum property that selects a variant of the format.
   struct Variants {
     const char* property;
@@ -50,4 +50,4 @@ struct EventFileFormat {
 };
 
 /// Returns the element type that writes `format`, which must have static storage duration.
-GType event_writer_type(const EventFileFormat& format);
+GType event_writer_type(const EventWriterFormat& format);

@@ -74,7 +74,7 @@ std::unique_ptr<RecordingDecoder> make_evt_decoder_of(const GstCaps* caps,
  * location=recording.dat
  * ]|
  */
-static const RecordingFormat evt = {
+static const EventReaderFormat evt = {
     .type_name = "GstEvtDec",
     .long_name = "Prophesee RAW reader",
     .description = "Reads Prophesee RAW files of events",
@@ -99,7 +99,7 @@ GST_ELEMENT_REGISTER_DEFINE(evtdec, "evtdec", GST_RANK_PRIMARY, event_reader_typ
  * location=recording.raw
  * ]|
  */
-static const RecordingFormat dat = {
+static const EventReaderFormat dat = {
     .type_name = "GstEventDatDec",
     .long_name = "Prophesee DAT reader",
     .description = "Reads Prophesee DAT files of events",
@@ -131,7 +131,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_
  * location=recording.raw
  * ]|
  */
-static const RecordingFormat es = {
+static const EventReaderFormat es = {
     .type_name = "GstEventEsDec",
     .long_name = "Event Stream reader",
     .description = "Reads Event Stream files of events",
@@ -167,7 +167,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_re
  * location=two.raw
  * ]|
  */
-static const RecordingFormat atis = {
+static const EventReaderFormat atis = {
     .type_name = "GstEventAtisDec",
     .long_name = "N-MNIST reader",
     .description = "Reads the .bin files of N-MNIST and N-Caltech101",
@@ -199,7 +199,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventatisdec, "eventatisdec", GST_RANK_PRIMARY, even
  * location=events.raw
  * ]|
  */
-static const RecordingFormat csv = {
+static const EventReaderFormat csv = {
     .type_name = "GstEventCsvDec",
     .long_name = "CSV reader",
     .description = "Reads CSV files of events",
@@ -228,7 +228,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_
  * location=events.raw
  * ]|
  */
-static const RecordingFormat npy = {
+static const EventReaderFormat npy = {
     .type_name = "GstEventNpyDec",
     .long_name = "NumPy reader",
     .description = "Reads NumPy files of events",
@@ -255,7 +255,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_
  * location=events.raw
  * ]|
  */
-static const RecordingFormat npz = {
+static const EventReaderFormat npz = {
     .type_name = "GstEventNpzDec",
     .long_name = "NumPy archive reader",
     .description = "Reads NumPy archives of events",
@@ -291,7 +291,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
  * autovideosink
  * ]|
  */
-static const RecordingFormat hdf5 = {
+static const EventReaderFormat hdf5 = {
     .type_name = "GstEventHdf5Dec",
     .long_name = "HDF5 reader",
     .description = "Reads HDF5 files of events: DSEC, TUM-VIE, MVSEC, Metavision, v2e",
@@ -336,7 +336,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, even
  * eventrender ! videoconvert ! autovideosink  d.video_0 ! queue ! videoconvert ! autovideosink
  * ]|
  */
-static const RecordingFormat aedat = {
+static const EventReaderFormat aedat = {
     .type_name = "GstAedatDemux",
     .long_name = "AEDAT demuxer",
     .description = "Reads events and frames from AEDAT files",
@@ -384,7 +384,7 @@ static std::unique_ptr<RecordingDecoder> make_bag_decoder(const GstCaps* /*caps*
   return std::make_unique<eventcamera::BagDecoder>(settings.topics);
 }
 
-static const RecordingFormat mcap = {
+static const EventReaderFormat mcap = {
     .type_name = "GstEventMcapDec",
     .long_name = "MCAP demuxer",
     .description = "Reads events and images from MCAP files, which are ROS 2 bags",
@@ -415,7 +415,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventmcapdec, "eventmcapdec", GST_RANK_PRIMARY, even
  * videoconvert ! autovideosink
  * ]|
  */
-static const RecordingFormat bag = {
+static const EventReaderFormat bag = {
     .type_name = "GstEventBagDec",
     .long_name = "ROS bag demuxer",
     .description = "Reads events and images from ROS bags",

@@ -44,7 +44,7 @@ static const GEnumValue evt_formats[] = {
     {0, nullptr, nullptr},
 };
 
-static const EventFileFormat::Variants evt_variants = {
+static const EventWriterFormat::Variants evt_variants = {
     .property = "format",
     .nick = "Format",
     .blurb =
@@ -55,7 +55,7 @@ static const EventFileFormat::Variants evt_variants = {
 };
 
 static std::unique_ptr<eventcamera::Encoder> make_evt(SensorSize size,
-                                                      EventFileFormat::Choice choice,
+                                                      EventWriterFormat::Choice choice,
                                                       const GstCaps* caps) {
   const auto* words = gst_structure_get_string(gst_caps_get_structure(caps, 0), "format");
   if (const auto format = evt_format_named(words)) return make_evt_encoder(*format, size);
@@ -78,7 +78,7 @@ static GstCaps* fixate_evt(const GstEventCameraInfo& info, int variant, GstCaps*
   return gst_caps_fixate(caps);
 }
 
-static const EventFileFormat evt = {
+static const EventWriterFormat evt = {
     .type_name = "GstEvtEnc",
     .long_name = "Prophesee RAW writer",
     .description = "Writes events as Prophesee RAW, or as EVT words",
@@ -107,12 +107,12 @@ GST_ELEMENT_REGISTER_DEFINE(evtenc, "evtenc", GST_RANK_PRIMARY, event_writer_typ
  * location=test.dat
  * ]|
  */
-static const EventFileFormat dat = {
+static const EventWriterFormat dat = {
     .type_name = "GstEventDatEnc",
     .long_name = "Prophesee DAT writer",
     .description = "Writes events as Prophesee DAT",
     .caps = "application/x-prophesee-dat",
-    .create = [](SensorSize size, EventFileFormat::Choice,
+    .create = [](SensorSize size, EventWriterFormat::Choice,
                  const GstCaps*) { return eventcamera::make_dat_encoder(size); },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_writer_type(dat))
@@ -132,7 +132,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_
  * location=test.es
  * ]|
  */
-static const EventFileFormat::Variants es_variants = {
+static const EventWriterFormat::Variants es_variants = {
     .property = "origin",
     .nick = ES_ORIGIN_NICK,
     .blurb = ES_ORIGIN_BLURB ". Read when the stream begins",
@@ -140,14 +140,14 @@ static const EventFileFormat::Variants es_variants = {
     .default_value = static_cast<int>(eventcamera::EsOrigin::bottom_left),
 };
 
-static const EventFileFormat event_stream = {
+static const EventWriterFormat event_stream = {
     .type_name = "GstEventEsEnc",
     .long_name = "Event Stream writer",
     .description = "Writes events as Event Stream",
     .caps = "application/x-es",
     .variants = &es_variants,
     .create =
-        [](SensorSize size, EventFileFormat::Choice choice, const GstCaps*) {
+        [](SensorSize size, EventWriterFormat::Choice choice, const GstCaps*) {
           return eventcamera::make_event_stream_encoder(
               size, static_cast<eventcamera::EsOrigin>(choice.variant));
         },
@@ -180,7 +180,7 @@ static GType csv_format_type() {
   return enum_type("GstEventCsvFormat", values.data());
 }
 
-static const EventFileFormat::Variants csv_variants = {
+static const EventWriterFormat::Variants csv_variants = {
     .property = "format",
     .nick = "Format",
     .blurb = "Columns, separators, time unit and header; read when the stream begins",
@@ -188,13 +188,13 @@ static const EventFileFormat::Variants csv_variants = {
     .default_value = 0,
 };
 
-static const EventFileFormat csv = {
+static const EventWriterFormat csv = {
     .type_name = "GstEventCsvEnc",
     .long_name = "CSV writer",
     .description = "Writes events as lines of text",
     .caps = "application/x-event-csv",
     .variants = &csv_variants,
-    .create = [](SensorSize size, EventFileFormat::Choice choice,
+    .create = [](SensorSize size, EventWriterFormat::Choice choice,
                  const GstCaps*) -> std::unique_ptr<eventcamera::Encoder> {
       const auto& named = eventcamera::csv_formats()[static_cast<std::size_t>(choice.variant)];
       return std::make_unique<eventcamera::CsvEncoder>(named.format, size);
@@ -217,12 +217,12 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvenc, "eventcsvenc", GST_RANK_PRIMARY, event_
  * location=events.npy
  * ]|
  */
-static const EventFileFormat npy = {
+static const EventWriterFormat npy = {
     .type_name = "GstEventNpyEnc",
     .long_name = "NumPy writer",
     .description = "Writes events as NumPy",
     .caps = "application/x-npy",
-    .create = [](SensorSize, EventFileFormat::Choice,
+    .create = [](SensorSize, EventWriterFormat::Choice,
                  const GstCaps*) -> std::unique_ptr<eventcamera::Encoder> {
       return std::make_unique<eventcamera::NpyEncoder>();
     },
@@ -250,14 +250,14 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpyenc, "eventnpyenc", GST_RANK_PRIMARY, event_
  * location=events.npz
  * ]|
  */
-static const EventFileFormat npz = {
+static const EventWriterFormat npz = {
     .type_name = "GstEventNpzEnc",
     .long_name = "NumPy archive writer",
     .description =
         "Writes events as a NumPy archive: t in microseconds, x and y in pixels, p, and the "
         "sensor's width and height in pixels",
     .caps = "application/x-npz",
-    .create = [](SensorSize size, EventFileFormat::Choice,
+    .create = [](SensorSize size, EventWriterFormat::Choice,
                  const GstCaps*) { return eventcamera::make_npz_encoder(size); },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpzenc, "eventnpzenc", GST_RANK_PRIMARY, event_writer_type(npz))
@@ -298,7 +298,7 @@ static const GEnumValue bag_compressions[] = {
     {0, nullptr, nullptr},
 };
 
-static const EventFileFormat::Variants mcap_variants = {
+static const EventWriterFormat::Variants mcap_variants = {
     .property = "format",
     .nick = "Format",
     .blurb = "Encoding of the events in the messages; read when the stream begins",
@@ -306,7 +306,7 @@ static const EventFileFormat::Variants mcap_variants = {
     .default_value = static_cast<int>(eventcamera::BagEvents::evt3),
 };
 
-static const EventFileFormat::Variants mcap_compressions = {
+static const EventWriterFormat::Variants mcap_compressions = {
     .property = "compression",
     .nick = "Compression",
     .blurb = "Compression of the file; read when the stream begins",
@@ -314,7 +314,7 @@ static const EventFileFormat::Variants mcap_compressions = {
     .default_value = static_cast<int>(eventcamera::BagCompression::none),
 };
 
-static const EventFileFormat mcap = {
+static const EventWriterFormat mcap = {
     .type_name = "GstEventMcapEnc",
     .long_name = "MCAP writer",
     .description = "Writes events as MCAP, a ROS 2 bag",
@@ -322,7 +322,7 @@ static const EventFileFormat mcap = {
     .variants = &mcap_variants,
     .compressions = &mcap_compressions,
     .create =
-        [](SensorSize size, EventFileFormat::Choice choice, const GstCaps*) {
+        [](SensorSize size, EventWriterFormat::Choice choice, const GstCaps*) {
           return eventcamera::make_mcap_encoder(
               {size, static_cast<eventcamera::BagEvents>(choice.variant),
                static_cast<eventcamera::BagCompression>(choice.compression)});

@@ -24,7 +24,7 @@ static gboolean choose_mode(GstPad* sink, GstObject* /*parent*/) {
   return gst_pad_activate_mode(sink, pulls ? GST_PAD_MODE_PULL : GST_PAD_MODE_PUSH, TRUE);
 }
 
-EventReader::EventReader(GstElement* element, const RecordingFormat& format)
+EventReader::EventReader(GstElement* element, const EventReaderFormat& format)
     : element_(element), sink_(add_pad(element, "sink")), format_(format) {
   gst_pad_set_activate_function(sink_, choose_mode);
   gst_pad_set_activatemode_function(

@@ -17,9 +17,9 @@
 #include "gst/base/owned.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/seek_request.hpp"
-#include "gst/recording/pad_bytes.hpp"
-#include "gst/recording/reader_pad.hpp"
-#include "gst/recording/recording_format.hpp"
+#include "gst/recording/eventreader.hpp"
+#include "gst/recording/reader/pad_bytes.hpp"
+#include "gst/recording/reader/reader_pad.hpp"
 #include "src/formats/recording_reader.hpp"
 
 GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
@@ -57,7 +57,7 @@ struct Restart {
 /// and messages.
 class EventReader {
  public:
-  EventReader(GstElement* element, const RecordingFormat& format);
+  EventReader(GstElement* element, const EventReaderFormat& format);
   ~EventReader();
   EventReader(const EventReader&) = delete;
   EventReader& operator=(const EventReader&) = delete;
@@ -153,7 +153,7 @@ class EventReader {
 
   GstElement* element_;
   GstPad* sink_;
-  const RecordingFormat& format_;
+  const EventReaderFormat& format_;
 
   Guarded<Shared> shared_;
   Guarded<ReaderSettings> settings_;

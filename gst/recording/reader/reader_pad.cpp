@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "gst/recording/reader_pad.hpp"
+#include "gst/recording/reader/reader_pad.hpp"
 
 #include <algorithm>
 #include <utility>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "gst/recording/pad_bytes.hpp"
+#include "gst/recording/reader/pad_bytes.hpp"
 
 #include <algorithm>
 #include <utility>
