@@ -12,7 +12,7 @@ using namespace harness;
 /// An element, and whether it draws.
 class EveryOutput : public testing::TestWithParam<std::tuple<const char*, bool>> {};
 INSTANTIATE_TEST_SUITE_P(, EveryOutput,
-                         testing::Combine(testing::ValuesIn(elements), testing::Bool()));
+                         testing::Combine(testing::ValuesIn(simulators), testing::Bool()));
 
 TEST_P(EveryOutput, ComesFromAPool) {
   const auto& [element, draws] = GetParam();

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Filters of events: buffers, timestamps, flags, and what they forget.
-#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
-#include <thread>
 
 #include "src/core/event.hpp"
 #include "tests/elements/event_buffer.hpp"
@@ -425,49 +423,6 @@ TEST_F(HotPixelTest, ReportsFilesThatItCannotWrite) {
   EXPECT_EQ(count_passed(h, 0, hot), 100U);
   gst_element_set_state(h.element(), GST_STATE_READY);
   EXPECT_NE(h.error().find("/nowhere/at/all.txt"), std::string::npos);
-}
-
-class AnyFilter : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Filters, AnyFilter,
-                         testing::Values("eventantiflicker", "eventcrop", "eventdenoise",
-                                         "eventflip", "eventhotpixel", "eventpolarity",
-                                         "eventscale", "eventratecontrol", "eventrefractory",
-                                         "eventtrail"),
-                         [](const auto& element) { return std::string(element.param); });
-
-TEST_P(AnyFilter, TakesSettingsOfAnotherThreadWhilePlaying) {
-  Harness h(GetParam());
-  h.caps(small_sensor);
-  std::atomic<bool> is_done = false;
-  std::thread other([&] {
-    guint count = 0;
-    GParamSpec** specs = g_object_class_list_properties(G_OBJECT_GET_CLASS(h.element()), &count);
-    for (guint round = 0; !is_done; ++round)
-      for (guint i = 0; i < count; ++i) {
-        if ((specs[i]->flags & GST_PARAM_MUTABLE_PLAYING) == 0) continue;
-        GValue value = G_VALUE_INIT;
-        g_object_get_property(G_OBJECT(h.element()), "stats", &value);
-        g_value_unset(&value);
-        g_value_init(&value, specs[i]->value_type);
-        if (G_VALUE_HOLDS_BOOLEAN(&value))
-          g_value_set_boolean(&value, round % 2);
-        else if (G_VALUE_HOLDS_ENUM(&value))
-          g_value_set_enum(
-              &value, static_cast<gint>(round % G_PARAM_SPEC_ENUM(specs[i])->enum_class->n_values));
-        else
-          g_param_value_set_default(specs[i], &value);
-        g_object_set_property(G_OBJECT(h.element()), specs[i]->name, &value);
-        g_value_unset(&value);
-      }
-    g_free(specs);
-  });
-  for (GstClockTime i = 0; i < 300; ++i) {
-    EXPECT_EQ(h.push(buffer_of(i * ms, {on(0), on(10, 2), on(20)}, 1 * ms)), GST_FLOW_OK);
-    h.pull();
-  }
-  is_done = true;
-  other.join();
-  EXPECT_EQ(stat_of(h.element(), "events"), 900U);
 }
 
 }  // namespace

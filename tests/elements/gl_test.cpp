@@ -380,7 +380,7 @@ TEST_P(Busy, DownstreamsRefusalIsToldToUpstreamAtTheNextFrame) {
 
 TEST(OpenGl, IsAnErrorWhereItsContextIsLost) {
   take_over_contexts();
-  for (const std::string element : gpu_elements) {
+  for (const std::string element : gpu_simulators) {
     for (const std::string& out :
          {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of(element)}) {
       Harness h(element);

@@ -31,7 +31,7 @@ inline int repetitions(int usual, int soak) {
 #endif
 }
 
-/// A simulator element between a source and a sink simulated by the test.
+/// An element between a source and a sink simulated by the test.
 namespace harness {
 
 struct Unref {
@@ -49,13 +49,13 @@ using Owned = std::unique_ptr<Type, Unref>;
 
 using Buffer = Owned<GstBuffer>;
 
-inline const char* const elements[] = {"eventsim-frame",   "eventsim-dense",    "eventsim-sparse",
-                                       "eventsim-diff",    "eventsim-dvs",      "gleventsim-frame",
-                                       "gleventsim-dense", "gleventsim-sparse", "gleventsim-diff"};
+inline const char* const simulators[] = {
+    "eventsim-frame",   "eventsim-dense",   "eventsim-sparse",   "eventsim-diff",  "eventsim-dvs",
+    "gleventsim-frame", "gleventsim-dense", "gleventsim-sparse", "gleventsim-diff"};
 
 /// Those that take frames in system memory, and in textures.
-inline const auto cpu_elements = std::span(elements).first<5>();
-inline const auto gpu_elements = std::span(elements).last<4>();
+inline const auto cpu_simulators = std::span(simulators).first<5>();
+inline const auto gpu_simulators = std::span(simulators).last<4>();
 
 inline bool is_on_gpu(const std::string& element) {
   return element.starts_with("gl");

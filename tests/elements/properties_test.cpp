@@ -35,9 +35,9 @@ struct Defaults {
   double unit = 1;  ///< unit of the thresholds set by a test
 };
 
-class EveryElement : public testing::TestWithParam<Defaults> {};
+class EverySimulator : public testing::TestWithParam<Defaults> {};
 INSTANTIATE_TEST_SUITE_P(
-    , EveryElement,
+    , EverySimulator,
     testing::Values(Defaults{"eventsim-frame", 20, false}, Defaults{"eventsim-dense", 2, true},
                     Defaults{"eventsim-sparse", 10, true}, Defaults{"eventsim-diff", 20, true},
                     Defaults{"eventsim-dvs", 0.2, false, 0.1},
@@ -45,7 +45,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Defaults{"gleventsim-sparse", 10, true},
                     Defaults{"gleventsim-diff", 20, true}));
 
-TEST_P(EveryElement, HasTheDefaultsOfTheTable) {
+TEST_P(EverySimulator, HasTheDefaultsOfTheTable) {
   gst_init(nullptr, nullptr);
   Owned<GstElement> element(gst_element_factory_make(GetParam().element, nullptr));
   ASSERT_TRUE(element);
@@ -58,7 +58,7 @@ TEST_P(EveryElement, HasTheDefaultsOfTheTable) {
   }
 }
 
-TEST_P(EveryElement, KeepsWhatIsSet) {
+TEST_P(EverySimulator, KeepsWhatIsSet) {
   gst_init(nullptr, nullptr);
   Owned<GstElement> element(gst_element_factory_make(GetParam().element, nullptr));
   const double positive = 12.5 * GetParam().unit;
@@ -73,7 +73,7 @@ TEST_P(EveryElement, KeepsWhatIsSet) {
   EXPECT_EQ(palette, static_cast<int>(eventcamera::PaletteName::red_blue));
 }
 
-TEST_P(EveryElement, DescribesItself) {
+TEST_P(EverySimulator, DescribesItself) {
   gst_init(nullptr, nullptr);
   Owned<GstElement> element(gst_element_factory_make(GetParam().element, nullptr));
   GstElementFactory* factory = gst_element_get_factory(element.get());
@@ -307,7 +307,7 @@ void control(GstElement* element, const char* property,
   gst_object_unref(source);
 }
 
-TEST_P(EveryElement, HasThresholdsThatChangeOverTime) {
+TEST_P(EverySimulator, HasThresholdsThatChangeOverTime) {
   const double unit = GetParam().unit;
   Harness h(GetParam().element);
   for (const char* property : {"positive-threshold", "negative-threshold"})

@@ -70,7 +70,8 @@ std::ostream& operator<<(std::ostream& out, const Resources& resources) {
 
 /// An element, and whether it draws.
 class Memory : public testing::TestWithParam<std::tuple<const char*, bool>> {};
-INSTANTIATE_TEST_SUITE_P(, Memory, testing::Combine(testing::ValuesIn(elements), testing::Bool()));
+INSTANTIATE_TEST_SUITE_P(, Memory,
+                         testing::Combine(testing::ValuesIn(simulators), testing::Bool()));
 
 TEST_P(Memory, DoesNotGrowFrameByFrame) {
   const auto& [element, draws] = GetParam();
@@ -93,7 +94,7 @@ TEST_P(Memory, DoesNotGrowFrameByFrame) {
 }
 
 class OnTheCpu : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(, OnTheCpu, testing::ValuesIn(cpu_elements));
+INSTANTIATE_TEST_SUITE_P(, OnTheCpu, testing::ValuesIn(cpu_simulators));
 
 TEST_P(OnTheCpu, TakesFramesOf64Megapixels) {
   Player player(

@@ -6,8 +6,8 @@ namespace {
 
 using namespace harness;
 
-class EveryElement : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
+class EverySimulator : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
 
 class AllStates : public testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(, AllStates, testing::ValuesIn(element_lines::element_names()),
@@ -26,7 +26,7 @@ TEST_P(AllStates, AreReachedFromEachOther) {
   EXPECT_EQ(GST_OBJECT_REFCOUNT_VALUE(element.get()), 1);
 }
 
-TEST_P(EveryElement, PlaysAgainAfterAStop) {
+TEST_P(EverySimulator, PlaysAgainAfterAStop) {
   Pipeline pipeline(
       "videotestsrc name=source pattern=ball num-buffers=6 ! video/x-raw,width=80,height=60 ! " +
       with_upload(GetParam()) + " ! fakesink name=sink signal-handoffs=true");
@@ -41,7 +41,7 @@ TEST_P(EveryElement, PlaysAgainAfterAStop) {
   }
 }
 
-TEST_P(EveryElement, IsFreedWhileInUse) {
+TEST_P(EverySimulator, IsFreedWhileInUse) {
   for (int frames = 0; frames < 4; ++frames) {
     bool freed = false;
     {

@@ -36,10 +36,10 @@ bool is_physical(const std::string& element) {
   return element == "eventsim-dvs";
 }
 
-class EveryElement : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
+class EverySimulator : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
 
-TEST_P(EveryElement, GivesTheSameBytesForAnyStrideAndNumberOfThreads) {
+TEST_P(EverySimulator, GivesTheSameBytesForAnyStrideAndNumberOfThreads) {
   Harness h(GetParam());
   h.caps(video(61, 43));
   const auto expected = intervals(h, 4);
@@ -50,7 +50,7 @@ TEST_P(EveryElement, GivesTheSameBytesForAnyStrideAndNumberOfThreads) {
   EXPECT_EQ(intervals(padded, 4, is_on_gpu(GetParam()) ? 20 : 19), expected);
 }
 
-TEST_P(EveryElement, GivesEventsWithinThePictureSorted) {
+TEST_P(EverySimulator, GivesEventsWithinThePictureSorted) {
   Harness h(GetParam());
   h.caps(video(61, 43));
   for (int i = 0; i < 4; ++i) {
@@ -71,7 +71,7 @@ TEST_P(EveryElement, GivesEventsWithinThePictureSorted) {
   }
 }
 
-TEST_P(EveryElement, BeginsAnewWhenTheSizeChanges) {
+TEST_P(EverySimulator, BeginsAnewWhenTheSizeChanges) {
   Harness h(GetParam());
   h.caps(video(61, 43));
   ASSERT_EQ(intervals(h, 4).size(), 3U);
@@ -90,7 +90,7 @@ TEST_P(EveryElement, BeginsAnewWhenTheSizeChanges) {
   EXPECT_NE(h.out_caps().find("width=(int)33"), std::string::npos);
 }
 
-TEST_P(EveryElement, LosesNoIntervalWhenOnlyTheFormatOrTheFramerateChanges) {
+TEST_P(EverySimulator, LosesNoIntervalWhenOnlyTheFormatOrTheFramerateChanges) {
   Harness h(GetParam());
   h.caps(video(32, 24, "GRAY8"));
   h.push(h.flat(0, 50));
@@ -102,7 +102,7 @@ TEST_P(EveryElement, LosesNoIntervalWhenOnlyTheFormatOrTheFramerateChanges) {
   EXPECT_TRUE(h.pull());
 }
 
-TEST_P(EveryElement, SwitchesFromEventsToVideoWithoutLosingAnInterval) {
+TEST_P(EverySimulator, SwitchesFromEventsToVideoWithoutLosingAnInterval) {
   Harness h(GetParam());
   h.caps(video(32, 24));
   h.push(h.flat(0, 50));
@@ -121,7 +121,7 @@ TEST_P(EveryElement, SwitchesFromEventsToVideoWithoutLosingAnInterval) {
   EXPECT_EQ(gst_buffer_get_size(picture.get()), 32U * 24U * 4U);
 }
 
-TEST_P(EveryElement, StandsBesideItsLikes) {
+TEST_P(EverySimulator, StandsBesideItsLikes) {
   Harness h(GetParam());
   h.caps(video(61, 43));
   const auto expected = intervals(h, 6);
@@ -138,7 +138,7 @@ TEST_P(EveryElement, StandsBesideItsLikes) {
   EXPECT_EQ(equal, 16);
 }
 
-TEST_P(EveryElement, TakesPropertiesWhilePlaying) {
+TEST_P(EverySimulator, TakesPropertiesWhilePlaying) {
   Harness h(GetParam());
   h.caps(video(61, 43));
   std::atomic<bool> done = false;
@@ -178,7 +178,7 @@ TEST(Stream, RefusesFramesThatAreTooSmall) {
 /// A frame with an invalid meta.
 GstFlowReturn push_with_meta(const char* format, int stride, gsize offset, gsize size) {
   GstFlowReturn last = GST_FLOW_OK;
-  for (const char* element : cpu_elements) {
+  for (const char* element : cpu_simulators) {
     Harness h(element);
     h.caps(video(320, 240, format));
     GstBuffer* buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
@@ -191,7 +191,7 @@ GstFlowReturn push_with_meta(const char* format, int stride, gsize offset, gsize
                                    strides);
     const GstFlowReturn flow = h.push(buffer);
     EXPECT_EQ(flow != GST_FLOW_OK, h.message(GST_MESSAGE_ERROR) != nullptr);
-    if (element != cpu_elements[0]) {
+    if (element != cpu_simulators[0]) {
       EXPECT_EQ(flow, last) << element;
     }
     last = flow;
@@ -223,7 +223,7 @@ TEST(Stream, RefusesFramesSmallerThanTheirCaps) {
                            Meta{GST_VIDEO_FORMAT_NV12, 62, 42, 2, "NV12 of 62x42 pixels"},
                            Meta{GST_VIDEO_FORMAT_GRAY8, 62, 44, 1, "GRAY8 of 62x44 pixels"},
                            Meta{GST_VIDEO_FORMAT_NV12, 62, 44, 1, "NV12 of 62x44 pixels"}})
-    for (const char* element : cpu_elements) {
+    for (const char* element : cpu_simulators) {
       Harness h(element);
       h.caps(video(62, 44, "NV12"));
       GstBuffer* buffer = h.flat(0, 100);

@@ -9,9 +9,9 @@ using namespace harness;
 const std::string video = "video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1";
 const std::string uneven = "video/x-raw, format=GRAY8, width=32, height=24, framerate=0/1";
 
-class EveryElement : public testing::TestWithParam<const char*> {
+class EverySimulator : public testing::TestWithParam<const char*> {
  protected:
-  EveryElement() : h(GetParam()) {}
+  EverySimulator() : h(GetParam()) {}
 
   /// A frame that differs from the one before.
   GstFlowReturn flash(GstClockTime pts, guint flags = 0) {
@@ -33,23 +33,23 @@ class EveryElement : public testing::TestWithParam<const char*> {
   Harness h;
   bool bright = false;
 };
-INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
+INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
 
-TEST_P(EveryElement, MakesOneIntervalLessThanThereAreFrames) {
+TEST_P(EverySimulator, MakesOneIntervalLessThanThereAreFrames) {
   h.caps(video);
   for (int i = 0; i < 5; ++i) ASSERT_EQ(flash(i * 40 * GST_MSECOND), GST_FLOW_OK);
   for (int i = 1; i < 5; ++i) expect_interval((i - 1) * 40 * GST_MSECOND, i * 40 * GST_MSECOND);
   EXPECT_FALSE(h.pull());
 }
 
-TEST_P(EveryElement, StampsIntervalsOfUnevenFrames) {
+TEST_P(EverySimulator, StampsIntervalsOfUnevenFrames) {
   h.caps(uneven);
   const GstClockTime times[] = {7, 33'333'340, 40'000'000, 140'000'123};
   for (const auto time : times) flash(time);
   for (int i = 1; i < 4; ++i) expect_interval(times[i - 1], times[i]);
 }
 
-TEST_P(EveryElement, SendsAGapForAnIntervalWithoutEvents) {
+TEST_P(EverySimulator, SendsAGapForAnIntervalWithoutEvents) {
   h.caps(video);
   h.push(h.flat(0, 90));
   h.push(h.flat(40 * GST_MSECOND, 90));
@@ -61,7 +61,7 @@ TEST_P(EveryElement, SendsAGapForAnIntervalWithoutEvents) {
   EXPECT_EQ(duration, 40 * GST_MSECOND);
 }
 
-TEST_P(EveryElement, DrawsAPictureForEveryFrameAtItsTime) {
+TEST_P(EverySimulator, DrawsAPictureForEveryFrameAtItsTime) {
   h.caps(video, pictures_of(GetParam()));
   std::vector<std::string> pictures;
   for (int i = 0; i < 6; ++i) {
@@ -86,7 +86,7 @@ TEST_P(EveryElement, DrawsAPictureForEveryFrameAtItsTime) {
   EXPECT_FALSE(h.pull_event(GST_EVENT_GAP));
 }
 
-TEST_P(EveryElement, DrawsWithoutLatency) {
+TEST_P(EverySimulator, DrawsWithoutLatency) {
   h.caps(video, pictures_of(GetParam()));
   gst_harness_set_upstream_latency(h.get(), 5 * GST_MSECOND);
   flash(0);
@@ -94,7 +94,7 @@ TEST_P(EveryElement, DrawsWithoutLatency) {
   EXPECT_EQ(gst_harness_query_latency(h.get()), 5 * GST_MSECOND);
 }
 
-TEST_P(EveryElement, DrawsNothingInAGapOfTheVideo) {
+TEST_P(EverySimulator, DrawsNothingInAGapOfTheVideo) {
   h.caps(video, pictures_of(GetParam()));
   flash(0);
   EXPECT_TRUE(h.pull());
@@ -110,7 +110,7 @@ TEST_P(EveryElement, DrawsNothingInAGapOfTheVideo) {
   EXPECT_EQ(h.warning(), "");
 }
 
-TEST_P(EveryElement, BeginsAnewAfterADiscontinuity) {
+TEST_P(EverySimulator, BeginsAnewAfterADiscontinuity) {
   h.caps(video);
   flash(0);
   flash(40 * GST_MSECOND);
@@ -127,7 +127,7 @@ TEST_P(EveryElement, BeginsAnewAfterADiscontinuity) {
   EXPECT_EQ(h.warning(), "");
 }
 
-TEST_P(EveryElement, BeginsAnewAfterAFrameThatFails) {
+TEST_P(EverySimulator, BeginsAnewAfterAFrameThatFails) {
   for (const auto& out : {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of(GetParam())}) {
     Harness bare(gst_harness_new_parse(GetParam()), GetParam());
     bare.caps(video, out);
@@ -148,7 +148,7 @@ TEST_P(EveryElement, BeginsAnewAfterAFrameThatFails) {
   }
 }
 
-TEST_P(EveryElement, BeginsAnewAfterAFlush) {
+TEST_P(EverySimulator, BeginsAnewAfterAFlush) {
   h.caps(video);
   flash(0);
   flush({h.get()});
@@ -161,7 +161,7 @@ TEST_P(EveryElement, BeginsAnewAfterAFlush) {
   expect_interval(40 * GST_MSECOND, 80 * GST_MSECOND);
 }
 
-TEST_P(EveryElement, BeginsAnewInAnotherSegmentButNotInTheSame) {
+TEST_P(EverySimulator, BeginsAnewInAnotherSegmentButNotInTheSame) {
   h.caps(video);
   flash(0);
   GstSegment segment;
@@ -177,7 +177,7 @@ TEST_P(EveryElement, BeginsAnewInAnotherSegmentButNotInTheSame) {
   expect_interval(5 * GST_SECOND, 5 * GST_SECOND + 40 * GST_MSECOND);
 }
 
-TEST_P(EveryElement, TimesFramesWithoutPtsByTheFramerate) {
+TEST_P(EverySimulator, TimesFramesWithoutPtsByTheFramerate) {
   gst_harness_set_live(h.get(), FALSE);
   h.caps(video);
   for (int i = 0; i < 3; ++i) EXPECT_EQ(flash(GST_CLOCK_TIME_NONE), GST_FLOW_OK);
@@ -191,7 +191,7 @@ TEST_P(EveryElement, TimesFramesWithoutPtsByTheFramerate) {
   EXPECT_EQ(h.warning(), "");
 }
 
-TEST_P(EveryElement, TimesFramesWithoutPtsByTheSegmentAfterASeek) {
+TEST_P(EverySimulator, TimesFramesWithoutPtsByTheSegmentAfterASeek) {
   gst_harness_set_live(h.get(), FALSE);
   h.caps(video);
   flash(GST_CLOCK_TIME_NONE);
@@ -205,7 +205,7 @@ TEST_P(EveryElement, TimesFramesWithoutPtsByTheSegmentAfterASeek) {
   expect_interval(5 * GST_SECOND, 5 * GST_SECOND + 40 * GST_MSECOND);
 }
 
-TEST_P(EveryElement, TimesFramesOfALiveSourceWithoutPtsByTheClock) {
+TEST_P(EverySimulator, TimesFramesOfALiveSourceWithoutPtsByTheClock) {
   h.caps(uneven);
   for (const auto now : {7, 50, 81}) {
     gst_harness_set_time(h.get(), static_cast<GstClockTime>(now) * GST_MSECOND);
@@ -217,7 +217,7 @@ TEST_P(EveryElement, TimesFramesOfALiveSourceWithoutPtsByTheClock) {
   EXPECT_EQ(h.warning(), "");
 }
 
-TEST_P(EveryElement, TimesTheFramesOfASourceOfBytes) {
+TEST_P(EverySimulator, TimesTheFramesOfASourceOfBytes) {
   gst_harness_set_live(h.get(), FALSE);
   h.caps(video);
   GstSegment bytes;
@@ -233,7 +233,7 @@ TEST_P(EveryElement, TimesTheFramesOfASourceOfBytes) {
   EXPECT_EQ(segment->format, GST_FORMAT_TIME);
 }
 
-TEST_P(EveryElement, WarnsOnceWhereNothingTellsTheTimesOfFrames) {
+TEST_P(EverySimulator, WarnsOnceWhereNothingTellsTheTimesOfFrames) {
   gst_harness_set_live(h.get(), FALSE);
   h.caps(uneven);
   for (int i = 0; i < 3; ++i) EXPECT_EQ(flash(GST_CLOCK_TIME_NONE), GST_FLOW_OK);
@@ -242,7 +242,7 @@ TEST_P(EveryElement, WarnsOnceWhereNothingTellsTheTimesOfFrames) {
   EXPECT_EQ(h.warning(), "");
 }
 
-TEST_P(EveryElement, WarnsOfTimeThatRunsBackwards) {
+TEST_P(EverySimulator, WarnsOfTimeThatRunsBackwards) {
   h.caps(video);
   flash(100 * GST_MSECOND);
   EXPECT_EQ(flash(60 * GST_MSECOND), GST_FLOW_OK);
@@ -254,7 +254,7 @@ TEST_P(EveryElement, WarnsOfTimeThatRunsBackwards) {
   EXPECT_NE(h.warning().find("not later"), std::string::npos);
 }
 
-TEST_P(EveryElement, LetsNoIntervalsOverlap) {
+TEST_P(EverySimulator, LetsNoIntervalsOverlap) {
   h.caps(video);
   flash(0);
   flash(100 * GST_MSECOND);
@@ -270,7 +270,7 @@ TEST_P(EveryElement, LetsNoIntervalsOverlap) {
   expect_interval(0, 40 * GST_MSECOND);
 }
 
-TEST_P(EveryElement, CutsIntervalsThatEventsCannotCount) {
+TEST_P(EverySimulator, CutsIntervalsThatEventsCannotCount) {
   h.caps(uneven);
   flash(0);
   const GstClockTime max_interval = GstClockTime{0xffffffff} * 1000;
@@ -281,7 +281,7 @@ TEST_P(EveryElement, CutsIntervalsThatEventsCannotCount) {
   EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
 }
 
-TEST_P(EveryElement, HoldsTheLastFrameThroughAGapOfTheVideo) {
+TEST_P(EverySimulator, HoldsTheLastFrameThroughAGapOfTheVideo) {
   h.caps(video);
   gst_harness_push_event(h.get(), gst_event_new_gap(0, 10 * GST_MSECOND));
   EXPECT_TRUE(h.pull_event(GST_EVENT_GAP));  // no interval has started: forwarded unchanged
@@ -297,7 +297,7 @@ TEST_P(EveryElement, HoldsTheLastFrameThroughAGapOfTheVideo) {
   expect_interval(110 * GST_MSECOND, 150 * GST_MSECOND);
 }
 
-TEST_P(EveryElement, GoesOnAfterAGapInVideoOfAnyFramerate) {
+TEST_P(EverySimulator, GoesOnAfterAGapInVideoOfAnyFramerate) {
   h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=0/1");
   flash(0);
   gst_harness_push_event(h.get(), gst_event_new_gap(40 * GST_MSECOND, 80 * GST_MSECOND));
@@ -308,7 +308,7 @@ TEST_P(EveryElement, GoesOnAfterAGapInVideoOfAnyFramerate) {
   EXPECT_EQ(GST_BUFFER_PTS(events.get()) + GST_BUFFER_DURATION(events.get()), 120 * GST_MSECOND);
 }
 
-TEST_P(EveryElement, RefusesToRunBackwards) {
+TEST_P(EverySimulator, RefusesToRunBackwards) {
   h.caps(video);
   flash(0);
   play_backwards(h);
@@ -320,7 +320,7 @@ TEST_P(EveryElement, RefusesToRunBackwards) {
   EXPECT_EQ(flash(120 * GST_MSECOND), GST_FLOW_OK);
 }
 
-TEST_P(EveryElement, SendsEosAfterTheLastInterval) {
+TEST_P(EverySimulator, SendsEosAfterTheLastInterval) {
   h.caps(video);
   flash(0);
   flash(40 * GST_MSECOND);
@@ -330,7 +330,7 @@ TEST_P(EveryElement, SendsEosAfterTheLastInterval) {
   EXPECT_FALSE(h.pull());
 }
 
-TEST_P(EveryElement, IsOneFrameLate) {
+TEST_P(EverySimulator, IsOneFrameLate) {
   h.caps(video);
   EXPECT_TRUE(h.message(GST_MESSAGE_LATENCY));
   gst_harness_set_upstream_latency(h.get(), 5 * GST_MSECOND);
@@ -340,7 +340,7 @@ TEST_P(EveryElement, IsOneFrameLate) {
   EXPECT_EQ(gst_harness_query_latency(h.get()), 25 * GST_MSECOND);
 }
 
-TEST_P(EveryElement, LearnsThatFramesComeSlowerThanTheCapsSay) {
+TEST_P(EverySimulator, LearnsThatFramesComeSlowerThanTheCapsSay) {
   h.caps(video);
   flash(0);
   flash(40 * GST_MSECOND);
@@ -350,7 +350,7 @@ TEST_P(EveryElement, LearnsThatFramesComeSlowerThanTheCapsSay) {
   EXPECT_EQ(gst_harness_query_latency(h.get()), 80 * GST_MSECOND);
 }
 
-TEST_P(EveryElement, DoesNotDelayTheViewAfterOnePause) {
+TEST_P(EverySimulator, DoesNotDelayTheViewAfterOnePause) {
   h.caps(video);
   h.message(GST_MESSAGE_LATENCY);
   GstClockTime time = 0;
@@ -363,7 +363,7 @@ TEST_P(EveryElement, DoesNotDelayTheViewAfterOnePause) {
   EXPECT_FALSE(h.message(GST_MESSAGE_LATENCY));
 }
 
-TEST_P(EveryElement, ReturnsToItsLatencyWithinASecond) {
+TEST_P(EverySimulator, ReturnsToItsLatencyWithinASecond) {
   h.caps(video);
   GstClockTime time = 0;
   for (int i = 0; i < 4; ++i) flash(time += 300 * GST_MSECOND);
@@ -376,7 +376,7 @@ TEST_P(EveryElement, ReturnsToItsLatencyWithinASecond) {
   EXPECT_FALSE(h.message(GST_MESSAGE_LATENCY));
 }
 
-TEST_P(EveryElement, KeepsLatenessFromUpstream) {
+TEST_P(EverySimulator, KeepsLatenessFromUpstream) {
   h.caps(video);
   flash(0);
   gst_harness_push_upstream_event(
@@ -387,7 +387,7 @@ TEST_P(EveryElement, KeepsLatenessFromUpstream) {
   }
 }
 
-TEST_P(EveryElement, LearnsItsLatencyWhereTheFramerateVaries) {
+TEST_P(EverySimulator, LearnsItsLatencyWhereTheFramerateVaries) {
   h.caps(uneven);
   EXPECT_EQ(gst_harness_query_latency(h.get()), 0U);
   flash(0);

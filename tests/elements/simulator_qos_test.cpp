@@ -14,11 +14,11 @@ constexpr GstClockTime ms = GST_MSECOND;
 const std::string video = "video/x-raw, format=GRAY8, width=32, height=24, framerate=5/1";
 const std::string pictures = "video/x-raw, format=GRAY8";
 
-class EveryElement : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
+class EverySimulator : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
 
-class EveryElementOnTheCpu : public EveryElement {};
-INSTANTIATE_TEST_SUITE_P(, EveryElementOnTheCpu, testing::ValuesIn(cpu_elements));
+class EverySimulatorOnTheCpu : public EverySimulator {};
+INSTANTIATE_TEST_SUITE_P(, EverySimulatorOnTheCpu, testing::ValuesIn(cpu_simulators));
 
 constexpr GstClockTime frame_time(int i) {
   return static_cast<GstClockTime>(i) * 200 * ms;
@@ -70,7 +70,7 @@ std::vector<std::string> output(Harness& h, bool is_slow) {
   return intervals;
 }
 
-TEST_P(EveryElement, SkipsWholeFramesWhereDownstreamIsLate) {
+TEST_P(EverySimulator, SkipsWholeFramesWhereDownstreamIsLate) {
   for (const bool draws : {true, false}) {
     Harness h(std::string(GetParam()) + (draws ? "" : " qos=true"));
     h.caps(video, draws ? pictures_of(GetParam()) : GST_EVENT_CAMERA_MEDIA_TYPE);
@@ -100,7 +100,7 @@ TEST_P(EveryElement, SkipsWholeFramesWhereDownstreamIsLate) {
   }
 }
 
-TEST_P(EveryElement, SkipsFramesOfPicturesUnlessToldOtherwise) {
+TEST_P(EverySimulator, SkipsFramesOfPicturesUnlessToldOtherwise) {
   const auto skipped = [](const std::string& launch, const std::string& out) {
     Harness h(launch);
     h.caps(video, out);
@@ -117,7 +117,7 @@ TEST_P(EveryElement, SkipsFramesOfPicturesUnlessToldOtherwise) {
   EXPECT_EQ(skipped(element + " qos=true", GST_EVENT_CAMERA_MEDIA_TYPE), 2U);
 }
 
-TEST_P(EveryElement, SkipsNothingAfterAFlush) {
+TEST_P(EverySimulator, SkipsNothingAfterAFlush) {
   Harness h(GetParam());
   h.caps(video, pictures_of(GetParam()));
   h.push(frame_at(h, 0));
@@ -167,7 +167,7 @@ GstBuffer* slow_frame(const Harness& h, int i, GstClockTime work) {
   return frame;
 }
 
-TEST_P(EveryElementOnTheCpu, ReportsTheLatencyOfProcessing) {
+TEST_P(EverySimulatorOnTheCpu, ReportsTheLatencyOfProcessing) {
   Harness h(GetParam());
   h.caps(video);
   auto latency = [&, i = 0](GstClockTime work) mutable {

@@ -11,10 +11,10 @@ using namespace harness;
 
 const std::string size = ", width=32, height=24, framerate=25/1";
 
-class EveryElement : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
+class EverySimulator : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
 
-TEST_P(EveryElement, MakesEventsWhereDownstreamTakesAnything) {
+TEST_P(EverySimulator, MakesEventsWhereDownstreamTakesAnything) {
   Harness h(GetParam());
   h.caps("video/x-raw, format=GRAY8" + size, "ANY");
   EXPECT_EQ(h.out_caps(),
@@ -22,13 +22,13 @@ TEST_P(EveryElement, MakesEventsWhereDownstreamTakesAnything) {
             "format=(string)XYTP");
 }
 
-TEST_P(EveryElement, MakesEventsWhereDownstreamPrefersVideoButTakesBoth) {
+TEST_P(EverySimulator, MakesEventsWhereDownstreamPrefersVideoButTakesBoth) {
   Harness h(GetParam());
   h.caps("video/x-raw, format=GRAY8" + size, "video/x-raw(ANY); application/x-event-camera");
   EXPECT_EQ(h.out_caps().rfind("application/x-event-camera", 0), 0U) << h.out_caps();
 }
 
-TEST_P(EveryElement, MakesVideoWhereDownstreamTakesOnlyThat) {
+TEST_P(EverySimulator, MakesVideoWhereDownstreamTakesOnlyThat) {
   const bool is_gl = is_on_gpu(GetParam());
   Harness h(GetParam());
   h.caps("video/x-raw, format=I420, pixel-aspect-ratio=4/3, interlace-mode=progressive" + size,
