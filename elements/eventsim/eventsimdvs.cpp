@@ -65,6 +65,7 @@
 #include "gst/base/named_file.hpp"
 #include "gst/base/types.hpp"
 #include "gst/simulator/eventsimulator.hpp"
+#include "gst/simulator/luma_video_simulator.hpp"
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/dvs_simulator.hpp"
 

@@ -10,6 +10,7 @@
 #include "gst/base/video_frame.hpp"
 #include "gst/simulator/buffers.hpp"
 #include "gst/simulator/caps.hpp"
+#include "gst/simulator/frame_luma.hpp"
 
 #define GST_CAT_DEFAULT event_simulator_debug
 

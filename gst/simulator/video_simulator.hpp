@@ -3,7 +3,6 @@
 
 #include <gst/video/video.h>
 
-#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -11,9 +10,7 @@
 
 #include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
-#include "gst/drawing/drawn_video.hpp"
-#include "gst/simulator/frame_luma.hpp"
-#include "src/render/accumulator.hpp"
+#include "src/render/palette.hpp"
 #include "src/simulate/simulator.hpp"
 
 /// An interval between two frames.
@@ -91,63 +88,4 @@ inline VideoSimulatorError cannot_draw(const std::string& fault) {
   return {{GST_RESOURCE_ERROR_FAILED,
            "Cannot draw into an output buffer: " + fault + ". Check the element downstream."},
           fault};
-}
-
-/// Simulator of frames in system memory.
-class LumaVideoSimulator final : public VideoSimulator {
- public:
-  LumaVideoSimulator(GObject* element, const GstVideoInfo& video,
-                     std::unique_ptr<eventcamera::Simulator> simulator)
-      : element_(element), video_(video), luma_(video), simulator_(std::move(simulator)) {}
-
-  void set_video(const GstVideoInfo& video) override {
-    video_ = video;
-    luma_ = FrameLuma(video);
-  }
-
-  void set_drawn_video(const GstVideoInfo& drawn) override {
-    drawing_ = Drawing{drawn, {GST_VIDEO_INFO_WIDTH(&drawn), GST_VIDEO_INFO_HEIGHT(&drawn)}};
-  }
-
-  void push(Interval interval, const eventcamera::Settings& settings) override {
-    const auto* events = simulate(interval.frame.get(), interval.end, settings);
-    event_simulator_push_interval(element_, std::move(interval), events);
-  }
-
-  void draw(OwnedBuffer frame, eventcamera::Nanoseconds time, const eventcamera::Settings& settings,
-            const eventcamera::Palette& palette, GstBuffer* picture) override {
-    const auto* events = simulate(frame.get(), time, settings);
-    const VideoFrame mapped(drawing_->video, picture, GST_MAP_WRITE);
-    if (!mapped) throw cannot_draw(mapped.fault());
-    if (events != nullptr) drawing_->accumulator.add(*events, simulator_->threads());
-    drawing_->accumulator.draw(palette, pixel_layout_of(drawing_->video), mapped.data(),
-                               mapped.stride(), simulator_->threads());
-  }
-
-  eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
-
- private:
-  struct Drawing {
-    GstVideoInfo video;
-    eventcamera::Accumulator accumulator;
-  };
-
-  const eventcamera::EventBuckets* simulate(GstBuffer* frame, eventcamera::Nanoseconds time,
-                                            const eventcamera::Settings& settings) {
-    const VideoFrame mapped(video_, frame, GST_MAP_READ);
-    if (!mapped) throw cannot_read(mapped.fault());
-    return simulator_->push(luma_.of(mapped, simulator_->threads()), time, settings);
-  }
-
-  GObject* element_;
-  GstVideoInfo video_;
-  FrameLuma luma_;
-  std::optional<Drawing> drawing_;
-  std::unique_ptr<eventcamera::Simulator> simulator_;
-};
-
-/// For EventSimulatorMethod::create: a simulator made by `make` from the format of the luma.
-template <auto make>
-std::unique_ptr<VideoSimulator> in_system_memory(GObject* element, const GstVideoInfo& video) {
-  return std::make_unique<LumaVideoSimulator>(element, video, make(FrameLuma::format_of(video)));
 }

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "src/dvs/dvs_settings.hpp"
-#include "src/dvs/light_response.hpp"
+#include "src/dvs/shade_tables.hpp"
 #include "src/dvs/state_bytes.hpp"
 #include "src/dvs/sub_intervals.hpp"
 

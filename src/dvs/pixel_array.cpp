@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "src/dvs/shot_noise.hpp"
 
 namespace eventcamera {
 namespace {
@@ -46,7 +47,6 @@ bool Mismatch::is_hot(std::uint64_t pixel) const {
 }
 
 PixelTraits Mismatch::of(std::uint64_t pixel) const {
-  constexpr double never = std::numeric_limits<double>::infinity();
   if (defect_of(pixel) < settings_.dead_pixels) return {never, never, 0};
 
   const auto [positive, negative] = fixed_thresholds(pixel);

@@ -9,21 +9,11 @@
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
 #include "src/core/label.hpp"
-#include "src/dvs/light_response.hpp"
+#include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/random.hpp"
 #include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
-
-/// Draws the noise budget of a pixel: the expected shot noise until its next noise event,
-/// 1/noise_unit. Shot noise is a Poisson process whose rate depends on the light: its next event
-/// fires when the integral of the rate has used up the budget, which is exponentially distributed
-/// with mean 1.
-inline std::uint32_t draw_noise_budget(const Random& random, std::uint64_t pixel,
-                                       Random::Purpose purpose, std::uint64_t counter) {
-  const double drawn = random.exponential(pixel, purpose, counter) * noise_unit;
-  return static_cast<std::uint32_t>(std::clamp(drawn, 1.0, 4294967294.0));
-}
 
 /// The properties of one pixel.
 struct PixelTraits {

@@ -6,9 +6,9 @@
 
 #include "src/dvs/adaptation.hpp"
 #include "src/dvs/interval_events.hpp"
-#include "src/dvs/light_response.hpp"
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/row_filter.hpp"
+#include "src/dvs/shade_tables.hpp"
 #include "src/dvs/sub_intervals.hpp"
 
 namespace eventcamera {

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "src/dvs/light_response.hpp"
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/run.hpp"
+#include "src/dvs/shade_tables.hpp"
 #include "src/dvs/sub_intervals.hpp"
 
 namespace eventcamera {

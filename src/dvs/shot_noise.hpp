@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "src/dvs/pixel_array.hpp"
+#include "src/dvs/random.hpp"
 
 namespace eventcamera {
 
@@ -13,6 +13,19 @@ inline constexpr double never = std::numeric_limits<double>::infinity();
 
 /// Maximum number of random numbers that a pixel draws in a sub-interval.
 inline constexpr std::uint64_t draws_per_sub_interval = 1 << 16;
+
+/// Shot noise is counted in fixed point, in units of 1/noise_unit events.
+inline constexpr double noise_unit = 1 << 27;
+
+/// Draws the noise budget of a pixel: the expected shot noise until its next noise event,
+/// 1/noise_unit. Shot noise is a Poisson process whose rate depends on the light: its next event
+/// fires when the integral of the rate has used up the budget, which is exponentially distributed
+/// with mean 1.
+inline std::uint32_t draw_noise_budget(const Random& random, std::uint64_t pixel,
+                                       Random::Purpose purpose, std::uint64_t counter) {
+  const double drawn = random.exponential(pixel, purpose, counter) * noise_unit;
+  return static_cast<std::uint32_t>(std::clamp(drawn, 1.0, 4294967294.0));
+}
 
 /// Shot noise of a pixel in a sub-interval, in units of 1/noise_unit events.
 struct ShotNoise {
