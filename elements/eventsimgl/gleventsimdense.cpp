@@ -7,8 +7,8 @@
  * #GstEventSimDense for video in OpenGL textures, with compute shaders. The same flow gives the
  * same events. The flow differs in the last bits of floating-point numbers, and more if the CPU
  * computes it only around changed pixels, with another pyramid and other borders. Needs OpenGL ES
- * 3.1 or OpenGL 4.3; works without a screen, beside other elements of OpenGL with the environment
- * variable GST_GL_WINDOW=egl-device.
+ * 3.1 or OpenGL 4.3. Works without a screen; beside other elements of OpenGL, only if the
+ * environment variable GST_GL_WINDOW is egl-device.
  *
  * ## Example launch line
  * |[

@@ -11,9 +11,9 @@
  * @short_description: events from the difference of two frames, on the GPU
  *
  * #GstEventSimFrame for video in OpenGL textures, with compute shaders; the same frames give the
- * same events. Needs OpenGL ES 3.1 or OpenGL 4.3; works without a screen, beside other elements of
- * OpenGL with the environment variable GST_GL_WINDOW=egl-device. Use it for video that is already
- * in GPU memory; video in system memory is uploaded first.
+ * same events. Needs OpenGL ES 3.1 or OpenGL 4.3. Works without a screen; beside other elements of
+ * OpenGL, only if the environment variable GST_GL_WINDOW is egl-device. Use it for video that is
+ * already in GPU memory; video in system memory is uploaded first.
  *
  * ## Example launch line
  * |[
@@ -38,8 +38,8 @@ GST_ELEMENT_REGISTER_DEFINE(gleventsim_frame, "gleventsim-frame", GST_RANK_NONE,
  *
  * #GstEventSimSparse for video in OpenGL textures, with compute shaders. The same tracks give the
  * same events; tracks differ at most in the last bits of floating-point numbers. Needs OpenGL ES
- * 3.1 or OpenGL 4.3; works without a screen, beside other elements of OpenGL with the environment
- * variable GST_GL_WINDOW=egl-device.
+ * 3.1 or OpenGL 4.3. Works without a screen; beside other elements of OpenGL, only if the
+ * environment variable GST_GL_WINDOW is egl-device.
  *
  * ## Example launch line
  * |[
@@ -66,8 +66,8 @@ GST_ELEMENT_REGISTER_DEFINE(gleventsim_sparse, "gleventsim-sparse", GST_RANK_NON
  *
  * #GstEventSimDiff for video in OpenGL textures, with compute shaders. The same tracks give the
  * same events; tracks differ at most in the last bits of floating-point numbers. Needs OpenGL ES
- * 3.1 or OpenGL 4.3; works without a screen, beside other elements of OpenGL with the environment
- * variable GST_GL_WINDOW=egl-device.
+ * 3.1 or OpenGL 4.3. Works without a screen; beside other elements of OpenGL, only if the
+ * environment variable GST_GL_WINDOW is egl-device.
  *
  * ## Example launch line
  * |[

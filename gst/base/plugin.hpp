@@ -3,8 +3,6 @@
 
 #include <gst/gst.h>
 
-#include "gst/base/authors.hpp"
-
 #define PACKAGE "gst-eventsim"
 
 // clang-format off

@@ -45,7 +45,7 @@ struct Flow {
 enum class FlowMethod {
   dis_lq,      ///< DIS, low quality and fast: patches of 4 at strides of 3, 8 iterations, 3 scales
   dis_hq,      ///< DIS, high quality: patches of 8 at strides of 4, 32 iterations
-  farneback,   ///< Farneback: up to 4 levels, window 15, 3 iterations, polynomials of 5 pixels
+  farneback,   ///< Farneback: up to 4 levels, 2 to 5 iterations, polynomials of 5 pixels
   opencv_dis,  ///< OpenCV's DIS with the parameters of dis_hq; only in builds with OpenCV
   dis_mq,      ///< dis_lq with 4 scales or more, to an eighth of the size, and propagation
 };
