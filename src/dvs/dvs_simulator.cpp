@@ -226,6 +226,9 @@ class PixelSimulator final : public DvsSimulator {
     if (settings_ != current_) change_to(settings_);
     if (current_.max_rate > 0 && !readout_) readout_.emplace(format().width, format().height);
     const double duration = in_microseconds(interval.duration());
+    const auto rounding_of = [](Nanoseconds time) { return in_microseconds(time % 1000); };
+    next_rounding_ =
+        std::max(0.0, rounding_of(*last_time_ + interval.duration()) - rounding_of(*last_time_));
     fired_.begin(duration, band_count(format().height), readout_ ? unread_ : events);
     scratch_.resize(static_cast<std::size_t>(threads().threads()));
     return duration;
@@ -379,9 +382,16 @@ class PixelSimulator final : public DvsSimulator {
     candidates.count = 0;
     filter_run(filter_of(sub_interval, tables), luma, pixels, run, candidates);
     if (candidates.count == 0) return;
-    const RowToSolve solved{current_,     dynamics_, random_,
-                            sub_interval, tables,    pixels,
-                            candidates,   events,    clock_ + sub_interval.begin};
+    const RowToSolve solved{current_,
+                            dynamics_,
+                            random_,
+                            sub_interval,
+                            tables,
+                            pixels,
+                            candidates,
+                            events,
+                            clock_ + sub_interval.begin,
+                            i + 1 == plan.sub_intervals.size() ? next_rounding_ : 0};
     switch (solver_) {
       case Solver::pixels:
         return solve_pixels(solved);
@@ -490,7 +500,8 @@ class PixelSimulator final : public DvsSimulator {
   std::vector<float> responses_;  ///< by luma value
   ExposurePulse pulse_;
   IntervalPlans plans_;
-  double clock_ = 0;  ///< start of this interval, microseconds since the first frame
+  double clock_ = 0;          ///< start of this interval, microseconds since the first frame
+  double next_rounding_ = 0;  ///< RowToSolve::next_rounding of its last sub-interval
   IntervalEvents fired_;
   EventBuckets unread_;        ///< events that go to the readout
   std::vector<Event> sorted_;  ///< the same, sorted

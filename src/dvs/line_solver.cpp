@@ -79,9 +79,11 @@ class Pixels {
     store(row, some, lanes, values);
   }
 
-  /// Stores what is left of refractory periods, if any is or was.
+  /// Stores RowToSolve::refractory_left(), if any is or was.
   void store_refractory_left(const RowToSolve& row, Values ready) const {
-    const auto left = hn::Max(all(0), hn::Sub(ready, all(row.sub_interval.duration)));
+    auto left = hn::Max(all(0), hn::Sub(ready, all(row.sub_interval.duration)));
+    const auto is_short = hn::And(hn::Gt(left, all(0)), hn::Lt(left, all(min_gap)));
+    left = hn::Add(left, hn::IfThenElseZero(is_short, all(row.next_rounding)));
     const auto is_or_was = hn::Gt(hn::Max(left, load(row, Candidates::refractory_left)), all(0));
     if (hn::AllFalse(Doubles(), hn::And(is_or_was, exist()))) return;
     store(row, left, row.pixels.refractory_left);

@@ -163,7 +163,7 @@ class Pixel {
     pixels_.reference[x_] = static_cast<float>(reference_ - leak_ * end_.t);
     pixels_.positive[x_] = static_cast<float>(positive_);
     pixels_.negative[x_] = static_cast<float>(negative_);
-    pixels_.refractory_left[x_] = static_cast<float>(std::max(0.0, ready_ - end_.t));
+    pixels_.refractory_left[x_] = static_cast<float>(row_.refractory_left(ready_));
     pixels_.noise_budget[x_] = noise_.left();
     if (adaptation_.is_on()) pixels_.growth_end[x_] = growth_end_;
   }

@@ -48,8 +48,18 @@ struct RowToSolve {
   const Candidates& candidates;
   const IntervalEvents::Band& events;
   double start;  ///< of the sub-interval, microseconds since the first frame
+  /// By how much more the start of the next interval is rounded down to microseconds than that of
+  /// this one, if the sub-interval is the last; else 0.
+  double next_rounding;
 
   bool has_labels() const { return pixels.last_cause != nullptr; }
+
+  /// Rest of the refractory period at the end of the sub-interval. A rest of less than min_gap
+  /// comes after an event in the last microsecond, which must not be that of the next one.
+  double refractory_left(double ready) const {
+    const double left = std::max(0.0, ready - sub_interval.duration);
+    return left > 0 && left < min_gap ? left + next_rounding : left;
+  }
 
   /// Cause of a crossing by pixel x, whose threshold is falling at `fall`, in light to which its
   /// signal answers with the slope `light`; both per microsecond (docs/methods.md).

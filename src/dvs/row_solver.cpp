@@ -412,8 +412,8 @@ class RowSolver {
     const double reference =
         unsolved_.column(Column::sign)[i] * unsolved_.column(Column::reference)[i];
     pixels.reference[x] = static_cast<float>(reference - fall_of(x) * duration_);
-    const double ready = unsolved_.column(Column::ready)[i];
-    pixels.refractory_left[x] = static_cast<float>(std::max(0.0, ready - duration_));
+    pixels.refractory_left[x] =
+        static_cast<float>(row_.refractory_left(unsolved_.column(Column::ready)[i]));
     auto& noise = unsolved_.noise[index];
     noise.skip(row_.random, row_.pixels.first_number + static_cast<std::uint64_t>(x),
                unsolved_.draws[index]);

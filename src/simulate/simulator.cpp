@@ -16,12 +16,13 @@ std::optional<StepTimes> IntervalSimulator::steps_to(Nanoseconds time, const Set
 const EventBuckets* IntervalSimulator::hold_until(Nanoseconds time, const Settings& settings) {
   assert(!last_time_ || time >= *last_time_);
   if (!last_time_) return nullptr;
-  const Nanoseconds duration = time - *last_time_;
-  last_time_ = time;
-  if (duration <= 0 || duration > max_interval) return nullptr;
   threads_.set_threads(settings.threads);
   labels_ = settings.labels;
-  return hold(StepTimes(duration, 1), settings, events_) ? &events_ : nullptr;
+  const Nanoseconds duration = time - *last_time_;
+  const bool has_noise =
+      duration > 0 && duration <= max_interval && hold(StepTimes(duration, 1), settings, events_);
+  last_time_ = time;
+  return has_noise ? &events_ : nullptr;
 }
 
 void IntervalSimulator::reset() {

@@ -105,7 +105,7 @@ class IntervalSimulator {
   /// Fills `events` with noise events of an unchanged frame; false if the simulator has no noise.
   virtual bool hold(const StepTimes&, const Settings&, EventBuckets&) { return false; }
 
-  std::optional<Nanoseconds> last_time_;
+  std::optional<Nanoseconds> last_time_;       ///< of the last frame, where an interval begins
   std::optional<ImageView<Flow>> given_flow_;  ///< of the next interval
   EventBuckets events_;
 
