@@ -211,6 +211,9 @@ bool StreamSimulation::accept_time(GstBuffer* frame) {
   if (last && time <= *last) {
     warn_of_times("a frame is not later than the previous one");
     forget_frames();
+  } else if (last && time - *last < Nanoseconds{event_resolution}) {
+    warn_of_times("two frames are less than a microsecond apart");
+    forget_frames();
   } else if (last && time - *last > eventcamera::max_interval) {
     warn_of_times("two frames are more than 71 minutes apart");
     forget_frames();
@@ -314,24 +317,31 @@ bool StreamSimulation::take_gap(GstEvent* event) {
   return false;
 }
 
-/// Holds the last frame until `end` and pushes the events of that time, or a GAP if there are none.
-/// May throw.
+/// Holds the last frame until `end` and pushes the events of that time, and GAPs where there are
+/// none. In parts, as a pixel has a maximum number of events in each. May throw.
 void StreamSimulation::hold_until(Nanoseconds end, guint32 seqnum) {
-  const Nanoseconds start = *state_->simulator().last_time();
-  sync_controlled_properties(static_cast<GstClockTime>(end));
-  const EventBuckets* events = state_->simulator().hold_until(end, begin_interval().simulation);
-  stream_.handed_out_until = end;
-  auto& flow = stream_.flow;
-  if (events == nullptr || events->size() == 0) {
-    flow = push_gap(start, end, seqnum);
-    return;
+  constexpr auto max_part = Nanoseconds{250 * GST_MSECOND};
+  auto& simulator = state_->simulator();
+  auto& flow = stream_.flow = GST_FLOW_OK;
+  Nanoseconds sent = *simulator.last_time();
+  for (Nanoseconds start = sent; start < end && flow == GST_FLOW_OK;) {
+    const Nanoseconds part_end = std::min(start + max_part, end);
+    sync_controlled_properties(static_cast<GstClockTime>(part_end));
+    const EventBuckets* events = simulator.hold_until(part_end, begin_interval().simulation);
+    stream_.handed_out_until = part_end;
+    if (events != nullptr && events->size() > 0) {
+      if (sent < start) flow = push_gap(sent, start, seqnum);
+      const OwnedBuffer in(gst_buffer_new());
+      OwnedBuffer out;
+      if (flow == GST_FLOW_OK) flow = write_events(*events, in.get(), start, part_end, out);
+      if (flow == GST_FLOW_OK)
+        flow = push_buffer(std::move(out), static_cast<GstClockTime>(start),
+                           static_cast<GstClockTime>(part_end - start));
+      sent = part_end;
+    }
+    start = part_end;
   }
-  const OwnedBuffer in(gst_buffer_new());
-  OwnedBuffer out;
-  flow = write_events(*events, in.get(), start, end, out);
-  if (flow == GST_FLOW_OK)
-    flow = push_buffer(std::move(out), static_cast<GstClockTime>(start),
-                       static_cast<GstClockTime>(end - start));
+  if (sent < end && flow == GST_FLOW_OK) flow = push_gap(sent, end, seqnum);
 }
 
 /* intervals out */

@@ -254,6 +254,16 @@ TEST_P(EverySimulator, WarnsOfTimeThatRunsBackwards) {
   EXPECT_NE(h.warning().find("not later"), std::string::npos);
 }
 
+TEST_P(EverySimulator, TakesNoIntervalShorterThanTheResolutionOfEvents) {
+  h.caps(video);
+  flash(1500);
+  EXPECT_EQ(flash(2300), GST_FLOW_OK);
+  EXPECT_FALSE(h.pull());
+  EXPECT_NE(h.warning().find("less than a microsecond apart"), std::string::npos);
+  flash(3300);
+  expect_interval(2300, 3300);
+}
+
 TEST_P(EverySimulator, LetsNoIntervalsOverlap) {
   h.caps(video);
   flash(0);
@@ -416,6 +426,26 @@ TEST(Dvs, SendsTheNoiseOfAGap) {
   ASSERT_TRUE(next);
   EXPECT_EQ(GST_BUFFER_PTS(next.get()), 100 * GST_MSECOND);
   EXPECT_EQ(GST_BUFFER_DURATION(next.get()), 40 * GST_MSECOND);
+}
+
+TEST(Dvs, SendsTheNoiseOfAGapOfAnyLength) {
+  const std::pair<int, double> gaps[] = {{10, 100}, {4500, 0.1}};  // seconds, events per second
+  for (const auto& [seconds, rate] : gaps) {
+    Harness h("eventsim-dvs leak-rate=" + std::to_string(rate));
+    h.caps(video);
+    h.push(h.flat(0, 90));
+    const auto end = static_cast<GstClockTime>(seconds) * GST_SECOND;
+    gst_harness_push_event(h.get(), gst_event_new_gap(0, end));
+    double events = 0;
+    GstClockTime until = 0;
+    while (const auto held = h.pull()) {
+      EXPECT_GE(GST_BUFFER_PTS(held.get()), until);
+      until = GST_BUFFER_PTS(held.get()) + GST_BUFFER_DURATION(held.get());
+      events += static_cast<double>(events_of(held.get()).size());
+    }
+    EXPECT_LE(until, end);
+    EXPECT_NEAR(events, 32 * 24 * (seconds - 0.04) * rate, 32 * 24);
+  }
 }
 
 }  // namespace
