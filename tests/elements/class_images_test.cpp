@@ -431,8 +431,9 @@ std::vector<std::vector<int>> rows_of(const std::string& launch, const std::stri
 }
 
 TEST(ClassImagesInPipelines, StayWithTheirEventsInFilters) {
-  for (const char* filter : {"identity", "eventdenoise", "eventhotpixel", "eventrefractory",
-                             "eventtrail", "eventratecontrol max-rate=2000", "eventpolarity"})
+  for (const char* filter :
+       {"identity", "eventantiflicker", "eventdenoise", "eventhotpixel", "eventrefractory",
+        "eventtrail", "eventratecontrol max-rate=2000", "eventpolarity"})
     for (const auto& row : rows_of(filter)) ASSERT_EQ(row[5], 1 + row[1] + 64 * row[2]) << filter;
 }
 
