@@ -74,7 +74,7 @@ TEST(EventCameras, MayHaveAnUnknownSensor) {
   EXPECT_EQ(event_camera_of(device).value().sensor, SensorSize{});
 }
 
-TEST(OtherCameras, AreNot) {
+TEST(OtherCameras, AreNoEventCameras) {
   EXPECT_FALSE(event_camera_of({.driver = "uvcvideo", .card = "a webcam", .fourcc = "YUYV"}));
   EXPECT_FALSE(event_camera_of({.driver = "uvcvideo", .card = "infrared", .fourcc = "GREY"}));
   EXPECT_FALSE(event_camera_of({}));

@@ -5,9 +5,12 @@
 #include <malloc.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <iostream>
 #include <random>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include "tests/elements/element_lines.hpp"
 #include "tests/elements/event_buffer.hpp"
@@ -80,17 +83,21 @@ TEST_P(Memory, DoesNotGrowFrameByFrame) {
   Harness h(element);
   h.caps(video, draws ? pictures_of(element) : GST_EVENT_CAMERA_MEDIA_TYPE);
   const Flight flight(h);
-  Resources after_some;
+  std::vector<std::ptrdiff_t> growths;  // of the heap in tenths of the stream
+  std::size_t last_heap = 0;
   for (int i = 0; i < frames; ++i) {
     ASSERT_EQ(h.push(flight.frame(i)), GST_FLOW_OK);
     const auto buffer = h.pull();
     ASSERT_EQ(buffer != nullptr, draws || i > 0);
-    if (i == frames / 10) after_some = Resources::now();
+    if (i % (frames / 10) != 0) continue;
+    const auto heap = Resources::now().heap;
+    growths.push_back(static_cast<std::ptrdiff_t>(heap - std::exchange(last_heap, heap)));
   }
-  // Less than a pointer per frame, and what may be allocated late: by a driver, or by a thread that
-  // gets most of a frame for the first time, because the machine is busy.
-  const std::size_t once = 16384;
-  EXPECT_LE(Resources::now().heap, after_some.heap + static_cast<std::size_t>(frames) * 7 + once);
+  // Less than a pointer per frame in half of them, but for what comes and goes. A driver, or a
+  // thread that gets most of a frame for the first time because the machine is busy, may allocate
+  // late, but not all the time.
+  std::ranges::sort(growths);
+  EXPECT_LE(growths[growths.size() / 2], frames / 10 * 7 + 1024) << testing::PrintToString(growths);
 }
 
 class OnTheCpu : public testing::TestWithParam<const char*> {};

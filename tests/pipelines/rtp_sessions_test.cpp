@@ -202,21 +202,21 @@ void expect_everything(const std::string& to, const std::string& from) {
   EXPECT_EQ(receiving.stat("depay", "lost-events"), 0U) << from;
 }
 
-TEST(Rtp, JitterBuffer) {
+TEST(Rtp, PassesAJitterBuffer) {
   expect_everything("rtpjitterbuffer latency=50");
 }
 
-TEST(Rtp, StreamFraming) {
+TEST(Rtp, ArrivesInAByteStream) {
   expect_everything("rtpstreampay ! rtpstreamdepay");
 }
 
-TEST(Rtp, Udp) {
+TEST(Rtp, ArrivesOverUdp) {
   const auto port = std::to_string(next_port());
   expect_everything("udpsink host=127.0.0.1 port=" + port,
                     "udpsrc port=" + port + " " + from_caps + " ! rtpjitterbuffer latency=50");
 }
 
-TEST(Rtp, RtpBin) {
+TEST(Rtp, PassesRtpbin) {
   const int port = next_port();
   const auto rtp = std::to_string(port);
   const auto rtcp = std::to_string(port + 1);
@@ -239,7 +239,7 @@ std::string srtp_receiver(const std::string& port, const std::string& with) {
   return "udpsrc port=" + port + " caps=\"" + srtp_caps(with) + ",ssrc=(uint)1234\" ! srtpdec";
 }
 
-TEST(Rtp, Srtp) {
+TEST(Rtp, ArrivesEncrypted) {
   const auto port = std::to_string(next_port());
   expect_everything("application/x-rtp,ssrc=(uint)1234 ! srtpenc key=" + key +
                         " ! udpsink host=127.0.0.1 port=" + port,
@@ -405,7 +405,7 @@ TEST(Rtp, ForwardErrorCorrectionLosesNothing) {
   EXPECT_EQ(dropped, 2);
 }
 
-TEST(Rtp, Srt) {
+TEST(Rtp, ArrivesOverSrt) {
   const auto port = std::to_string(next_port());
   expect_everything("rtpstreampay ! srtsink uri=\"srt://127.0.0.1:" + port + "?mode=caller\"",
                     "srtsrc uri=\"srt://127.0.0.1:" + port +
@@ -413,7 +413,7 @@ TEST(Rtp, Srt) {
                         " ! rtpstreamdepay");
 }
 
-TEST(Rtp, Rist) {
+TEST(Rtp, ArrivesOverRist) {
   const int port = next_port();
   // ristsrc knows static payload types only.
   expect_everything("ristsink address=127.0.0.1 port=" + std::to_string(port),
