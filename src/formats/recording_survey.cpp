@@ -32,6 +32,7 @@ bool RecordingSurvey::read(RecordingInput& input) {
   while (!has_events_ && !input.decoder().knows_all_streams() && next(input)) has_moved_ = true;
   const bool is_whole = input.is_finished();
   if (is_whole) finish(input.decoder());
+  finish_short_streams(input.decoder());
   const auto last = input.decoder().last_time();
   has_moved_ |= find_first_items(input);
   if (input.source().failed()) return false;
@@ -122,6 +123,12 @@ void RecordingSurvey::note(const FrameItem& item) {
 void RecordingSurvey::finish(const RecordingDecoder& decoder) {
   for (std::size_t i = 0; i < decoder.streams().size(); ++i)
     if (decoder.streams()[i].kind == StreamKind::events) finish(i);
+}
+
+/// Finishes streams of events with too few of them to tell the first.
+void RecordingSurvey::finish_short_streams(const RecordingDecoder& decoder) {
+  for (std::size_t i = 0; i < decoder.streams().size(); ++i)
+    if (decoder.streams()[i].kind == StreamKind::events && !stream(i).first) finish(i);
 }
 
 void RecordingSurvey::finish(std::size_t index) {

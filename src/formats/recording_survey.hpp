@@ -77,6 +77,7 @@ class RecordingSurvey {
   void note(const FrameItem& item);
   void note(const TriggerItem& /*item*/) {}
   void note(const ImuItem& /*item*/) {}
+  void finish_short_streams(const RecordingDecoder& decoder);
   void finish(std::size_t index);
   void learn_duration(std::optional<Microseconds> stated, bool is_whole,
                       const RecordingInput& input);

@@ -17,6 +17,7 @@
 #include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/aedat/aedat_decoder.hpp"
 #include "src/formats/dat/dat.hpp"
+#include "src/formats/es/es.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
@@ -673,6 +674,34 @@ TEST(RecordingReader, ReadsTheDurationOfFixedRecordsAtTheEnd) {
     ASSERT_TRUE(reader.next());
     const auto last = std::ranges::max_element(events, {}, &AbsoluteEvent::t)->t;
     EXPECT_EQ(reader.duration(), last + 1 - events.front().t);
+  }
+}
+
+/// More than the surveyed bytes of a silence; then events, of which the last block that is surveyed
+/// has too few to tell whether the clock jumped.
+TEST(RecordingReader, FindsTheFirstEventsAfterALongSilence) {
+  constexpr std::size_t silence = std::size_t{20} << 20;  // bytes
+  constexpr int count = 3000;
+  const std::string_view header("Event Stream\2\0\0\1\x40\1\xf0\0", 20);
+  Bytes bytes(header.begin(), header.end());
+  bytes.resize(silence - 500, 0xff);  // 127 us each
+  const auto first = static_cast<Microseconds>(127 * (bytes.size() - header.size()) + 10);
+  for (int i = 0; i < count; ++i)
+    for (const int byte : {10 << 1 | 1, i % 256, 0, i % sensor.height, 0})
+      bytes.push_back(static_cast<std::uint8_t>(byte));
+  MemoryBytes all(bytes);
+  WatchedBytes source(bytes);
+  for (ByteSource* const from : std::initializer_list<ByteSource*>{&all, &source}) {
+    RecordingReader reader(
+        [] { return std::make_unique<OneStreamDecoder>(make_event_stream_decoder()); },
+        chunk_length);
+    reader.open(*from);
+    Outcome outcome;
+    outcome.take_all(reader);
+    EXPECT_FALSE(reader.is_empty());
+    EXPECT_EQ(reader.origin(), first);
+    EXPECT_GT(reader.duration(), 0);
+    EXPECT_EQ(outcome.events(0).size(), std::size_t{count});
   }
 }
 
