@@ -6,6 +6,7 @@ namespace eventcamera {
 void RecordingInput::push(std::span<const std::uint8_t> bytes) {
   const auto guard = lock();
   decoder_->push(bytes);
+  position_ += bytes.size();
   is_finished_ = false;
 }
 
@@ -32,7 +33,6 @@ std::optional<Item> RecordingInput::next() {
     }
     const auto piece = source_->piece(position_);
     if (!piece) return std::nullopt;
-    position_ += piece->size();
     if (piece->empty())
       finish();
     else

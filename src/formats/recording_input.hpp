@@ -74,7 +74,7 @@ class RecordingInput {
   /// Pull mode: true if the decoder reads from the source.
   bool reads_itself() const { return reads_itself_; }
 
-  /// Pull mode: offset of the next byte to pull, unless the decoder reads itself.
+  /// Offset of the next byte to push or pull, unless the decoder reads itself.
   std::uint64_t position() const { return position_; }
 
  private:

@@ -41,12 +41,18 @@ void RecordingReader::push(std::span<const std::uint8_t> bytes, std::optional<In
 }
 
 void RecordingReader::interrupt() {
+  input_.restart(SeekPoint{.t = always, .position = input_.position()});
+  begin_times();
+}
+
+void RecordingReader::begin_times() {
   input_.expect_more();
   finishing_ = drained_ = false;
   shift_.reset();
   for (std::size_t i = 0; i < streams_.size(); ++i) start_chunker(i);
   next_stream_ = 0;
   newest_ = 0;
+  output_due_.reset();
   triggers_.clear();
   imu_samples_.clear();
 }

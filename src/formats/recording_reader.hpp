@@ -99,8 +99,11 @@ class RecordingReader {
   /// Reads the pushed bytes and drops their items.
   void discard() { input_.discard(); }
 
-  /// Words: the next input is discontinuous.
+  /// Words: the next ones do not continue those before.
   void interrupt();
+
+  /// Words: the next ones do, but not the times of their intervals.
+  void begin_times();
 
   /// Pull mode: sets the source of bytes, which must outlive this object. Call before next().
   void open(ByteSource& source) { input_.open(source); }

@@ -57,7 +57,8 @@ TEST_P(EveryWord, FollowsGapsAndFlushes) {
   EXPECT_EQ(pull_events(reader), std::vector{event});
   EXPECT_TRUE(reader.pull_event(GST_EVENT_GAP));
 
-  flush({reader.get()});
+  flush({writer.get(), reader.get()});
+  push_segment(writer.get());
   push_segment(reader.get());
   writer.write(AbsoluteEvent::at(3, 4, 70'000, Polarity::on), 70'000);
   GstBuffer* words = writer.pull().release();
@@ -66,6 +67,45 @@ TEST_P(EveryWord, FollowsGapsAndFlushes) {
   gst_harness_push_event(reader.get(), gst_event_new_eos());
   const auto moved = AbsoluteEvent::at(3, 4, 5'000, Polarity::on);
   EXPECT_EQ(pull_events(reader), std::vector{moved});
+}
+
+/// A camera that starts again counts from a lower time.
+TEST_P(EveryWord, FollowsACameraThatStartsAgain) {
+  for (const std::string how : {"DISCONT", "flush", "stream"}) {
+    Reader reader("evtdec", caps);
+    Events read;
+    for (const Microseconds clock : {9'000'000, 2'000'000}) {
+      Writer writer("evtenc", caps);
+      writer.write(AbsoluteEvent::at(3, 4, clock + 5, Polarity::on), clock);
+      GstBuffer* const words = writer.pull().release();
+      GST_BUFFER_PTS(words) = 10 * GST_MSECOND;
+      if (how == "DISCONT") GST_BUFFER_FLAG_SET(words, GST_BUFFER_FLAG_DISCONT);
+      if (how == "flush") flush({reader.get()});
+      if (how == "stream")
+        gst_harness_push_event(reader.get(), gst_event_new_stream_start(how.c_str()));
+      if (how != "DISCONT") push_segment(reader.get());
+      reader.push(words);
+      gst_harness_push_event(reader.get(), gst_event_new_gap(20 * GST_MSECOND, GST_MSECOND));
+      append_events(reader.pull().get(), read);
+    }
+    EXPECT_EQ(read, Events(2, AbsoluteEvent::at(3, 4, 10'000, Polarity::on))) << how;
+    EXPECT_EQ(reader.warning(), "") << how;
+  }
+}
+
+/// As of evtparse, which corrects its times so.
+TEST_P(EveryWord, ContinuesInANewSegment) {
+  Writer writer("evtenc", caps);
+  Reader reader("evtdec", caps);
+  const std::vector events = {AbsoluteEvent::at(3, 4, 9'000, Polarity::on),
+                              AbsoluteEvent::at(5, 4, 9'010, Polarity::on)};
+  for (const auto& event : events) {
+    push_segment(reader.get());
+    writer.write(event, event.t);
+    reader.push(writer.pull().release());
+  }
+  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  EXPECT_EQ(pull_events(reader), events);
 }
 
 TEST_P(EveryWord, FollowsASizeThatChanges) {

@@ -727,6 +727,44 @@ TEST(RecordingReader, MovesWordsToTheTimeOfTheirStream) {
   EXPECT_TRUE(std::get<3>(outcome.chunks.back()).empty());
 }
 
+/// EVT3 words, of which the last is incomplete.
+Bytes words_of(std::initializer_list<std::uint16_t> words) {
+  Bytes bytes;
+  for (const auto word : words) {
+    bytes.push_back(static_cast<std::uint8_t>(word));
+    bytes.push_back(static_cast<std::uint8_t>(word >> 8));
+  }
+  bytes.pop_back();
+  return bytes;
+}
+
+TEST(RecordingReader, KeepsNoStateOfWordsThroughADiscontinuity) {
+  RecordingReader reader(
+      [] { return std::make_unique<OneStreamDecoder>(make_evt_decoder(EvtFormat::evt3, sensor)); },
+      chunk_length, RecordingReader::Clock::stream);
+  Outcome outcome;
+  const auto read = [&](const Bytes& words) {
+    reader.push(words, RecordingReader::Interval{0, 0});
+    outcome.take_all(reader);
+    reader.reach(chunk_length);
+    outcome.take_all(reader);
+    return std::exchange(outcome.chunks, {});
+  };
+  // Time, row, event, trigger, vector.
+  EXPECT_EQ(read(words_of({0x8009, 0x6000, 0x0007, 0x2001, 0xa001, 0x3003, 0x4001, 0})).size(), 1U);
+  EXPECT_EQ(outcome.triggers.size(), 1U);
+  reader.interrupt();
+  // An event before the time and before the row, a vector without a base, a row and an event.
+  const auto chunks = read(words_of({0x2001, 0x8002, 0x6000, 0x2002, 0x4001, 0x0009, 0x2003, 0}));
+  ASSERT_EQ(chunks.size(), 1U);
+  EXPECT_EQ(std::get<3>(chunks.front()), (std::vector{Event::at(3, 9, 0, Polarity::off)}));
+  EXPECT_EQ(outcome.triggers.size(), 1U);
+  EXPECT_EQ(reader.counts().corrupt_places, 1U);
+  EXPECT_EQ(reader.corruption().first, "EVT3 vector without a base column");
+  EXPECT_EQ(reader.corruption().first_at, 15U + 8U);
+  EXPECT_EQ(reader.streams().front().info.size, sensor);
+}
+
 TEST(RecordingReader, SaysWhatIsNoRecording) {
   const auto make = [] { return std::make_unique<OneStreamDecoder>(make_prophesee_raw_decoder()); };
   RecordingReader pushed(make, chunk_length);

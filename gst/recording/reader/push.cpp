@@ -18,6 +18,7 @@ GstFlowReturn EventReader::chain(GstBuffer* buffer) {
   if (is_timed() && GST_BUFFER_IS_DISCONT(buffer)) {
     const GstFlowReturn drained = drain();
     if (drained != GST_FLOW_OK) return drained;
+    if (recording_) recording_->interrupt();
     for (auto& pad : pads_) pad->interrupt();
     for (auto& pad : pads_) pad->need_segment(false);
   }
@@ -75,6 +76,7 @@ gboolean EventReader::sink_event(GstEvent* event) {
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_STREAM_START:
       drain();  // into the stream that ends here, before the new one
+      if (recording_ && is_timed()) recording_->interrupt();
       gst_event_replace(&stream_start_, event);
       gst_event_unref(event);
       for (auto& pad : pads_) pad->reset();
@@ -122,7 +124,7 @@ gboolean EventReader::forward(GstEvent* event) {
 /// Pushes all pending output before a discontinuity.
 GstFlowReturn EventReader::drain() {
   if (is_consuming_) take_end();
-  if (recording_) recording_->interrupt();
+  if (recording_) recording_->begin_times();
   is_consuming_ = false;
   return std::exchange(flow_, GST_FLOW_OK);
 }
