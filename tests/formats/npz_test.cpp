@@ -98,6 +98,26 @@ TEST(Npz, AnArrayOfEvents) {
       EXPECT_EQ(read(archive({text, other, member}, is_compressed)).events, expected);
 }
 
+Member plain_array(const std::string& name, std::size_t rows, std::size_t columns) {
+  const auto shape = "(" + std::to_string(rows) + ", " + std::to_string(columns) + ")";
+  return {name, npz_file::array("'<f8'", shape, std::vector<double>(rows * columns, 1))};
+}
+
+TEST(Npz, AnArrayOfEventsAmongOthers) {
+  const Member events = {"events.npy",
+                         npz_file::array<double>("'<f8'", "(2, 4)", {7, 3, 4, 1, 9, 5, 6, 0})};
+  const std::vector<AbsoluteEvent> expected = {AbsoluteEvent::at(3, 4, 7, Polarity::on),
+                                               AbsoluteEvent::at(5, 6, 9, Polarity::off)};
+  const auto matrix = plain_array("K.npy", 3, 3);
+  const auto poses = plain_array("poses.npy", 10, 5);
+  EXPECT_EQ(read(archive({matrix, events}, true), {.unit = TimeUnit::microseconds}).events,
+            expected);
+  EXPECT_EQ(read(archive({poses, matrix, events}, true),
+                 {.columns = *columns_of("txyp"), .unit = TimeUnit::microseconds})
+                .events,
+            expected);
+}
+
 TEST(Npz, WhatIsWrongIsToldAndWhatIsWholeIsRead) {
   const auto events = events_of(50'000);
   auto shorter = columns_of_events(events);
@@ -132,9 +152,10 @@ TEST(Npz, WhatIsWrongIsToldAndWhatIsWholeIsRead) {
 
 TEST(Npz, WhatIsNoneIsRefused) {
   const auto whole = archive(columns_of_events(events_of(1000)), true);
-  const auto refused = [](const Bytes& bytes, std::string_view words) {
+  const auto refused = [](const Bytes& bytes, std::string_view words,
+                          const TableSettings& settings = {}) {
     try {
-      read(bytes);
+      read(bytes, settings);
       ADD_FAILURE() << words;
     } catch (const UnsupportedFormat& error) {
       EXPECT_NE(std::string_view(error.what()).find(words), std::string_view::npos) << error.what();
@@ -150,6 +171,12 @@ TEST(Npz, WhatIsNoneIsRefused) {
   refused(
       archive({{"a.npy", npz_file::array("'<f8'", "(4, 500)", std::vector<double>(2000))}}, true),
       "numpy.ascontiguousarray");
+  const auto matrix = archive({plain_array("K.npy", 3, 3)}, true);
+  refused(matrix, "of K.npy: the NumPy array has 3 columns; an event needs four: t, x, y and p");
+  const auto poses = archive({plain_array("poses.npy", 10, 5)}, true);
+  refused(poses, "of poses.npy: the NumPy array has 5 columns; column-order has 4",
+          {.columns = *columns_of("txyp")});
+  refused(poses, "poses.npy: unknown columns in the NumPy array; set column-order for all 5");
   auto wide = columns_of_events(events_of(10));
   wide[0].second = npz_file::array("'<u2'", "(10, 2)", std::vector<std::uint16_t>(20));
   refused(archive(wide, true), "not an array of one column");

@@ -121,7 +121,17 @@ NpyDecoder::NpyDecoder(const NpyHeader& header, const TableSettings& settings)
   begin(header);
 }
 
+/// Throws UnsupportedFormat if the rows of an array of plain numbers cannot be events.
+void NpyDecoder::check_columns(std::size_t count) const {
+  const auto what =
+      "the NumPy array has " + std::to_string(count) + (count == 1 ? " column; " : " columns; ");
+  if (count < event_columns) throw UnsupportedFormat(what + "an event needs four: t, x, y and p");
+  if (!settings_.columns.empty() && count != settings_.columns.size())
+    throw UnsupportedFormat(what + "column-order has " + std::to_string(settings_.columns.size()));
+}
+
 void NpyDecoder::begin(NpyHeader header) {
+  if (!header.columns.empty()) check_columns(header.columns.size());
   constexpr std::uint64_t max_sample = std::uint64_t{1} << 20;
   left_ = header.count;
   position_ = preamble_.size();

@@ -23,7 +23,8 @@ class NpyDecoder final : public Decoder {
  public:
   explicit NpyDecoder(const TableSettings& settings = {});
 
-  /// Reads only elements, as described by `header`.
+  /// Reads only elements, as described by `header`. Throws UnsupportedFormat if their columns
+  /// cannot be those of events.
   NpyDecoder(const NpyHeader& header, const TableSettings& settings);
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
@@ -31,6 +32,7 @@ class NpyDecoder final : public Decoder {
   void decode_tail(ByteSource& source, Decoded& out) const override;
 
  private:
+  void check_columns(std::size_t count) const;
   void begin(NpyHeader header);
   void read_sample(Decoded& out);
   void find_layout(std::span<const std::uint8_t> elements);

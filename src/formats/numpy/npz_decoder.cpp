@@ -162,10 +162,14 @@ class Archive {
     if (ended_) return false;
     const auto bytes = elements_->next();
     ended_ = !bytes || bytes->empty();
-    if (ended_)
-      decoder_->finish(out);
-    else
-      decoder_->decode(*bytes, out);
+    try {
+      if (ended_)
+        decoder_->finish(out);
+      else
+        decoder_->decode(*bytes, out);
+    } catch (const UnsupportedFormat& error) {
+      throw UnsupportedFormat(error_prefix_ + error.what());
+    }
     corruption_ = decoder_->corruption();
     if (size_unreadable_) corruption_.note(0, "the arrays width and height are not a sensor size");
     if (!bytes) corruption_.note(0, "the ZIP archive cannot be unpacked further");
@@ -238,6 +242,7 @@ class Archive {
     std::ranges::move(labels, std::back_inserter(arrays));
   }
 
+  /// Opens the first array that may be one of events.
   void open_first_array(const TableSettings& settings) {
     std::string cause;
     for (std::size_t i = 0; i < archive_.names().size(); ++i) {
@@ -247,6 +252,7 @@ class Archive {
         if (array.header.columns.size() == 1) continue;
         decoder_ = std::make_unique<NpyDecoder>(array.header, settings);
         elements_ = std::make_unique<WholeArray>(std::move(array));
+        error_prefix_ = archive_.names()[i] + ": ";
         return;
       } catch (const UnsupportedFormat& error) {
         cause = std::string("; of ") + archive_.names()[i] + ": " + error.what();
@@ -259,6 +265,7 @@ class Archive {
   ZipArchive archive_;
   std::unique_ptr<Elements> elements_;
   std::unique_ptr<NpyDecoder> decoder_;
+  std::string error_prefix_;  ///< name of the array of events
   Corruption corruption_;
   bool size_unreadable_ = false;
   bool ended_ = false;
