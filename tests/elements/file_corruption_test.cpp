@@ -32,11 +32,12 @@ TEST_P(EveryFormat, SaysWhenItIsUnsupportedFormat) {
 }
 
 TEST_P(EveryFormat, IsNoFileWithoutAByte) {
+  const bool is_text = format().name == "csv";  // without events, it may have no byte
   const TemporaryFile file;
   for (const std::string way : {"", "queue ! "}) {
     Player player(file.source() + way + format().reader);
-    EXPECT_FALSE(player.play());
-    EXPECT_TRUE(player.error.starts_with("Cannot read this file: ")) << way << player.error;
+    EXPECT_EQ(player.play(), is_text);
+    EXPECT_EQ(player.error.starts_with("Cannot read this file: "), !is_text) << way << player.error;
   }
 }
 

@@ -131,6 +131,19 @@ TEST(EvtDec, LeavesOutEventsOutsideTheSensor) {
   EXPECT_EQ(stat_of(h.element(), "late-items") + stat_of(h.element(), "stray-items"), 0U);
 }
 
+/// As of the formats without a header.
+TEST(EventCsvDec, ReadsAFileWithNothingInIt) {
+  const Format rpg = {"rpg", "eventcsvenc format=rpg", "eventcsvdec", "application/x-event-csv"};
+  const TemporaryFile file(file_of(rpg, {}));
+  EXPECT_TRUE(file.bytes().empty());
+  for (const std::string way : {"", "queue ! "}) {
+    Player player(file.source() + way + "eventcsvdec");
+    EXPECT_TRUE(player.play()) << player.error;
+    EXPECT_EQ(player.warnings, std::vector<std::string>{"The file has no events."}) << way;
+    EXPECT_TRUE(player.events.empty());
+  }
+}
+
 TEST(EventCsvDec, TakesTimesInTheUnitThatIsFoundOrSet) {
   const Format esim = {"esim", "eventcsvenc format=esim", "eventcsvdec", "application/x-event-csv"};
   const auto file = file_of(esim, some_events());

@@ -105,7 +105,6 @@ void CsvDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
 
 void CsvDecoder::finish(Decoded& out) {
   if (in_head_) {
-    if (head_.empty()) throw UnsupportedFormat("the file is empty");
     head_ += '\n';
     read_head();
     head_.pop_back();

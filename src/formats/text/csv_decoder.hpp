@@ -28,7 +28,7 @@ namespace eventcamera {
 ///
 /// Polarity is 0/1, -1/1 or false/true.
 ///
-/// A file with only a header or comments is a recording without events; an empty file is an error.
+/// A file with only a header or comments, or with nothing, is a recording without events.
 class CsvDecoder final : public Decoder {
  public:
   explicit CsvDecoder(const TableSettings& settings = {});
