@@ -10,8 +10,8 @@ namespace eventcamera {
 /// Unwraps a counter of `bits` bits in units of 2^`shift` microseconds: that of TIME_HIGH words.
 ///
 /// Counts rise in small steps, in which they may wrap. Any other count is a leap, after a pause or
-/// a flipped bit, and does not wrap. If the next count continues from before the leap, so does
-/// the time.
+/// a flipped bit, and wraps only if it is of 12 bits and falls by half of its range or more, as in
+/// OpenEB. If the next count continues from before the leap, so does the time.
 template <int bits, int shift>
 class TimeBase {
  public:
@@ -31,7 +31,7 @@ class TimeBase {
       advance_to(from + (std::uint64_t{step(from, count)} << shift));
     } else {
       before_leap_ = last;
-      time_ += (std::uint64_t{count} - count_of(last)) << shift;
+      time_ += leap(count_of(last), count) << shift;
     }
     known_ = true;
     return static_cast<std::int64_t>(time_ - last) >= 0;
@@ -43,19 +43,25 @@ class TimeBase {
   /// Small steps lead to `time`.
   void advance_to(std::uint64_t time) { before_leap_ = time_ = time; }
 
+  /// Uses bits 0 to `bits` of the rest.
   UnitDecoder::State state() const {
-    return {static_cast<Microseconds>(time_), static_cast<std::uint64_t>(known_)};
+    return {static_cast<Microseconds>(time_),
+            std::uint64_t{count_of(before_leap_)} << 1 | static_cast<std::uint64_t>(known_)};
   }
 
-  void restore(Microseconds clock, bool known) {
-    advance_to(static_cast<std::uint64_t>(clock));
-    known_ = known;
+  void restore(const UnitDecoder::State& state) {
+    time_ = static_cast<std::uint64_t>(state.clock);
+    before_leap_ =
+        time_ - (leap(static_cast<std::uint32_t>(state.rest >> 1) & mask, count()) << shift);
+    known_ = (state.rest & 1) != 0;
   }
 
  private:
   /// Limit of small steps: two minutes for 28 bits; four seconds for 12, in which faery writes
   /// pauses. One flipped bit makes no such step across the wrap.
   static constexpr std::uint32_t max_step = std::uint32_t{1} << (bits == 12 ? 10 : 21);
+  /// Limit of leaps across the wrap.
+  static constexpr std::uint32_t max_wrapping_leap = bits == 12 ? 1 << 11 : max_step;
   static constexpr std::uint32_t mask = ~std::uint32_t{0} >> (32 - bits);
 
   static std::uint32_t count_of(std::uint64_t time) {
@@ -65,6 +71,12 @@ class TimeBase {
   /// Counts from `time` to the next time at `count`.
   static std::uint32_t step(std::uint64_t time, std::uint32_t count) {
     return (count - count_of(time)) & mask;
+  }
+
+  /// Counts from one to another, modulo 2^64.
+  static std::uint64_t leap(std::uint32_t from, std::uint32_t to) {
+    const auto step = (to - from) & mask;
+    return step <= max_wrapping_leap ? step : std::uint64_t{to} - from;
   }
 
   std::uint64_t time_ = 0;

@@ -419,6 +419,50 @@ TEST(Evt3, FollowsStepsOfFourSeconds) {
   EXPECT_EQ(corruption.places, 0U);
 }
 
+TEST(Evt3, FollowsPausesAcrossTheWrapUpToHalfItsRange) {
+  for (const int pause : {1025, 1500, 2047, 2048}) {
+    const auto count = static_cast<std::uint16_t>(0x8000 | ((0xffe + pause) & 0xfff));
+    const auto next = static_cast<std::uint16_t>(count + 1);
+    const auto [decoded, corruption] =
+        read(EvtFormat::evt3, evt3({0x8ffe, 0x6000, 0x0000, 0x2000, count, 0x6000, 0x2000, count,
+                                    0x2000, next, 0x6000, 0x2000}));
+    constexpr Microseconds first = 0xffe * 4096;
+    const auto last = first + Microseconds{4096} * pause;
+    EXPECT_EQ(
+        decoded.events,
+        events({AbsoluteEvent::at(0, 0, first, off), AbsoluteEvent::at(0, 0, last, off),
+                AbsoluteEvent::at(0, 0, last, off), AbsoluteEvent::at(0, 0, last + 4096, off)}));
+    EXPECT_EQ(corruption.places, 0U);
+  }
+}
+
+/// At a seek point, too. A bit that falls back by half the range or more looks like a pause.
+TEST(Evt3, ComesBackFromAFlippedBitAcrossTheWrap) {
+  constexpr Microseconds lap = 1 << 24;
+  // After 0xffe: 0x003, and 0xffe again.
+  for (const std::uint16_t flipped : {0x8403, 0x87fe}) {
+    Bytes bytes = evt3({0x8ffe, 0x6000, 0x0000});
+    for (int i = 0; i < 1 << 15; ++i) std::ranges::copy(evt3({0x2001}), std::back_inserter(bytes));
+    const auto middle = bytes.size() + 2;
+    const std::uint16_t next = flipped == 0x8403 ? 0x8004 : 0x8fff;
+    std::ranges::copy(evt3({flipped, 0x6000, 0x2002, next, 0x6000, 0x2003}),
+                      std::back_inserter(bytes));
+    const auto back = next == 0x8004 ? lap + 4 * 4096 : lap - 4096;
+    const auto decoder = make_evt_decoder(EvtFormat::evt3, vga);
+    const auto decoded = decode(*decoder, bytes, [&] { return middle; });
+    ASSERT_EQ(decoded.events.size(), (1U << 15) + 2);
+    EXPECT_EQ(decoded.events.back(), AbsoluteEvent::at(3, 0, back, off));
+    EXPECT_EQ(decoder->corruption().places, 1U);
+    const auto seek_point = decoder->seek_point_before(100 * lap);
+    ASSERT_TRUE(seek_point);
+    ASSERT_EQ(seek_point->position, middle);
+    decoder->restart(*seek_point);
+    const auto again = decode(*decoder, std::span(bytes).subspan(middle));
+    ASSERT_EQ(again.events.size(), 2U);
+    EXPECT_EQ(again.events.back(), decoded.events.back());
+  }
+}
+
 /// No trigger of a sought time or later is missing.
 TEST(Triggers, HaveSeekPointsWithoutEvents) {
   for (const auto format : {EvtFormat::evt3, EvtFormat::evt2, EvtFormat::evt21, EvtFormat::evt4}) {

@@ -19,7 +19,7 @@ template <CdTypes types>
 class CdDecoder : public UnitDecoder {
  public:
   State state() const override { return time_.state(); }
-  void restore(const State& state) override { time_.restore(state.clock, state.rest != 0); }
+  void restore(const State& state) override { time_.restore(state); }
 
  protected:
   CdDecoder(SensorSize size, const char* unknown_type)

@@ -33,15 +33,15 @@ class Evt3Decoder final : public UnitDecoder {
 
   State state() const override {
     auto state = time_.state();
-    state.rest |= std::uint64_t{low_} << 1 | std::uint64_t{polarity_} << 13 |
+    state.rest |= std::uint64_t{low_} << 16 | std::uint64_t{polarity_} << 17 |
                   std::uint64_t{y_ ^ nowhere} << 32 | std::uint64_t{base_ ^ nowhere} << 48;
     return state;
   }
 
   void restore(const State& state) override {
-    time_.restore(state.clock, (state.rest & 1) != 0);
-    low_ = static_cast<std::uint32_t>(state.rest >> 1) & 0xfff;
-    polarity_ = static_cast<std::uint32_t>(state.rest >> 13) & polarity_bit;
+    time_.restore(state);
+    low_ = static_cast<std::uint32_t>(state.rest >> 16) & 0xfff;
+    polarity_ = static_cast<std::uint32_t>(state.rest >> 17) & polarity_bit;
     y_ = (static_cast<std::uint32_t>(state.rest >> 32) & 0xffff) ^ nowhere;
     base_ = static_cast<std::uint32_t>(state.rest >> 48) ^ nowhere;
   }
