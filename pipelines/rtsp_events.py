@@ -74,7 +74,10 @@ class Server:
         else:
             auth.set_default_token(token)
         if certificate:
-            auth.set_tls_certificate(Gio.TlsCertificate.new_from_file(certificate))
+            pair = Gio.TlsCertificate.new_from_file(certificate)
+            if pair.get_property("private-key-pem") is None:  # the first client would crash the server
+                raise RuntimeError(f"{certificate} has no private key; append it: cat cert.pem key.pem > both.pem")
+            auth.set_tls_certificate(pair)
         self._server.set_auth(auth)
 
     def run(self, address, port, scheme):

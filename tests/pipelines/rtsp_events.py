@@ -160,6 +160,7 @@ def encryption():
                        check=True, capture_output=True)
         with open(certificate, "rb") as public, open(pair, "ab") as both:
             both.write(public.read())
+        fails(f"{certificate} has no private key; append it", "--certificate", certificate, "--port", "0")
         trusted = Gio.TlsFileDatabase.new(certificate)
         with Server("--certificate", pair, "--user", "ada", "--password", "secret") as server:
             assert server.base.startswith("rtsps://"), server.base
