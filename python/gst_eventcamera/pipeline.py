@@ -55,9 +55,17 @@ class PipelineWarning(UserWarning):
     element."""
 
 
+def printable(path: str) -> str:
+    """A path whose bytes that are not UTF-8 are escaped."""
+    return path.encode(errors="surrogateescape").decode(errors="backslashreplace")
+
+
 def quoted(path: str | os.PathLike[str]) -> str:
-    """A path as the value of a property in a pipeline description."""
-    return '"' + os.fspath(path).replace("\\", "\\\\").replace('"', '\\"') + '"'
+    """A path as the value of a property in a pipeline description. Raises PipelineError if it is not UTF-8."""
+    text = os.fspath(path)
+    if text != printable(text):
+        raise PipelineError(f"the name {printable(text)} is not UTF-8; rename it")
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def _text_of(message: Gst.Message, error: GLib.Error, cause: Optional[str]) -> str:

@@ -15,7 +15,7 @@ from typing import Any, Iterator, Mapping, Optional
 
 import yaml
 
-from .pipeline import Gst, Pipeline, PipelineError, expect_limits, property_limits, quoted
+from .pipeline import Gst, Pipeline, PipelineError, expect_limits, printable, property_limits, quoted
 from .recordings import WRITERS
 
 Value = float | int | str | bool
@@ -153,7 +153,7 @@ class Recipe:
                 if os.path.exists(path) and not os.path.isdir(path) and not os.path.isfile(path):  # such as a pipe
                     continue
                 name = match if os.path.isdir(path) else os.path.splitext(match)[0]
-                _check_name(name)
+                _check_name(name, path)
                 if found.setdefault(name, path) != path:
                     raise RecipeError(f"videos: {found[name]} and {path} have the same name, {name}; rename one")
         if not found:
@@ -228,7 +228,9 @@ def _fixed_folder(pattern: str) -> str:
     return "/".join(folders[:fixed]) or ("/" if pattern.startswith("/") else "")
 
 
-def _check_name(name: str) -> None:
+def _check_name(name: str, path: str) -> None:
+    if name != printable(name):
+        raise RecipeError(f"videos: the name {printable(path)} is not UTF-8; rename it")
     if re.search(r"[\x00-\x1f{}]|^/|(^|/)\.\.?(/|$)", name) or not name.isprintable():
         raise RecipeError(f"videos: {name!r} has braces, control characters or dots that file names of a data set"
                           " cannot have; rename it")

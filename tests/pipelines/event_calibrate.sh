@@ -122,6 +122,8 @@ refused() { # WORDS ARGUMENT...
 refused "no element" scene.mkv recorded.raw --element eventsim-nothing
 refused "only eventsim-dvs has profiles" scene.mkv recorded.raw --element eventsim-frame --profile frame.profile
 refused "nowhere.mkv" nowhere.mkv recorded.raw
+cp scene.mkv $'lat\xfcin.mkv'
+refused 'lat\\xfcin.mkv is not UTF-8; rename it' $'lat\xfcin.mkv' recorded.raw
 GST_PLUGIN_PATH= GST_PLUGIN_SYSTEM_PATH=/nowhere GST_REGISTRY=none.bin \
   refused "plugin eventcam.*meson devenv -C build -w \\." scene.mkv recorded.raw
 touch empty.txt

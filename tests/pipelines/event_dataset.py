@@ -547,7 +547,9 @@ class Recipes(unittest.TestCase):
         shutil.copy(path_of("recipes/videos/ball.mkv"), path_of("recipes/videos/ball.mp4"))
         self.expect("have the same name, ball; rename one", base)
         os.rename(path_of("recipes/videos/ball.mp4"), path_of("recipes/videos/{ball}.mp4"))
-        self.expect("rename it", base)
+        self.expect("{ball}' has braces", base)
+        os.rename(path_of("recipes/videos/{ball}.mp4"), path_of("recipes/videos/b\udce4ll.mp4"))
+        self.expect(path_of("recipes/videos/b\\xe4ll.mp4") + " is not UTF-8; rename it", base)
         self.assertIn("output: avi is none of",
                       event_dataset(recipe_of("recipes", base + "output: avi"), status=2))
 

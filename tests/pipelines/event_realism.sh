@@ -92,6 +92,7 @@ refused "from must be less than --to" real1.raw real2.raw --from 2 --to 1
 refused "name that with --html" real1.raw real2.raw --video scene.mkv
 refused "scene.mkv is read, so it cannot be written" real1.raw real2.raw --video scene.mkv --html scene.mkv
 refused "nowhere.raw" real1.raw nowhere.raw
+refused 'm/lat\\xfcin.npz is not UTF-8; rename it' real1.raw $'m/lat\xfcin.npz'
 refused "nowhere/page.html cannot be written; name a file" real1.raw real2.raw --html nowhere/page.html
 "$GST_LAUNCH" -q videotestsrc num-buffers=4 ! video/x-raw,width=320,height=240 ! matroskamux ! filesink location=large.mkv
 refused "large.mkv has 320 x 240 pixels, the recording has 161 x 90" real1.raw real2.raw --video large.mkv --html page.html
