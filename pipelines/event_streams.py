@@ -182,6 +182,8 @@ def read_pictures(path, start, end):
                         raise RuntimeError(f"{path}: {time} is not the time of a picture; give seconds below 1e9")
                     entries.append((round(float(time) * 1e9),
                                     os.path.join(os.path.dirname(path), name.strip())))
+                    if len(entries) > 1 and entries[-1][0] <= entries[-2][0]:
+                        raise RuntimeError(f"{path}: the time {time} is not later than the one before it")
     except (UnicodeDecodeError, ValueError):
         return None
     if not entries:

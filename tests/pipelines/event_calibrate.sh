@@ -133,6 +133,10 @@ for time in inf 1e300 nan; do
   echo "$time 00.png" >times.txt
   refused "times.txt: $time is not the time of a picture" times.txt recorded.raw
 done
+for time in 0.04 0.05; do
+  printf '0.05 00.png\n%s 01.png\n' $time >times.txt
+  refused "times.txt: the time $time is not later than the one before it" times.txt recorded.raw
+done
 for element in "" " "; do refused "name a simulator" scene.mkv recorded.raw --element "$element"; done
 for option in --from --to --measure-from --measure-to; do
   for wrong in -5 nan inf 1e20 soon; do

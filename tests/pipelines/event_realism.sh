@@ -102,6 +102,8 @@ for wrong in -5 nan inf 1e20 soon; do
 done
 touch empty.txt
 refused "empty.txt: no pictures; give a line" real1.raw real2.raw --video empty.txt --html page.html
+printf '0.1 1.png\n0.05 2.png\n' >times.txt
+refused "times.txt: the time 0.05 is not later than the one before it" real1.raw real2.raw --video times.txt --html page.html
 
 # Ctrl-C ends the programs quietly. They leave no compiled files.
 cat >sitecustomize.py <<'PYTHON'
