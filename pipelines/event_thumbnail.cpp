@@ -211,10 +211,13 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "%s and %s are the same file\n", in, out);
     return 2;
   }
+  const char* file = in;  // that fails
   try {
-    write_bytes(out, draw_recording(in, options.size).draw().png());
+    const std::string png = draw_recording(in, options.size).draw().png();
+    file = out;
+    write_bytes(out, png);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s: %s\n", in, error.what());
+    std::fprintf(stderr, "%s: %s\n", file, error.what());
     return 1;
   }
   return 0;

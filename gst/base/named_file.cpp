@@ -46,7 +46,8 @@ void write_bytes(const std::string& location, std::string_view bytes) {
   if (g_file_set_contents(location.c_str(), bytes.data(), static_cast<gssize>(bytes.size()),
                           &error))
     return;
-  const std::string cause = error->message;
+  // "Failed to create file NAME: REASON", with the name of a temporary file.
+  const std::string message = error->message;
   g_error_free(error);
-  throw std::runtime_error(cause);
+  throw std::runtime_error(message.substr(message.rfind(": ") + 2));
 }

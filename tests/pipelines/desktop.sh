@@ -159,6 +159,16 @@ head -c 100 ball.raw >header.raw
 ! "$BUILD/pipelines/event-thumbnail" header.raw thumbnail.png 2>reason || fail "a thumbnail without events"
 grep -qx "header.raw: no events found" reason || fail "$(cat reason)"
 
+# Nor where it cannot be written, which is not blamed on the recording.
+mkdir folder.png
+while read -r out reason; do
+  ! "$BUILD/pipelines/event-thumbnail" ball.raw "$out" 2>errors || fail "a thumbnail in $out"
+  grep -qx "$out: $reason" errors || fail "$(cat errors)"
+done <<'FILES'
+folder.png Is a directory
+nowhere/thumbnail.png No such file or directory
+FILES
+
 # Not in place of the recording, under another name of it either.
 ln -s ball.raw link.png
 for out in ball.raw link.png; do

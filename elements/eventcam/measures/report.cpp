@@ -129,13 +129,15 @@ bool can_report(gpointer element, const ReportFiles& files) {
 
 void report(gpointer element, const ReportFiles& files, GstStructure* figures,
             const std::function<eventcamera::RgbPicture()>& draw) {
+  std::string path = files.location;
   try {
-    if (!files.location.empty()) write_json(figures, files.location);
-    if (!files.map.empty()) write_bytes(files.map, draw().png());
+    if (!path.empty()) write_json(figures, path);
+    path = files.map;
+    if (!path.empty()) write_bytes(path, draw().png());
   } catch (const std::exception& error) {
     GST_ELEMENT_ERROR(element, RESOURCE, WRITE,
                       ("Cannot write the statistics; check the folder and the free space."),
-                      ("%s", error.what()));
+                      ("%s: %s", path.c_str(), error.what()));
   }
   gst_element_post_message(GST_ELEMENT(element),
                            gst_message_new_element(GST_OBJECT(element), figures));
