@@ -211,6 +211,11 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "%s and %s are the same file\n", in, out);
     return 2;
   }
+  // Opening a pipe might wait forever.
+  if (std::error_code none; std::filesystem::is_other(in, none)) {
+    std::fprintf(stderr, "%s is not a regular file; save it to a file first\n", in);
+    return 1;
+  }
   const char* file = in;  // that fails
   try {
     const std::string png = draw_recording(in, options.size).draw().png();

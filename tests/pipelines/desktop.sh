@@ -169,6 +169,11 @@ folder.png Is a directory
 nowhere/thumbnail.png No such file or directory
 FILES
 
+# A pipe is not waited for.
+mkfifo pipe.raw
+! timeout 60 "$BUILD/pipelines/event-thumbnail" pipe.raw thumbnail.png 2>reason || fail "a thumbnail of a pipe"
+grep -qx "pipe.raw is not a regular file; save it to a file first" reason || fail "$(cat reason)"
+
 # Not in place of the recording, under another name of it either.
 ln -s ball.raw link.png
 for out in ball.raw link.png; do
