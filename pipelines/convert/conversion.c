@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+#define _POSIX_C_SOURCE 200809L /* for sigaction() */
 #include "conversion.h"
 
 #include <gst/eventcamera/eventcamera.h>
@@ -252,12 +253,19 @@ static void print_message(const char* in, GstMessage* message) {
 static volatile sig_atomic_t interrupted;
 
 static void interrupt(int number) {
+  (void)number;
   interrupted = 1;
-  signal(number, SIG_DFL);
 }
 
 void catch_interrupt(void) {
-  signal(SIGINT, interrupt);
+  const struct sigaction once = {.sa_handler = interrupt, .sa_flags = SA_RESETHAND};
+  /* A terminal that closes sends SIGHUP, and then its shell does. nohup ignores both. */
+  const struct sigaction always = {.sa_handler = interrupt};
+  struct sigaction before;
+  sigaction(SIGINT, &once, NULL);
+  sigaction(SIGTERM, &once, NULL);
+  sigaction(SIGHUP, NULL, &before);
+  if (before.sa_handler != SIG_IGN) sigaction(SIGHUP, &always, NULL);
 }
 
 gboolean was_interrupted(void) {

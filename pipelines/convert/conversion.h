@@ -25,8 +25,8 @@ typedef struct {
 int convert_events(const char* in, const Reader* reader, const char* out, const Format* format,
                    const ElementOptions* options, const Part* part, guint64* events);
 
-/* The first Ctrl-C from now on completes the file with the events so far; the second kills the
- * program. */
+/* The first Ctrl-C, SIGTERM or SIGHUP from now on completes the file with the events so far; a
+ * second Ctrl-C or SIGTERM kills the program. */
 void catch_interrupt(void);
 gboolean was_interrupted(void);
 

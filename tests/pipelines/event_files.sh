@@ -475,17 +475,27 @@ has_begun() { # PROCESS FILE: it has written 10 kB to the file, or keeps them in
   stat -L -c %s "$2" "${files[@]}" 2>/dev/null | awk '$1 >= 10000 { begun = 1 } END { exit !begun }'
 }
 timeout 600 "$GST_LAUNCH" -q videotestsrc pattern=snow num-buffers=150 ! eventsim-frame ! evtenc ! filesink location=long.raw
-for ending in raw npy npz aedat4 h5 hdf5 mcap; do
+for interruption in "INT raw" "INT npy" "INT npz" "INT aedat4" "INT h5" "INT hdf5" "INT mcap" "TERM dat" "HUP es"; do
+  read -r signal ending <<<"$interruption"
   echo "event-convert long.raw interrupted.$ending"
   "$BUILD/pipelines/event-convert" long.raw "interrupted.$ending" 2>interruption &
   converting=$!
   while kill -0 $converting && ! has_begun $converting "interrupted.$ending.part"; do sleep 0.01; done
-  kill -INT $converting || true
+  kill -$signal $converting || true
+  [ $signal != HUP ] || kill -HUP $converting || true # again, by the shell
   if wait $converting; then echo "it was already done"; else grep -q interrupted interruption; fi
   convert "interrupted.$ending" part.dat 2>warnings | tee count
   grep -q "^[1-9][0-9]* events" count || fail "no events in interrupted.$ending"
   if grep -q warning: warnings; then fail "interrupted.$ending: $(cat warnings)"; fi
+  [ ! -e "interrupted.$ending.part" ] || fail "interrupted.$ending.part is left"
 done
+
+# Not by a terminal that closes after nohup.
+nohup "$BUILD/pipelines/event-convert" long.raw whole.dat >interruption 2>&1 &
+converting=$!
+while kill -0 $converting && ! has_begun $converting whole.dat.part; do sleep 0.01; done
+kill -HUP $converting || true
+wait $converting || fail "nohup: $(cat interruption)"
 
 # A whole file is not replaced by one that is interrupted.
 cp ball.aedat4 kept.aedat4
