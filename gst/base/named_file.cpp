@@ -49,5 +49,6 @@ void write_bytes(const std::string& location, std::string_view bytes) {
   // "Failed to create file NAME: REASON", with the name of a temporary file.
   const std::string message = error->message;
   g_error_free(error);
-  throw std::runtime_error(message.substr(message.rfind(": ") + 2));
+  const auto colon = message.rfind(": ");
+  throw std::runtime_error(colon == message.npos ? message : message.substr(colon + 2));
 }
