@@ -10,7 +10,7 @@ import numpy as np
 from event_streams import png_of
 from gst_eventcamera.dataset import duration_of, pictures_of
 from gst_eventcamera.frames import Frames
-from gst_eventcamera.pipeline import Gst, events_of
+from gst_eventcamera.pipeline import Gst, events_of, utf8_path
 from gst_eventcamera.recipe import TENSORS
 from gst_eventcamera.recordings import WRITERS
 from gst_eventcamera.sources import SINK
@@ -190,7 +190,7 @@ def simulate(video, path, clips):
         if is_tensors:
             array = NpyFile(path)
         else:
-            pipeline.element("file").set_property("location", path)
+            pipeline.element("file").set_property("location", utf8_path(path))
         for sample in pipeline.samples():
             figures.take(events_of(sample))
             while array and (tensor := pipeline.element("tensors").try_pull_sample(0)):

@@ -60,12 +60,17 @@ def printable(path: str) -> str:
     return path.encode(errors="surrogateescape").decode(errors="backslashreplace")
 
 
-def quoted(path: str | os.PathLike[str]) -> str:
-    """A path as the value of a property in a pipeline description. Raises PipelineError if it is not UTF-8."""
+def utf8_path(path: str | os.PathLike[str]) -> str:
+    """A path as the value of a property. Raises PipelineError if it is not UTF-8."""
     text = os.fspath(path)
     if text != printable(text):
         raise PipelineError(f"the name {printable(text)} is not UTF-8; rename it")
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return text
+
+
+def quoted(path: str | os.PathLike[str]) -> str:
+    """The same in a pipeline description."""
+    return '"' + utf8_path(path).replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def _text_of(message: Gst.Message, error: GLib.Error, cause: Optional[str]) -> str:

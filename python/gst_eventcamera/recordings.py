@@ -17,7 +17,7 @@ import numpy as np
 from .events import Events, join
 from .pipeline import (
     EVENT_CAPS, LABEL, GLib, Gst, GstEventCamera, Pipeline, PipelineError, duration_of, events_of, given_size,
-    quoted, sensor_size)
+    quoted, sensor_size, utf8_path)
 from .sources import SINK
 
 # Elements that write a file, by its extension.
@@ -251,9 +251,10 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
 
     Only a complete file replaces an existing one. Raises ValueError for events that are not sorted, too late or
     outside the sensor, or an unknown extension, and PipelineError if the file cannot be written."""
+    path = utf8_path(path)
     extension = os.path.splitext(path)[1].lower()
     if extension not in WRITERS:
-        raise ValueError(f"{os.fspath(path)}: the extension must be one of {' '.join(WRITERS)}")
+        raise ValueError(f"{path}: the extension must be one of {' '.join(WRITERS)}")
     width, height = given_size(events, width, height)
     _check(events, width, height)
     writer = WRITERS[extension]
@@ -270,13 +271,13 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
                 pipeline.raise_error(wait=LOOK)
             if source.push_buffer(buffer) != Gst.FlowReturn.OK:
                 pipeline.raise_error()
-                raise PipelineError(f"{os.fspath(path)} cannot be written")
+                raise PipelineError(f"{path} cannot be written")
         source.end_of_stream()
         pipeline.wait()
 
 
 @contextlib.contextmanager
-def _replacing(path: str | os.PathLike[str]) -> Iterator[str]:
+def _replacing(path: str) -> Iterator[str]:
     """A path to write to, whose file then replaces that of `path`, or is removed on failure. Devices and pipes are
     written to as they are."""
     target = os.path.realpath(path)
@@ -288,7 +289,7 @@ def _replacing(path: str | os.PathLike[str]) -> Iterator[str]:
         with open(part, "xb"):
             pass
     except OSError as error:
-        raise PipelineError(f"{os.fspath(path)} cannot be written: {error.strerror}") from None
+        raise PipelineError(f"{path} cannot be written: {error.strerror}") from None
     try:
         yield part
         os.replace(part, target)

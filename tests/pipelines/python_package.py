@@ -472,6 +472,8 @@ class Failures(unittest.TestCase):
         self.expect(ec.PipelineError, 'No such file "/nowhere"', lambda: ec.read("/nowhere"))
         self.expect(ec.PipelineError, "the name /nowhere/lat\\xfcin.npz is not UTF-8; rename it",
                     lambda: ec.read("/nowhere/lat\udcfcin.npz"))
+        self.expect(ec.PipelineError, "lat\\xfcin.npz is not UTF-8; rename it",
+                    lambda: ec.write(path_of("lat\udcfcin.npz"), random_events(10, 1000)))
         self.expect(ec.PipelineError, 'no element "nothing"', lambda: list(ec.live("videotestsrc ! nothing")))
         self.expect(ec.PipelineError, "can't handle caps application/x-event-camera",
                     lambda: list(ec.live("videotestsrc num-buffers=3")))
