@@ -112,6 +112,46 @@ struct EventAggregatorFunctions {
     self.segment_ended_ = false;
   }
 
+  /// True if an event goes through in its place in the stream. GstAggregator would forward it from
+  /// any pad, before the segment, and drop tags.
+  static bool is_passed_on(const EventAggregator& self, GstAggregatorPad* pad, GstEvent* event) {
+    switch (GST_EVENT_TYPE(event)) {
+      case GST_EVENT_TAG:
+        return pad == self.main_pad_;
+      case GST_EVENT_STREAM_START:
+      case GST_EVENT_CAPS:
+      case GST_EVENT_SEGMENT:
+      case GST_EVENT_GAP:
+      case GST_EVENT_EOS:
+      case GST_EVENT_FLUSH_STOP:
+        return false;
+      default:
+        return GST_EVENT_IS_SERIALIZED(event);
+    }
+  }
+
+  /// Passes an event on at once, or after the segment. May throw.
+  static gboolean pass_on(EventAggregator& self, OwnedEvent event) {
+    if (self.segment_sent_)
+      return gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self.element_), event.release());
+    self.waiting_.push_back(std::move(event));
+    return TRUE;
+  }
+
+  /// Sends the events that wait for the segment.
+  static void send_waiting(EventAggregator& self) {
+    for (auto& event : std::exchange(self.waiting_, {}))
+      gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self.element_), event.release());
+  }
+
+  /// GstAggregator sends the segment just before a buffer or EOS.
+  static GstPadProbeReturn probe_output(GstPad*, GstPadProbeInfo* info, gpointer element) {
+    const bool is_buffer = (GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0;
+    if (is_buffer || GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_EOS)
+      send_waiting(of(GST_AGGREGATOR(element)));
+    return GST_PAD_PROBE_OK;
+  }
+
   /// At the end of the output: EOS, or SEGMENT_DONE once all pads have reached the end of their
   /// segments. May throw.
   static GstFlowReturn end(EventAggregator& self) {
@@ -138,6 +178,7 @@ struct EventAggregatorFunctions {
       GstEvent* const event = gst_event_new_segment(&segment);
       gst_event_set_seqnum(event, gst_event_get_seqnum(done.get()));
       gst_pad_push_event(GST_PAD(src), event);
+      send_waiting(self);
     }
     flush(self.element_);
     gst_pad_push_event(GST_PAD(src), done.release());
@@ -149,10 +190,6 @@ struct EventAggregatorFunctions {
     if (timed_out) GST_LOG_OBJECT(element, "deadline passed; continuing without further input");
     return guard(self, [&] {
       const auto result = self.segment_ended_ ? GST_FLOW_EOS : self.aggregate(timed_out != FALSE);
-      // GstAggregator sends the segment, which precedes tags, with the first buffer.
-      if (has_segment(GST_AGGREGATOR_SRC_PAD(element)))
-        for (auto& tags : std::exchange(self.tags_, {}))
-          gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(element), tags.release());
       return result == GST_FLOW_EOS ? end(self) : result;
     });
   }
@@ -213,9 +250,10 @@ struct EventAggregatorFunctions {
         return FALSE;
       }
     }
-    if (GST_EVENT_TYPE(event) == GST_EVENT_TAG && pad == self.main_pad_) {
-      OwnedEvent tags(gst_event_ref(event));  // GstAggregator drops it
-      guard(self, [&] { self.tags_.push_back(std::move(tags)); });
+    if (is_passed_on(self, pad, event)) {
+      OwnedEvent passed(event);
+      if (self.main_pad_ != nullptr && pad != self.main_pad_) return TRUE;
+      return guard(self, [&] { return pass_on(self, std::move(passed)); });
     }
     if (GST_EVENT_TYPE(event) == GST_EVENT_GAP) take_segment_end(pad, event);
     if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP) forget_segment_end(pad);
@@ -298,6 +336,8 @@ struct EventAggregatorFunctions {
     GST_DEBUG_OBJECT(element, "flushed: dropping events that wait");
     forget_segment_ends(self);
     self.segment_sent_ = false;
+    std::erase_if(self.waiting_,
+                  [](const OwnedEvent& event) { return !GST_EVENT_IS_STICKY(event.get()); });
     return guard(self, [&] {
       self.flush();
       return GST_FLOW_OK;
@@ -315,7 +355,7 @@ struct EventAggregatorFunctions {
     forget_segment_ends(self);
     self.segment_sent_ = false;
     self.main_caps_.reset();
-    self.tags_.clear();
+    self.waiting_.clear();
     self.faults_.reset();
     return TRUE;
   }
@@ -366,7 +406,12 @@ static void finalize(GObject* object) {
 
 static void gst_event_aggregator_init(GstEventAggregator* self) {
   new (&priv_of(self)) GstEventAggregatorPrivate;
-  gst_pad_set_iterate_internal_links_function(GST_AGGREGATOR_SRC_PAD(self), iterate_linked_pads);
+  GstPad* const src = GST_AGGREGATOR_SRC_PAD(self);
+  gst_pad_set_iterate_internal_links_function(src, iterate_linked_pads);
+  gst_pad_add_probe(
+      src,
+      static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
+      EventAggregatorFunctions::probe_output, self, nullptr);
 }
 
 static void gst_event_aggregator_class_init(GstEventAggregatorClass* klass) {

@@ -17,11 +17,11 @@
 /// Implementation of an element that combines event streams and video. Each subclass of
 /// GstEventAggregator owns one, which lives as long as the element.
 ///
-/// One sink pad is the main pad: its segment and its tags are those of the output, and its upstream
-/// determines the seekable range. If pads are requested there is none; the subclass sets the
-/// segment, upstream of the first pad determines the range, and a seek must flush, because pads
-/// reach it at different times. A seek is forwarded to all pads, or to none if one of them would
-/// refuse it.
+/// One sink pad is the main pad: its segment, its tags and its custom events, such as triggers, are
+/// those of the output, and its upstream determines the seekable range. If pads are requested there
+/// is none; the output has the custom events of all, the subclass sets the segment, upstream of the
+/// first pad determines the range, and a seek must flush, because pads reach it at different times.
+/// A seek is forwarded to all pads, or to none if one of them would refuse it.
 ///
 /// Called from the source pad's thread only, or while there is none.
 class EventAggregator {
@@ -92,9 +92,9 @@ class EventAggregator {
   Role role_;
   GstAggregatorPad* main_pad_;
   OwnedCaps main_caps_;
-  std::vector<OwnedEvent> tags_;  ///< of the main pad, to be sent
-  bool segment_sent_ = false;     ///< that of the output
-  bool segment_ended_ = false;    ///< that of the output; other pads may still be in theirs
+  std::vector<OwnedEvent> waiting_;  ///< to be sent after the segment
+  bool segment_sent_ = false;        ///< that of the output
+  bool segment_ended_ = false;       ///< that of the output; other pads may still be in theirs
   EventFaults faults_;
 };
 

@@ -371,6 +371,45 @@ inline void play_on(GstHarness* h, GstClockTime running_time) {
   gst_harness_push_event(h, gst_event_new_segment(&segment));
 }
 
+/// Names of the buffers and events of an output, in their order: "buffer", those of event types,
+/// and of custom events.
+class OutputOrder {
+ public:
+  explicit OutputOrder(GstHarness* h) {
+    gst_pad_add_probe(
+        h->sinkpad,
+        static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER |
+                                     GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
+        +[](GstPad*, GstPadProbeInfo* info, gpointer self) {
+          static_cast<OutputOrder*>(self)->take(info);
+          return GST_PAD_PROBE_OK;
+        },
+        this, nullptr);
+  }
+
+  /// Once the output has ended.
+  const std::vector<std::string>& names() const { return names_; }
+
+ private:
+  void take(GstPadProbeInfo* info) {
+    if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0) {
+      names_.emplace_back("buffer");
+      return;
+    }
+    GstEvent* const event = GST_PAD_PROBE_INFO_EVENT(info);
+    const bool is_custom = GST_EVENT_TYPE(event) == GST_EVENT_CUSTOM_DOWNSTREAM;
+    names_.emplace_back(is_custom ? gst_structure_get_name(gst_event_get_structure(event))
+                                  : GST_EVENT_TYPE_NAME(event));
+  }
+
+  std::vector<std::string> names_;
+};
+
+inline void push_custom(GstHarness* h, const char* name) {
+  gst_harness_push_event(
+      h, gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty(name)));
+}
+
 /// Waits for the next output event of this type; drops other events before it.
 inline Owned<GstEvent> next_event(GstHarness* h, GstEventType type) {
   while (Owned<GstEvent> event{gst_harness_pull_event(h)})

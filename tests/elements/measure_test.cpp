@@ -511,6 +511,24 @@ TEST_F(CompareTest, ComparesOnlyWhatIsInTheSegments) {
   EXPECT_EQ(events_of(passed[0].get()).size(), 100U);
 }
 
+TEST_F(CompareTest, PassesTheCustomEventsOfTheCandidateOn) {
+  make();
+  const OutputOrder output(candidate);
+  begin();
+  for (const GstClockTime t : {0 * ms, 10 * ms}) {
+    push_custom(reference, "of-reference");
+    push_custom(candidate, "of-candidate");
+    for (auto* h : {reference, candidate})
+      gst_harness_push(h, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
+  }
+  end(reference);
+  end(candidate);
+  EXPECT_TRUE(conclude());
+  EXPECT_EQ(output.names(),
+            (std::vector<std::string>{"stream-start", "caps", "segment", "of-candidate", "buffer",
+                                      "of-candidate", "buffer", "eos"}));
+}
+
 TEST_F(CompareTest, ClassifiesWhereNoEventIsLeft) {
   make();
   begin();

@@ -314,6 +314,38 @@ TEST_F(MergeTest, BeginsWithAnEmptyIntervalIfNothingHappens) {
   EXPECT_EQ(GST_BUFFER_DURATION(buffer.get()), 10 * ms);
 }
 
+/// Such as triggers.
+TEST_F(MergeTest, PassesCustomEventsOnInTheirPlace) {
+  const OutputOrder output(a());
+  begin();
+  push_custom(a(), "first");
+  push(a(), 0, {on(1, 0, 1)});
+  push(b(), 0, {on(2, 0, 1)});
+  push_custom(b(), "second");
+  push(a(), 10 * ms, {on(1, 0, 1)});
+  push(b(), 10 * ms, {on(2, 0, 1)});
+  push_custom(a(), "last");
+  end(a());
+  end(b());
+  EXPECT_EQ(rest().size(), 4U);
+  EXPECT_EQ(output.names(),
+            (std::vector<std::string>{"stream-start", "caps", "segment", "first", "buffer",
+                                      "second", "buffer", "last", "eos"}));
+}
+
+TEST_F(MergeTest, PassesCustomEventsOnWhereThereIsNothingElse) {
+  const OutputOrder output(a());
+  begin();
+  push_custom(a(), "triggers");
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), Events{});
+  const auto& names = output.names();
+  ASSERT_GE(names.size(), 3U);
+  EXPECT_EQ(std::vector(names.end() - 3, names.end()),
+            (std::vector<std::string>{"segment", "triggers", "eos"}));
+}
+
 TEST_F(MergeTest, FollowsCapsThatChange) {
   begin();
   push(a(), 0, {on(7, 3, 1)});

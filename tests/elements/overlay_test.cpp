@@ -243,6 +243,23 @@ TEST_F(OverlayTest, PassesGapsInTheVideoOn) {
   EXPECT_EQ(start, 80 * ms);
 }
 
+TEST_F(OverlayTest, PassesTheCustomEventsOfTheVideoOn) {
+  const OutputOrder output(video.get());
+  begin("width=8, height=4");
+  push_custom(events.get(), "triggers");
+  GstStreamCollection* const streams = gst_stream_collection_new("events");
+  gst_harness_push_event(events.get(), gst_event_new_stream_collection(streams));
+  gst_object_unref(streams);
+  push_custom(video.get(), "of-video");
+  push_frame(0);
+  push_events(0, {});
+  EXPECT_EQ(drawn(), Places{});
+  for (auto* h : {video.get(), events.get()}) gst_harness_push_event(h, gst_event_new_eos());
+  ASSERT_TRUE(next_event(video.get(), GST_EVENT_EOS));
+  EXPECT_EQ(output.names(), (std::vector<std::string>{"stream-start", "caps", "segment", "of-video",
+                                                      "buffer", "eos"}));
+}
+
 TEST_F(OverlayTest, SendsNoGapBeforeItsSegment) {
   begin("width=8, height=4");
   push_frame(0);
