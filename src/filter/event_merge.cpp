@@ -90,6 +90,10 @@ MergedInterval EventMerger::next(Inputs inputs) {
   return interval;
 }
 
+bool EventMerger::goes_back(const MergeInput& input) const {
+  return position_ && input.start() + rounding < *position_;
+}
+
 void EventMerger::merge(Inputs inputs, const MergedInterval& interval, LabelledEvents out) {
   for (std::size_t written = 0; written < interval.events;) {
     // The next event, and the time of the next one of another input.

@@ -87,6 +87,9 @@ class EventMerger {
   /// Both must have its size.
   static void merge(Inputs inputs, const MergedInterval& interval, LabelledEvents out);
 
+  /// True if an interval starts before the end of the last one.
+  bool goes_back(const MergeInput& input) const;
+
   /// Forgets the time: the next interval may have any.
   void restart() { position_.reset(); }
 

@@ -54,6 +54,39 @@ class MergedOutput {
   GstClockTime end_ = GST_CLOCK_TIME_NONE;
 };
 
+/// Events of each buffer of an output, after its running time in ms.
+class RunningOutput {
+ public:
+  using Buffers = std::vector<std::pair<GstClockTime, Events>>;
+
+  explicit RunningOutput(GstHarness* h) {
+    gst_pad_add_probe(
+        h->sinkpad, GST_PAD_PROBE_TYPE_BUFFER,
+        +[](GstPad* pad, GstPadProbeInfo* info, gpointer self) {
+          static_cast<RunningOutput*>(self)->take(pad, GST_PAD_PROBE_INFO_BUFFER(info));
+          return GST_PAD_PROBE_OK;
+        },
+        this, nullptr);
+  }
+
+  /// Once the output has ended.
+  const Buffers& buffers() const { return buffers_; }
+
+ private:
+  void take(GstPad* pad, GstBuffer* buffer) {
+    const Owned<GstEvent> event(gst_pad_get_sticky_event(pad, GST_EVENT_SEGMENT, 0));
+    GstSegment segment;
+    gst_event_copy_segment(event.get(), &segment);
+    Events events;
+    append_events(buffer, events);
+    buffers_.emplace_back(
+        gst_segment_to_running_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer)) / ms,
+        events);
+  }
+
+  Buffers buffers_;
+};
+
 class MergeTest : public testing::Test {
  protected:
   MergeTest() : inputs_("eventmerge", "sink_0", "sink_1") {}
@@ -113,6 +146,8 @@ class MergeTest : public testing::Test {
     return std::to_string(width) + "x" + std::to_string(height);
   }
 
+  /// Running time of a buffer that was pulled before the next one was pushed, or all of the
+  /// segment.
   TwoInputs inputs_;
   MergedOutput output_;
 };
@@ -384,6 +419,48 @@ TEST_F(MergeTest, DropsIntervalsThatGoBack) {
   EXPECT_EQ(stat_of(element(), "late-events"), 1U);
 }
 
+TEST_F(MergeTest, FollowsTheSegmentsOfTheStreamThatStartsFirst) {
+  const RunningOutput output(a());
+  begin();
+  push(a(), 0, {on(1, 0, 1)});
+  push(b(), 0, {on(2, 0, 2)});
+  play_on(b(), 70 * ms);
+  play_on(a(), 100 * ms);
+  push(a(), 10 * ms, {on(3, 0, 3)});
+  push(b(), 10 * ms, {on(4, 0, 4)});
+  end(a());
+  end(b());
+  ASSERT_TRUE(next_event(a(), GST_EVENT_EOS));
+  EXPECT_EQ(output.buffers(),
+            (RunningOutput::Buffers{{0, {on_at(1, 0, 1), on_at(2, 0, 2)}},
+                                    {110, {on_at(3, 0, 10'003), on_at(4, 0, 10'004)}}}));
+}
+
+/// One stream is in its next recording before the other one.
+TEST_F(MergeTest, StartsOverOnceAllStreamsGoBackWithNewSegments) {
+  const RunningOutput output(a());
+  begin();
+  push(a(), 0, {on(1, 0, 1)});
+  push(b(), 0, {on(2, 0, 2)});
+  play_on(b(), 100 * ms);
+  push(b(), 0, {on(5, 0, 5)});
+  push(a(), 10 * ms, {on(3, 0, 3)});
+  play_on(a(), 100 * ms);
+  push(a(), 0, {on(4, 0, 4)});
+  end(a());
+  push(b(), 10 * ms, {on(6, 0, 6)});
+  play_on(b(), 200 * ms);
+  push(b(), 0, {on(7, 0, 7)});
+  end(b());
+  ASSERT_TRUE(next_event(a(), GST_EVENT_EOS));
+  EXPECT_EQ(output.buffers(), (RunningOutput::Buffers{{0, {on_at(1, 0, 1), on_at(2, 0, 2)}},
+                                                      {10, {on_at(3, 0, 10'003)}},
+                                                      {100, {on_at(4, 0, 4), on_at(5, 0, 5)}},
+                                                      {110, {on_at(6, 0, 10'006)}},
+                                                      {200, {on_at(7, 0, 7)}}}));
+  EXPECT_EQ(stat_of(element(), "late-events"), 0U);
+}
+
 TEST_F(MergeTest, StartsOverAfterAFlush) {
   begin();
   push(a(), 50 * ms, {on(1, 0, 1)});
@@ -526,6 +603,21 @@ TEST(Merge, WritesTwoRecordingsIntoOne) {
   const auto merged = Recordings::read(both);
   EXPECT_TRUE(std::ranges::is_sorted(merged, {}, &AbsoluteEvent::t));
   EXPECT_EQ(sorted(merged), sorted(expected));
+}
+
+TEST(Merge, GoesOnWithTheNextStream) {
+  const std::string stream =
+      "videotestsrc num-buffers=10 pattern=ball ! video/x-raw, width=64, height=48 ! eventsim-diff";
+  Player alone(stream);
+  ASSERT_TRUE(alone.play()) << alone.error;
+  auto expected = alone.events;
+  ASSERT_GT(expected.size(), 100U);
+  expected.insert(expected.end(), alone.events.begin(), alone.events.end());
+  Player player("concat name=k ! eventmerge name=m min-streams=1  " + stream + " ! k.  " + stream +
+                " ! k.  m.");
+  ASSERT_TRUE(player.play()) << player.error;
+  EXPECT_TRUE(player.warnings.empty());
+  EXPECT_TRUE(player.events == expected) << player.events.size();
 }
 
 TEST(Merge, SeeksInAllRecordings) {

@@ -9,9 +9,11 @@
  * or as the caps downstream say.
  *
  * Streams are merged by their timestamps, which do not change: recordings of two cameras with one
- * clock stay synchronized. The output has the segment of the stream that starts first. Events of
- * one microsecond are in the order of the pads. Labels stay with their events. Where a stream is
- * flagged DISCONT, so is the output. A seek must flush.
+ * clock stay synchronized. The output has the segment of the stream that starts first, and follows
+ * its new ones. A stream that goes back in time with a new segment, such as that of the next
+ * recording of a concat, waits until all others have, too, or have ended. Events of one microsecond
+ * are in the order of the pads. Labels stay with their events. Where a stream is flagged DISCONT,
+ * so is the output. A seek must flush.
  *
  * Readers of recordings are linked as they start, in any order, and GStreamer may give two at once
  * the same pad: name the pads, as in `m.sink_1`. The output starts once #GstEventMerge:min-streams
@@ -219,18 +221,25 @@ bool EventMerge::load(const OwnedAggregatorPad& pad) {
 
 /* output */
 
+/// The segment of a stream, up to the end of the one that ends last.
+GstSegment longest_segment(const OwnedAggregatorPad& of, std::span<const OwnedAggregatorPad> pads) {
+  GstSegment segment = segment_of(of.get());
+  for (const auto& pad : pads)
+    segment.stop = std::max(segment.stop, segment_of(pad.get()).stop);  // none is the maximum
+  return segment;
+}
+
 /// Chooses, once, the segment of the stream that starts first, up to the end of the one that ends
 /// last; from and to where a seek wants, which some streams may not reach.
 void EventMerge::choose_segment(std::span<const OwnedAggregatorPad> pads) {
   if (pads.empty() || std::exchange(segment_chosen_, true)) return;
-  GstSegment chosen = segment_of(pads.front().get());
-  GstClockTime stop = chosen.stop;
-  for (const auto& pad : pads.subspan(1)) {
-    const GstSegment segment = segment_of(pad.get());
-    stop = std::max(stop, segment.stop);  // none is the maximum
-    if (segment.start < chosen.start) chosen = segment;
+  const auto& first = *std::ranges::min_element(
+      pads, {}, [](const OwnedAggregatorPad& pad) { return segment_of(pad.get()).start; });
+  for (const auto& pad : pads) {
+    stream_of(pad).has_output_segment = pad == first;
+    stream_of(pad).segment_is_new = stream_of(pad).goes_back = false;
   }
-  chosen.stop = stop;
+  GstSegment chosen = longest_segment(first, pads);
   const auto sought = sought_.copy();
   // A further seek may be on its way.
   if (sought && std::ranges::any_of(pads, [&](const auto& pad) {
@@ -310,8 +319,9 @@ GstFlowReturn EventMerge::push_interval(const MergedInterval& interval,
 }
 
 GstFlowReturn EventMerge::aggregate(bool timed_out) {
-  const auto pads = numbered_pads(element());
+  auto pads = numbered_pads(element());
   std::vector<MergeInput*> inputs;
+  std::vector<MergeInput*> returned;
   bool waiting = false;
   for (const auto& pad : pads) {
     auto& stream = stream_of(pad);
@@ -319,10 +329,21 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
       gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
       return GST_FLOW_OK;
     }
-    if (load(pad))
-      inputs.push_back(&stream.input);
+    const bool is_loaded = load(pad);
+    stream.goes_back = is_loaded && stream.segment_is_new && merger_.goes_back(stream.input);
+    if (is_loaded)
+      (stream.goes_back ? returned : inputs).push_back(&stream.input);
     else if (!has_ended(pad.get()))
       waiting = true;
+  }
+  if (inputs.empty() && !waiting && !returned.empty()) {
+    GST_DEBUG_OBJECT(element(), "all streams go back");
+    std::erase_if(pads, [](const auto& pad) { return !stream_of(pad).input.is_loaded(); });
+    inputs.swap(returned);
+    merger_.restart();
+    segment_chosen_ = false;
+    discontinuous_ = true;
+    choose_segment(pads);
   }
   if (inputs.empty() && !waiting) {
     choose_segment(pads);
@@ -338,13 +359,17 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
   count(interval);
   for (const auto& pad : pads) {
     auto& stream = stream_of(pad);
-    if (stream.input.is_loaded() && stream.input.start() < interval.end)
-      discontinuous_ |= std::exchange(stream.discontinuous, false);
+    if (!stream.input.is_loaded() || stream.input.start() >= interval.end || stream.goes_back)
+      continue;
+    discontinuous_ |= std::exchange(stream.discontinuous, false);
+    if (std::exchange(stream.segment_is_new, false) && stream.has_output_segment)
+      set_segment(longest_segment(pad, pads));
   }
   const GstFlowReturn result = push_interval(interval, inputs);
   for (const auto& pad : pads) {
     auto& stream = stream_of(pad);
-    if (!stream.input.is_loaded() || !stream.input.is_merged(interval.end)) continue;
+    if (!stream.input.is_loaded() || !stream.input.is_merged(interval.end) || stream.goes_back)
+      continue;
     stream.input.unload();
     stream.loaded.reset();
     gst_aggregator_pad_drop_buffer(pad.get());
@@ -359,7 +384,7 @@ GstClockTime EventMerge::next_time() {
   for (const auto& pad : numbered_pads(element())) {
     const auto buffer = next_buffer(pad.get());
     const auto interval = buffer ? interval_of(buffer.get()) : std::nullopt;
-    if (!buffer) continue;
+    if (!buffer || stream_of(pad).goes_back) continue;
     const auto start = interval ? running_time(pad.get(), interval->start) : std::nullopt;
     next = std::min(next, start.value_or(0));
   }
@@ -430,6 +455,7 @@ void EventMerge::flush() noexcept {
     stream.input.unload();
     stream.loaded.reset();
     stream.discontinuous = false;
+    stream.segment_is_new = stream.goes_back = false;
   });
   merger_.restart();
   segment_chosen_ = false;
@@ -441,6 +467,7 @@ void EventMerge::stop() {
   flush();
   for (const auto& pad : numbered_pads(element())) {
     stream_of(pad).sensor = {};
+    stream_of(pad).segment_seqnum = GST_SEQNUM_INVALID;
     gst_segment_init(&*stream_of(pad).segment.lock(), GST_FORMAT_TIME);
   }
   sought_.lock()->reset();
@@ -526,7 +553,9 @@ static void release_pad(GstElement* element, GstPad* pad) {
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && segment_of(event).format == GST_FORMAT_TIME) {
     auto& stream = *GST_EVENT_MERGE_PAD(pad)->priv;
-    *stream.segment.lock() = segment_of(event);
+    const auto last = std::exchange(*stream.segment.lock(), segment_of(event));
+    if (stream.segment_seqnum != GST_SEQNUM_INVALID)
+      stream.segment_is_new |= !continues(last, segment_of(event));
     stream.segment_seqnum = gst_event_get_seqnum(event);
   }
   return PARENT_AGGREGATOR_CLASS->sink_event(aggregator, pad, event);

@@ -28,8 +28,11 @@ struct GstEventMergePadPrivate {
 
   // Accessed by the source pad's thread only, or while there is none.
   guint32 segment_seqnum = GST_SEQNUM_INVALID;
-  eventcamera::SensorSize sensor;  ///< 0x0 before caps
-  SensorPosition placed;           ///< position in the negotiated output
+  bool segment_is_new = false;      ///< it is not the first, and nothing of it is merged yet
+  bool goes_back = false;           ///< its loaded interval does, in a new segment, and waits
+  bool has_output_segment = false;  ///< its segment is that of the output
+  eventcamera::SensorSize sensor;   ///< 0x0 before caps
+  SensorPosition placed;            ///< position in the negotiated output
   eventcamera::MergeInput input;
   OwnedBuffer loaded;          ///< queued buffer whose events `input` has
   bool discontinuous = false;  ///< its start, or that of a buffer dropped before it
