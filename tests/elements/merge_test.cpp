@@ -783,6 +783,38 @@ TEST(Merge, WaitsForTheSecondStream) {
   EXPECT_EQ(events_of(buffer.get()).size(), 2U);
 }
 
+TEST(Merge, WaitsForTheSecondStreamWhereTheFirstIsEmpty) {
+  gst_init(nullptr, nullptr);
+  const Owned<GstHarness> first(gst_harness_new_empty());
+  gst_harness_set_live(first.get(), FALSE);  // before the element asks
+  const Owned<GstElement> element(
+      GST_ELEMENT(gst_object_ref_sink(gst_element_factory_make("eventmerge", nullptr))));
+  GstStaticPadTemplate src =
+      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS_ANY);
+  GstStaticPadTemplate sink =
+      GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS_ANY);
+  gst_harness_add_element_full(first.get(), element.get(), &src, "sink_0", &sink, "src");
+  gst_harness_set_src_caps_str(first.get(), small);
+  gst_harness_push_event(first.get(), gst_event_new_eos());
+  const std::clock_t before = std::clock();
+  g_usleep(300'000);
+  EXPECT_LT(std::clock() - before, CLOCKS_PER_SEC / 10) << "it waits without a pause";
+  const Owned<GstHarness> second(gst_harness_new_with_element(element.get(), "sink_1", nullptr));
+  gst_harness_set_live(second.get(), FALSE);
+  gst_harness_set_src_caps_str(second.get(), small);
+  EXPECT_EQ(gst_harness_push(second.get(), buffer_of(0, {on(2, 0, 0)}, 10 * ms)), GST_FLOW_OK);
+  gst_harness_push_event(second.get(), gst_event_new_eos());
+  EXPECT_TRUE(next_event(first.get(), GST_EVENT_EOS));
+  EXPECT_EQ(gst_harness_buffers_in_queue(first.get()), 1U);
+}
+
+TEST(Merge, EndsWithALiveStreamAloneThatIsEmpty) {
+  Player player(
+      "videotestsrc is-live=true num-buffers=0 ! video/x-raw, width=64, height=48 ! eventsim-frame "
+      "! queue ! m.sink_0  eventmerge name=m");
+  EXPECT_TRUE(player.play()) << player.error;
+}
+
 TEST(Merge, GoesOnWithALiveStreamAlone) {
   Player player(
       "videotestsrc is-live=true pattern=ball num-buffers=15 ! video/x-raw, width=64, height=48, "

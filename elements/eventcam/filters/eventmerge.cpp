@@ -152,8 +152,9 @@ bool EventMerge::wait_for_streams(std::size_t linked) {
   constexpr gint64 patience = G_USEC_PER_SEC;  // streams of a bin that decodes come late
   const GstClockTime latency = gst_aggregator_get_latency(element());
   const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(element()));
-  if (GST_CLOCK_TIME_IS_VALID(latency) && GST_CLOCK_TIME_IS_VALID(now) &&
-      now >= next_time() + latency)
+  const GstClockTime next = next_time();
+  const GstClockTime start = GST_CLOCK_TIME_IS_VALID(next) ? next : 0;
+  if (GST_CLOCK_TIME_IS_VALID(latency) && GST_CLOCK_TIME_IS_VALID(now) && now >= start + latency)
     return true;
   if (waiting_since_ == 0) waiting_since_ = g_get_monotonic_time();
   if (g_get_monotonic_time() - waiting_since_ > patience)
@@ -345,13 +346,14 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
     discontinuous_ = true;
     choose_segment(pads);
   }
-  if (inputs.empty() && !waiting) {
+  const bool all_have_ended = inputs.empty() && !waiting;
+  if (!segment_chosen_ && pads.size() < settings.copy().min_streams) {
+    if (!inputs.empty() || all_have_ended) timed_out = timed_out || wait_for_streams(pads.size());
+    waiting = true;
+  }
+  if (all_have_ended && (!waiting || timed_out)) {
     choose_segment(pads);
     return GST_FLOW_EOS;
-  }
-  if (!segment_chosen_ && pads.size() < settings.copy().min_streams) {
-    waiting = true;
-    if (!inputs.empty()) timed_out = timed_out || wait_for_streams(pads.size());
   }
   if (inputs.empty() || (waiting && !timed_out)) return GST_AGGREGATOR_FLOW_NEED_DATA;
   choose_segment(pads);
