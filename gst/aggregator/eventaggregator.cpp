@@ -98,6 +98,11 @@ struct EventAggregatorFunctions {
     return gst_event_aggregator_impl(GST_EVENT_AGGREGATOR(element));
   }
 
+  /// True if output buffers are those of a pad.
+  static bool is_passed(const EventAggregator& self, GstAggregatorPad* pad) {
+    return pad == self.main_pad_ && self.role_.passes_main_pad;
+  }
+
   template <class Work>
   static auto guard(EventAggregator& self, const Work& work) {
     const auto report = [&self](const std::exception& error) -> Report {
@@ -215,7 +220,7 @@ struct EventAggregatorFunctions {
       return false;
     }
     GST_DEBUG_OBJECT(pad, "takes %" GST_PTR_FORMAT, caps);
-    if (pad == self.main_pad_ && self.role_.passes_main_pad) {
+    if (is_passed(self, pad)) {
       self.main_caps_.reset(gst_caps_ref(caps));
       gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(self.element_));
     }
@@ -320,12 +325,19 @@ struct EventAggregatorFunctions {
                : PARENT_AGGREGATOR_CLASS->src_query(element, query);
   }
 
+  /// Answers ALLOCATION queries at once. GstAggregator would do so after the buffers before them,
+  /// which may wait for another pad, while upstream of both, such as a tee, waits for the answer.
+  static gboolean sink_query_pre_queue(GstAggregator* element, GstAggregatorPad* pad,
+                                       GstQuery* query) {
+    if (GST_QUERY_TYPE(query) == GST_QUERY_ALLOCATION)
+      return is_passed(of(element), pad)
+                 ? gst_pad_peer_query(GST_AGGREGATOR_SRC_PAD(element), query)
+                 : FALSE;
+    return PARENT_AGGREGATOR_CLASS->sink_query_pre_queue(element, pad, query);
+  }
+
   static gboolean sink_query(GstAggregator* element, GstAggregatorPad* pad, GstQuery* query) {
-    const auto& self = of(element);
-    const bool is_passed = pad == self.main_pad_ && self.role_.passes_main_pad;
-    if (is_passed && GST_QUERY_TYPE(query) == GST_QUERY_ALLOCATION)
-      return gst_pad_peer_query(GST_AGGREGATOR_SRC_PAD(element), query);
-    if (!is_passed || GST_QUERY_TYPE(query) != GST_QUERY_CAPS)
+    if (!is_passed(of(element), pad) || GST_QUERY_TYPE(query) != GST_QUERY_CAPS)
       return PARENT_AGGREGATOR_CLASS->sink_query(element, pad, query);
     answer_caps_of_passed(element, pad, query);
     return TRUE;
@@ -426,6 +438,7 @@ static void gst_event_aggregator_class_init(GstEventAggregatorClass* klass) {
   aggregator_class->sink_event = Functions::sink_event;
   aggregator_class->src_event = Functions::src_event;
   aggregator_class->src_query = Functions::src_query;
+  aggregator_class->sink_query_pre_queue = Functions::sink_query_pre_queue;
   aggregator_class->sink_query = Functions::sink_query;
   aggregator_class->flush = Functions::flush;
   aggregator_class->start = Functions::start;

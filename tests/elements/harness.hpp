@@ -200,7 +200,7 @@ class Harness {
 
   /// Waits until an aggregator has handled the events that were pushed.
   void wait_for_events() {
-    GstQuery* const query = gst_query_new_allocation(nullptr, FALSE);
+    GstQuery* const query = gst_query_new_drain();
     gst_pad_peer_query(h_->srcpad, query);
     gst_query_unref(query);
   }

@@ -8,8 +8,7 @@
 #include <string>
 
 #include "src/core/event.hpp"
-#include "tests/elements/event_buffer.hpp"
-#include "tests/elements/harness.hpp"
+#include "tests/elements/pipeline.hpp"
 
 namespace {
 
@@ -602,6 +601,17 @@ TEST_F(CompareTest, RefusesSensorsOfTwoSizes) {
       gst_bus_timed_pop_filtered(compare->bus.get(), 5 * GST_SECOND, GST_MESSAGE_ERROR));
   ASSERT_TRUE(message);
   EXPECT_NE(text_of(message.get()).find("8 x 4 pixels, the candidate 9 x 4"), std::string::npos);
+}
+
+/// Which asks for memory again. A tee waits for the answers of both of its branches.
+TEST(Compare, GoesOnWhereItsSourceChanges) {
+  const std::string source =
+      "videotestsrc num-buffers=30 ! video/x-raw, width=64, height=48, framerate=30/1 ! k.  ";
+  Pipeline pipeline(
+      "concat name=k ! eventsim-diff ! tee name=t  t. ! queue ! c.candidate  t. ! queue ! "
+      "c.reference  eventcompare name=c ! fakesink  " +
+      source + source);
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
 }
 
 TEST(Compare, AsksOnceForTheStreamThatIsMissing) {

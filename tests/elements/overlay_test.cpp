@@ -308,6 +308,19 @@ TEST(LiveOverlay, GoesOnWhereNoEventsAreLinked) {
   EXPECT_EQ(pipeline.stat("sink", "rendered"), 10U);
 }
 
+/// Which asks for memory again. A tee waits for the answers of both of its branches.
+TEST(Overlay, GoesOnWhereItsSourceChanges) {
+  const std::string source =
+      "videotestsrc num-buffers=30 ! video/x-raw, width=64, height=48, framerate=30/1 ! k.  ";
+  Pipeline pipeline(
+      "concat name=k ! identity single-segment=true ! tee name=t  t. ! queue ! videoconvert ! "
+      "eventoverlay name=overlay ! fakesink name=sink  t. ! queue ! eventsim-diff ! "
+      "overlay.event_sink  " +
+      source + source);
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  EXPECT_EQ(pipeline.stat("sink", "rendered"), 60U);
+}
+
 TEST(Overlay, AsksOnceForTheEventsThatAreMissing) {
   Harness h("eventoverlay", "video_sink", "src");
   for (const char* size : {"width=8, height=4", "width=4, height=8"})
