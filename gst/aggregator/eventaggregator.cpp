@@ -53,13 +53,16 @@ GstFlowReturn EventAggregator::push(OwnedBuffer buffer) {
   return gst_aggregator_finish_buffer(element_, buffer.release());
 }
 
-GstFlowReturn EventAggregator::pass(OwnedBuffer buffer) {
-  if (!is_gap(buffer.get())) return push(std::move(buffer));
-  if (segment_sent_)
-    gst_pad_push_event(
-        GST_AGGREGATOR_SRC_PAD(element_),
-        gst_event_new_gap(GST_BUFFER_PTS(buffer.get()), GST_BUFFER_DURATION(buffer.get())));
-  return GST_FLOW_OK;
+GstFlowReturn EventAggregator::push_gap(GstClockTime start, GstClockTime duration) {
+  GstPad* const src = GST_AGGREGATOR_SRC_PAD(element_);
+  if (segment_sent_) return push_event(src, gst_event_new_gap(start, duration));
+  if (!gst_pad_has_current_caps(src)) return GST_FLOW_OK;
+  // GstAggregator sends the segment with a buffer only.
+  OwnedBuffer empty(gst_buffer_new());
+  GST_BUFFER_PTS(empty.get()) = start;
+  GST_BUFFER_DURATION(empty.get()) = duration;
+  GST_BUFFER_FLAG_SET(empty.get(), GST_BUFFER_FLAG_GAP | GST_BUFFER_FLAG_DISCONT);
+  return push(std::move(empty));
 }
 
 std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime time) {

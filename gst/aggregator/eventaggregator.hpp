@@ -76,8 +76,8 @@ class EventAggregator {
 
   /// Pushes a buffer of the output.
   GstFlowReturn push(OwnedBuffer buffer);
-  /// Pushes a buffer, or the GAP event for which GstAggregator has queued it.
-  GstFlowReturn pass(OwnedBuffer buffer);
+  /// Pushes a GAP event; before the segment, an empty buffer of events.
+  GstFlowReturn push_gap(GstClockTime start, GstClockTime duration);
 
   /// Warns about skipped events.
   template <class Fault>

@@ -528,6 +528,21 @@ TEST_F(CompareTest, PassesTheCustomEventsOfTheCandidateOn) {
                                       "of-candidate", "buffer", "eos"}));
 }
 
+TEST_F(CompareTest, PassesGapsBeforeTheFirstEventsOn) {
+  make();
+  const OutputOrder output(candidate);
+  begin();
+  for (const GstClockTime t : {0 * ms, 10 * ms})
+    for (auto* h : {reference, candidate}) gst_harness_push_event(h, gst_event_new_gap(t, 10 * ms));
+  for (auto* h : {reference, candidate}) end(h);
+  EXPECT_TRUE(conclude());
+  EXPECT_EQ(output.names(),
+            (std::vector<std::string>{"stream-start", "caps", "segment", "buffer", "gap", "eos"}));
+  ASSERT_EQ(passed.size(), 1U);
+  EXPECT_EQ(gst_buffer_get_size(passed[0].get()), 0U);
+  EXPECT_EQ(GST_BUFFER_DURATION(passed[0].get()), 10 * ms);
+}
+
 TEST_F(CompareTest, ClassifiesWhereNoEventIsLeft) {
   make();
   begin();

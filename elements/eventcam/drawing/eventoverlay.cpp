@@ -225,7 +225,9 @@ GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& inter
   }
   OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
   if (interval) shown_ = interval->end;
-  if (is_gap(out.get())) return pass(std::move(out));
+  if (is_gap(out.get()))
+    return is_segment_sent() ? push_gap(GST_BUFFER_PTS(out.get()), GST_BUFFER_DURATION(out.get()))
+                             : GST_FLOW_OK;
   GST_LOG_OBJECT(main_pad(),
                  "frame at %" GST_TIME_FORMAT "; events are known until %" GST_TIME_FORMAT,
                  GST_TIME_ARGS(GST_BUFFER_PTS(out.get())), GST_TIME_ARGS(known_));
@@ -233,7 +235,7 @@ GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& inter
     const GstFlowReturn result = draw(*interval, out.get());
     if (result != GST_FLOW_OK) return result;
   }
-  return pass(std::move(out));
+  return push(std::move(out));
 }
 
 GstFlowReturn EventOverlay::aggregate(bool timed_out) {

@@ -127,7 +127,7 @@ class EventMerge final : public EventAggregator {
   void count(const MergedInterval& interval);
   void choose_segment(std::span<const OwnedAggregatorPad> pads);
   GstFlowReturn push_interval(const MergedInterval& interval, EventMerger::Inputs inputs);
-  GstFlowReturn push_gap(GstClockTime start, GstClockTime duration);
+  GstFlowReturn push_silence(GstClockTime start, GstClockTime duration);
 
   Guarded<Counts> counts_;
   Guarded<std::optional<SeekRequest>> sought_;  ///< the latest seek
@@ -277,19 +277,12 @@ void EventMerge::count(const MergedInterval& interval) {
                       std::to_string(interval.start) + " us, up to which events were sent");
 }
 
-GstFlowReturn EventMerge::push_gap(GstClockTime start, GstClockTime duration) {
+GstFlowReturn EventMerge::push_silence(GstClockTime start, GstClockTime duration) {
   if (duration == 0) return GST_FLOW_OK;
   GST_LOG_OBJECT(element(), "no events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
                  GST_TIME_ARGS(start), GST_TIME_ARGS(duration));
-  if (is_segment_sent())
-    return push_event(GST_AGGREGATOR_SRC_PAD(element()), gst_event_new_gap(start, duration));
-  // GstAggregator sends the segment with a buffer only.
-  OwnedBuffer empty(gst_buffer_new());
-  GST_BUFFER_PTS(empty.get()) = start;
-  GST_BUFFER_DURATION(empty.get()) = duration;
-  GST_BUFFER_FLAG_SET(empty.get(), GST_BUFFER_FLAG_GAP | GST_BUFFER_FLAG_DISCONT);
-  discontinuous_ = false;
-  return push(std::move(empty));
+  if (!is_segment_sent()) discontinuous_ = false;
+  return push_gap(start, duration);
 }
 
 /// Pushes the events of an interval. May throw.
@@ -298,7 +291,7 @@ GstFlowReturn EventMerge::push_interval(const MergedInterval& interval,
   if (!gst_pad_has_current_caps(GST_AGGREGATOR_SRC_PAD(element()))) return GST_FLOW_OK;
   const auto start = static_cast<GstClockTime>(interval.start) * GST_USECOND;
   const auto duration = static_cast<GstClockTime>(interval.end - interval.start) * GST_USECOND;
-  if (interval.events == 0) return push_gap(start, duration);
+  if (interval.events == 0) return push_silence(start, duration);
   const gsize size = interval.events * sizeof(eventcamera::Event);
   OwnedBuffer buffer;
   const GstFlowReturn result = buffers_.acquire(size, buffer);

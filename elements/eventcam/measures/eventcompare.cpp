@@ -266,7 +266,10 @@ GstFlowReturn EventCompare::take_next() {
     if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
     if (comparing && behind == StreamRole::candidate) compare(StreamRole::candidate, buffer.get());
   }
-  return pass(OwnedBuffer(gst_aggregator_pad_pop_buffer(main_pad())));
+  OwnedBuffer passed(gst_aggregator_pad_pop_buffer(main_pad()));
+  return is_gap(passed.get())
+             ? push_gap(GST_BUFFER_PTS(passed.get()), GST_BUFFER_DURATION(passed.get()))
+             : push(std::move(passed));
 }
 
 GstFlowReturn EventCompare::aggregate(bool) {
