@@ -20,6 +20,11 @@ StreamRole StreamComparison::behind() const {
   return candidate.end < reference.end ? StreamRole::candidate : StreamRole::reference;
 }
 
+std::optional<Nanoseconds> StreamComparison::end_of(StreamRole role) const {
+  const auto& stream = arriving_[role];
+  return stream.start ? std::optional(stream.end) : std::nullopt;
+}
+
 std::optional<Nanoseconds> StreamComparison::start() const {
   const auto& a = arriving_[StreamRole::reference].start;
   const auto& b = arriving_[StreamRole::candidate].start;

@@ -36,6 +36,9 @@ class StreamComparison {
   /// The stream that lags behind; its events are needed next.
   StreamRole behind() const;
 
+  /// End of what was added of a stream; none before that.
+  std::optional<Nanoseconds> end_of(StreamRole role) const;
+
   /// Adds the sorted events of [start, end] of one stream, with times relative to `base`, and their
   /// labels, if they have any. Returns what was skipped.
   InvalidEvents add(StreamRole role, std::span<const Event> events, Microseconds base,

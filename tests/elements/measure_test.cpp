@@ -485,6 +485,54 @@ TEST_F(CompareTest, ComparesEachSegment) {
   EXPECT_FALSE(compare->message(GST_MESSAGE_ELEMENT));
 }
 
+TEST_F(CompareTest, StartsOverWhereTimeGoesBack) {
+  make();
+  begin();
+  for (const GstClockTime base : {0 * ms, 20 * ms}) {
+    for (auto* h : {reference, candidate}) play_on(h, base);
+    for (const GstClockTime t : {0 * ms, 10 * ms})
+      for (auto* h : {reference, candidate})
+        gst_harness_push(h, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
+  }
+  for (auto* h : {reference, candidate}) end(h);
+  const auto* figures = conclude();
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(figures) << i;
+    EXPECT_EQ(time_in(figures, "end"), gint64{20 * ms});
+    for (const char* role : {"reference", "candidate"})
+      EXPECT_EQ(count_in(within(figures, role)), 2U) << role;
+    message_ = compare->message(GST_MESSAGE_ELEMENT);
+    figures = structure_of(message_);
+  }
+  EXPECT_FALSE(message_);
+  EXPECT_EQ(passed.size(), 4U);
+}
+
+TEST_F(CompareTest, StartsOverOnceTimeGoesBackInBothStreams) {
+  make();
+  begin();
+  const auto push = [](GstHarness* h, GstClockTime t) {
+    gst_harness_push(h, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
+  };
+  for (const GstClockTime t : {0 * ms, 10 * ms})
+    for (auto* h : {reference, candidate}) push(h, t);
+  push(reference, 20 * ms);
+  push(candidate, 0);
+  push(reference, 30 * ms);
+  push(reference, 0);
+  for (auto* h : {reference, candidate}) end(h);
+  const auto* figures = conclude();
+  for (const guint64 count : {2, 1}) {
+    ASSERT_TRUE(figures);
+    for (const char* role : {"reference", "candidate"})
+      EXPECT_EQ(count_in(within(figures, role)), count) << role;
+    message_ = compare->message(GST_MESSAGE_ELEMENT);
+    figures = structure_of(message_);
+  }
+  EXPECT_FALSE(message_);
+  EXPECT_EQ(passed.size(), 3U);
+}
+
 TEST_F(CompareTest, ComparesOnlyWhatIsInTheSegments) {
   make();
   begin();

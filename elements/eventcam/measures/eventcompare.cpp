@@ -7,7 +7,8 @@
  * Compares the stream on the pad `candidate`, which it passes through, with the one on the pad
  * `reference`, over the time that both cover in their segments. The two are synchronized by stream
  * time, and their sensors must have the same size. At EOS of the candidate, at the end of its
- * segment in a segment seek, or on stop, it posts an element message `eventcompare`:
+ * segment in a segment seek, where stream time goes back, or on stop, it posts an element message
+ * `eventcompare`:
  *
  * - `start`, `end` (#gint64): the time covered by both, in stream time (ns);
  * - `reference`, `candidate` (#GstStructure): the statistics of each, as in #GstEventStats;
@@ -32,6 +33,9 @@
  *   is kept, noise that is kept, noise that is dropped, light that is dropped;
  *   `true-positive-rate` (recall), `false-positive-rate` and `precision` (#gdouble). Events of
  *   unknown cause do not count.
+ *
+ * Where the stream time of one goes back, as in the next recording of a concat, it waits until that
+ * of the other does, or that ends. Then another comparison starts.
  *
  * The same is written to #GstEventCompare:location as JSON. #GstEventCompare:map shows the events
  * per pixel of the reference, of the candidate and of their difference, blue if the candidate has
@@ -68,6 +72,7 @@ GST_DEBUG_CATEGORY_STATIC(event_compare_debug);
 
 using eventcamera::both_roles;
 using eventcamera::Classification;
+using eventcamera::Nanoseconds;
 using eventcamera::PerRole;
 using eventcamera::SensorSize;
 using eventcamera::StreamComparison;
@@ -94,6 +99,8 @@ class EventCompare final : public EventAggregator {
   Guarded<ReportFiles> settings;
 
  private:
+  bool goes_back(StreamRole role) const;
+  bool is_over(StreamRole role) const;
   bool waits_for_reference() const;
   bool begin();
   bool has_one_size() const;
@@ -230,10 +237,26 @@ void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
   warn(skipped, buffer);
 }
 
+/// True if the next buffer of a stream is earlier than what was compared of it.
+bool EventCompare::goes_back(StreamRole role) const {
+  const auto end = comparison_ ? comparison_->end_of(role) : std::nullopt;
+  const auto buffer = next_buffer(pads_[role]);
+  const auto interval = end && buffer ? interval_of(buffer.get()) : std::nullopt;
+  if (!interval) return false;
+  const GstSegment segment = segment_of(pads_[role]);
+  const auto clipped = clip(*interval, segment);
+  return clipped && stream_time(segment, clipped->start) + Nanoseconds{event_resolution} < *end;
+}
+
+/// True if nothing more of a stream belongs to the comparison.
+bool EventCompare::is_over(StreamRole role) const {
+  return has_ended(pads_[role]) || goes_back(role);
+}
+
 /// True if the reference does not cover all that has been read of the candidate yet.
 bool EventCompare::waits_for_reference() const {
   return comparison_ && comparison_->behind() == StreamRole::reference &&
-         !has_ended(pads_[StreamRole::reference]);
+         !is_over(StreamRole::reference);
 }
 
 /// Starts the comparison once both sensors, of one size, are known. Returns true if it is running.
@@ -255,10 +278,20 @@ bool EventCompare::begin() {
 GstFlowReturn EventCompare::take_next() {
   const bool comparing = begin();
   const auto behind = comparing ? comparison_->behind() : StreamRole::candidate;
-  if (behind == StreamRole::reference && !has_ended(pads_[StreamRole::reference])) {
+  if (behind == StreamRole::reference && !is_over(StreamRole::reference)) {
     const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pads_[StreamRole::reference]));
     if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
     compare(StreamRole::reference, buffer.get());
+    return GST_FLOW_OK;
+  }
+  if (goes_back(StreamRole::candidate)) {
+    if (!is_over(StreamRole::reference))
+      return gst_aggregator_pad_drop_buffer(pads_[StreamRole::reference])
+                 ? GST_FLOW_OK
+                 : GST_AGGREGATOR_FLOW_NEED_DATA;
+    GST_DEBUG_OBJECT(element(), "stream time goes back: starting over");
+    if (!concluded_) conclude();
+    flush();
     return GST_FLOW_OK;
   }
   {
