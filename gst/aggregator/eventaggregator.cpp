@@ -120,6 +120,11 @@ struct EventAggregatorFunctions {
     self.segment_ended_ = false;
   }
 
+  /// As GST_EVENT_IS_SERIALIZED() and GST_EVENT_IS_STICKY(), which mix two enumerations.
+  static bool has_flag(GstEvent* event, GstEventTypeFlags flag) {
+    return (gst_event_type_get_flags(GST_EVENT_TYPE(event)) & flag) != 0;
+  }
+
   /// True if an event goes through in its place in the stream. GstAggregator would forward it from
   /// any pad, before the segment, and drop tags.
   static bool is_passed_on(const EventAggregator& self, GstAggregatorPad* pad, GstEvent* event) {
@@ -134,7 +139,7 @@ struct EventAggregatorFunctions {
       case GST_EVENT_FLUSH_STOP:
         return false;
       default:
-        return GST_EVENT_IS_SERIALIZED(event);
+        return has_flag(event, GST_EVENT_TYPE_SERIALIZED);
     }
   }
 
@@ -351,8 +356,9 @@ struct EventAggregatorFunctions {
     GST_DEBUG_OBJECT(element, "flushed: dropping events that wait");
     forget_segment_ends(self);
     self.segment_sent_ = false;
-    std::erase_if(self.waiting_,
-                  [](const OwnedEvent& event) { return !GST_EVENT_IS_STICKY(event.get()); });
+    std::erase_if(self.waiting_, [](const OwnedEvent& event) {
+      return !has_flag(event.get(), GST_EVENT_TYPE_STICKY);
+    });
     return guard(self, [&] {
       self.flush();
       return GST_FLOW_OK;
