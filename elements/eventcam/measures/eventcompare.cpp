@@ -245,7 +245,7 @@ bool EventCompare::goes_back(StreamRole role) const {
   if (!interval) return false;
   const GstSegment segment = segment_of(pads_[role]);
   const auto clipped = clip(*interval, segment);
-  return clipped && stream_time(segment, clipped->start) + Nanoseconds{event_resolution} < *end;
+  return clipped && stream_time(segment, clipped->start) < *end - Nanoseconds{event_resolution};
 }
 
 /// True if nothing more of a stream belongs to the comparison.
