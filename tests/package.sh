@@ -117,13 +117,13 @@ install=$(sed -n 's/^apt install /apt-get install -q -y --install-recommends /p'
 eval "${install:?}"
 source /tmp/pages/scratch_folder.sh
 source /tmp/pages/run_lines.sh
-mkdir pipelines
-ln -s /usr/share/doc/{gir1.2-gsteventcamera-1.0,python3-gst-eventcamera}/examples/* pipelines/
+mkdir -p pipelines/examples
+ln -s /usr/share/doc/{gir1.2-gsteventcamera-1.0,python3-gst-eventcamera}/examples/* pipelines/examples/
 run_lines /tmp/pages/README.md /tmp/pages/api.md /tmp/pages/network.md
 for file in ball.npz out.raw out.h5 events.npy; do
   [ -s $file ] || fail "$file is missing or empty"
 done
-./pipelines/on_and_off.py
+./pipelines/examples/on_and_off.py
 echo "The $count lines of the README and of two more pages were run"
 READ
 mkdir "$scratch/pages"
