@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "gst/base/errors.hpp"
+#include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_aggregator_debug);
@@ -120,11 +121,6 @@ struct EventAggregatorFunctions {
     self.segment_ended_ = false;
   }
 
-  /// As GST_EVENT_IS_SERIALIZED() and GST_EVENT_IS_STICKY(), which mix two enumerations.
-  static bool has_flag(GstEvent* event, GstEventTypeFlags flag) {
-    return (gst_event_type_get_flags(GST_EVENT_TYPE(event)) & flag) != 0;
-  }
-
   /// True if an event goes through in its place in the stream. GstAggregator would forward it from
   /// any pad, before the segment, and drop tags.
   static bool is_passed_on(const EventAggregator& self, GstAggregatorPad* pad, GstEvent* event) {
@@ -139,7 +135,7 @@ struct EventAggregatorFunctions {
       case GST_EVENT_FLUSH_STOP:
         return false;
       default:
-        return has_flag(event, GST_EVENT_TYPE_SERIALIZED);
+        return is_serialized(event);
     }
   }
 
@@ -357,7 +353,7 @@ struct EventAggregatorFunctions {
     forget_segment_ends(self);
     self.segment_sent_ = false;
     std::erase_if(self.waiting_, [](const OwnedEvent& event) {
-      return !has_flag(event.get(), GST_EVENT_TYPE_STICKY);
+      return (gst_event_type_get_flags(GST_EVENT_TYPE(event.get())) & GST_EVENT_TYPE_STICKY) == 0;
     });
     return guard(self, [&] {
       self.flush();

@@ -57,6 +57,11 @@ inline bool peer_can_seek(GstPad* pad, GstFormat format) {
   return seekable != FALSE;
 }
 
+/// As GST_EVENT_IS_SERIALIZED(), which mixes two enumerations.
+inline bool is_serialized(GstEvent* event) {
+  return (gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED) != 0;
+}
+
 /// Pushes an event; returns why it was refused, if it was.
 inline GstFlowReturn push_event(GstPad* src, GstEvent* event) {
   return gst_pad_push_event(src, event) ? GST_FLOW_OK : gst_pad_get_last_flow_return(src);

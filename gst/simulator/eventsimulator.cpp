@@ -120,9 +120,7 @@ static GstEvent* segment_of_times(GstEvent* event) {
 
 static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   auto& simulation = simulation_of(transform);
-  const bool is_serialized =
-      (gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED) != 0;
-  if (is_serialized && GST_EVENT_TYPE(event) != GST_EVENT_FLUSH_STOP) simulation.finish();
+  if (is_serialized(event) && GST_EVENT_TYPE(event) != GST_EVENT_FLUSH_STOP) simulation.finish();
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_SEGMENT:
       event = segment_of_times(event);

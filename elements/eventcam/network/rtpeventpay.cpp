@@ -311,9 +311,7 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
       [[fallthrough]];
     default:
       // Triggers and IMU samples precede each buffer, and may precede the interval that it joins.
-      if ((gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED) &&
-          !is_sensor_event(event))
-        reported(self, [&] { send(self); });
+      if (is_serialized(event) && !is_sensor_event(event)) reported(self, [&] { send(self); });
       break;
   }
   return PARENT_PAYLOAD_CLASS->sink_event(payload, event);

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/reader/event_reader.hpp"
@@ -106,9 +107,8 @@ gboolean EventReader::sink_event(GstEvent* event) {
       interrupt_output();
       return gst_pad_event_default(sink_, GST_OBJECT(element_), event);
     default:
-      return (gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED)
-                 ? forward(event)
-                 : gst_pad_event_default(sink_, GST_OBJECT(element_), event);
+      return is_serialized(event) ? forward(event)
+                                  : gst_pad_event_default(sink_, GST_OBJECT(element_), event);
   }
 }
 
