@@ -148,9 +148,7 @@ class ClipFrames(Frames):
         if time < self.start:
             self.before.append([buffer.pts, self._hash_of(buffer)])
         else:
-            self.times.append(buffer.pts)
-            self.shown = buffer.duration if buffer.duration != Gst.CLOCK_TIME_NONE else 0
-            self.corrupted += buffer.has_flags(Gst.BufferFlags.CORRUPTED)
+            self.add(buffer)
             if self.end is not None and time >= self.end - MARGIN:
                 self.last.append([buffer.pts, self._hash_of(buffer)])
         return Gst.PadProbeReturn.OK

@@ -27,14 +27,16 @@ class Frames:
 
     def watch(self, pad: Gst.Pad) -> None:
         def look(_: Gst.Pad, info: Gst.PadProbeInfo) -> Gst.PadProbeReturn:
-            buffer = info.get_buffer()
-            self.times.append(buffer.pts)
-            self.corrupted += bool(buffer.get_flags() & Gst.BufferFlags.CORRUPTED)
-            self.shown = buffer.duration if buffer.duration != Gst.CLOCK_TIME_NONE else 0
+            self.add(info.get_buffer())
             return Gst.PadProbeReturn.OK
 
         pad.add_probe(Gst.PadProbeType.BUFFER, look)
         self.watch_others(pad)
+
+    def add(self, buffer: Gst.Buffer) -> None:
+        self.times.append(buffer.pts)
+        self.corrupted += buffer.has_flags(Gst.BufferFlags.CORRUPTED)
+        self.shown = buffer.duration if buffer.duration != Gst.CLOCK_TIME_NONE else 0
 
     def watch_others(self, pad: Gst.Pad) -> None:
         """Watches the other streams of the file whose frames pass the pad."""

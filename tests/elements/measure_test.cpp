@@ -373,6 +373,20 @@ class CompareTest : public MeasureTest {
     return structure_of(message_);
   }
 
+  /// Expects comparisons of as many events of both streams each, up to this time.
+  void expect_comparisons(std::initializer_list<std::pair<guint64, GstClockTime>> expected) {
+    const auto* figures = conclude();
+    for (const auto& [count, end] : expected) {
+      ASSERT_TRUE(figures);
+      EXPECT_EQ(time_in(figures, "end"), static_cast<gint64>(end));
+      for (const char* role : {"reference", "candidate"})
+        EXPECT_EQ(count_in(within(figures, role)), count) << role;
+      message_ = compare->message(GST_MESSAGE_ELEMENT);
+      figures = structure_of(message_);
+    }
+    EXPECT_FALSE(message_);
+  }
+
   std::optional<TwoInputs> compare;
   Owned<GstMessage> message_;
   GstHarness* reference = nullptr;
@@ -495,16 +509,7 @@ TEST_F(CompareTest, StartsOverWhereTimeGoesBack) {
         gst_harness_push(h, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
   }
   for (auto* h : {reference, candidate}) end(h);
-  const auto* figures = conclude();
-  for (int i = 0; i < 2; ++i) {
-    ASSERT_TRUE(figures) << i;
-    EXPECT_EQ(time_in(figures, "end"), gint64{20 * ms});
-    for (const char* role : {"reference", "candidate"})
-      EXPECT_EQ(count_in(within(figures, role)), 2U) << role;
-    message_ = compare->message(GST_MESSAGE_ELEMENT);
-    figures = structure_of(message_);
-  }
-  EXPECT_FALSE(message_);
+  expect_comparisons({{2, 20 * ms}, {2, 20 * ms}});
   EXPECT_EQ(passed.size(), 4U);
 }
 
@@ -521,15 +526,7 @@ TEST_F(CompareTest, StartsOverOnceTimeGoesBackInBothStreams) {
   push(reference, 30 * ms);
   push(reference, 0);
   for (auto* h : {reference, candidate}) end(h);
-  const auto* figures = conclude();
-  for (const guint64 count : {2, 1}) {
-    ASSERT_TRUE(figures);
-    for (const char* role : {"reference", "candidate"})
-      EXPECT_EQ(count_in(within(figures, role)), count) << role;
-    message_ = compare->message(GST_MESSAGE_ELEMENT);
-    figures = structure_of(message_);
-  }
-  EXPECT_FALSE(message_);
+  expect_comparisons({{2, 20 * ms}, {1, 10 * ms}});
   EXPECT_EQ(passed.size(), 3U);
 }
 
