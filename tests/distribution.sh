@@ -18,6 +18,6 @@ tests/mmdebstrap.sh "$1" --variant=apt --format=null \
     ./install-packages build run tests
     apt-get install --yes --no-install-recommends libgstreamer-plugins-bad1.0-dev # GstTensorMeta, from 1.26
     # GCC warns of what the standard library does if that is precompiled.
-    meson setup build -Dtests=true -Dwerror=true -Ddebug=false -Db_pch=false
+    meson setup build -Dtests=true -Dwerror=true -Db_pch=false
     meson test -C build --print-errorlogs \
       element_{aedat_reading,file_reading,gl,hdf5,properties,render,rtp,states,stream,tensor}"'

@@ -54,7 +54,7 @@ endian = 'little'
 CROSS
 targets=("${tests[@]/%/_test}")
 ./compile $build --cross-file=$build/cross.ini -Dtests=true -Dintrospection=disabled -Deventsimgl=disabled \
-  -Doptimization=2 -Ddebug=false "${targets[@]}"
+  -Doptimization=2 "${targets[@]}"
 # One program takes longer than all others: each processor runs a part of every program.
 GTEST_TOTAL_SHARDS=$(nproc)
 export GTEST_TOTAL_SHARDS
