@@ -203,9 +203,9 @@ def table(result):
         lines.append("| " + " | ".join(cells) + " |")
     calibrated = rows[CALIBRATED]["element"]
     lag = f"{1000 * result['lag']:.1f} ms" if result["lag"] != 0 else "not estimated"
-    lines += ["", f"Frame intervals: {result['calibrated']} for calibration, the next"
-              f" {result['measured']} for measurement. Frame lag: {lag}. Events where the frames are overexposed:"
-              f" {100 * result['overexposed']:.0f} %. Calibrated element: `{calibrated}`.", ""]
+    lines += ["", f"Frame intervals: {result['calibrated']} for calibration, the next {result['measured']} for measurement.",
+              f"Frame lag: {lag}.", f"Events where the frames are overexposed: {100 * result['overexposed']:.0f} %.",
+              "Calibrated element:", "", "```", calibrated, "```", ""]
     return "\n".join([f"### {result['title'][0].upper()}{result['title'][1:]}", ""] + lines)
 
 
