@@ -24,11 +24,10 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "pipelines"))
-from event_calibrate import calibrate, find_lag, fit_thresholds  # noqa: E402
+from event_calibrate import Progress, calibrate, find_lag, fit_thresholds  # noqa: E402
 from event_streams import (  # noqa: E402
     Gst, Span, compare, delayed, read_mask, read_recording, read_video, simulate, until)
 from page import replace_tables  # noqa: E402
-from progress import Progress  # noqa: E402
 
 # The name of each row, and its element.
 ROWS = {

@@ -89,7 +89,7 @@ refused "large.raw: it has 320 x 240 pixels, more than" real1.raw large.raw
 refused "empty.raw: no events" real1.raw empty.raw
 refused "do not overlap in time" real1.raw later.csv
 refused "from must be less than --to" real1.raw real2.raw --from 2 --to 1
-refused "name that with --html" real1.raw real2.raw --video scene.mkv
+refused "name one with --html" real1.raw real2.raw --video scene.mkv
 refused "scene.mkv is read, so it cannot be written" real1.raw real2.raw --video scene.mkv --html scene.mkv
 refused "nowhere.raw" real1.raw nowhere.raw
 refused 'm/lat\\xfcin.npz is not UTF-8; rename it' real1.raw $'m/lat\xfcin.npz'
