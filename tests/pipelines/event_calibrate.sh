@@ -138,14 +138,10 @@ for time in 0.04 0.05; do
   refused "times.txt: the time $time is not later than the one before it" times.txt recorded.raw
 done
 for element in "" " "; do refused "name a simulator" scene.mkv recorded.raw --element "$element"; done
-for option in --from --to --measure-from --measure-to; do
-  for wrong in -5 nan inf 1e20 soon; do
-    refused "argument $option: '$wrong' is not a number of seconds from 0 on" scene.mkv recorded.raw $option $wrong
-  done
+for wrong in -5 nan 1e20 soon; do
+  refused "argument --from: '$wrong' is not a number of seconds from 0 on" scene.mkv recorded.raw --from $wrong
 done
-for wrong in nan inf 1e20 soon; do
-  refused "argument --lag: '$wrong' is not a number of seconds" scene.mkv recorded.raw --lag $wrong
-done
+refused "argument --lag: 'nan' is not a number of seconds" scene.mkv recorded.raw --lag nan
 for option in --profile --map; do
   refused "nowhere/file cannot be written; name a file" scene.mkv recorded.raw --element eventsim-dvs $option nowhere/file
   refused "\. cannot be written; name a file" scene.mkv recorded.raw --element eventsim-dvs $option .
