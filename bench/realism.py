@@ -24,11 +24,10 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "pipelines"))
-from event_calibrate import calibrate, find_lag, fit_thresholds  # noqa: E402
+from event_calibrate import Progress, calibrate, find_lag, fit_thresholds  # noqa: E402
 from event_streams import (  # noqa: E402
     Gst, Span, compare, delayed, read_mask, read_recording, read_video, simulate, until)
 from page import replace_tables  # noqa: E402
-from progress import Progress  # noqa: E402
 
 # The name of each row, and its element.
 ROWS = {
@@ -203,9 +202,9 @@ def table(result):
         lines.append("| " + " | ".join(cells) + " |")
     calibrated = rows[CALIBRATED]["element"]
     lag = f"{1000 * result['lag']:.1f} ms" if result["lag"] != 0 else "not estimated"
-    lines += ["", f"Frame intervals: {result['calibrated']} for calibration, the next"
-              f" {result['measured']} for measurement. Frame lag: {lag}. Events where the frames are overexposed:"
-              f" {100 * result['overexposed']:.0f} %. Calibrated element: `{calibrated}`.", ""]
+    lines += ["", f"Frame intervals: {result['calibrated']} for calibration, the next {result['measured']} for measurement.",
+              f"Frame lag: {lag}.", f"Events where the frames are overexposed: {100 * result['overexposed']:.0f} %.",
+              "Calibrated element:", "", "```", calibrated, "```", ""]
     return "\n".join([f"### {result['title'][0].upper()}{result['title'][1:]}", ""] + lines)
 
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Shared by the event servers: command-line options, and capturing from a camera or a test scene until
-Ctrl-C."""
+"""Options of the event servers, and their source: a camera or a test scene, until Ctrl-C."""
 import argparse
 import ipaddress
 import signal
@@ -12,7 +11,7 @@ from gi.repository import GLib, Gst
 from plugins import find_plugins
 
 SCENE = "videotestsrc is-live=true pattern=ball"
-# By default v4l2src selects the largest frames, which many cameras deliver only a few times a second.
+# The default of v4l2src is the largest frame size, which many cameras deliver only a few times a second.
 CAMERA = ("v4l2src name=camera ! video/x-raw,width=[1,640],height=[1,480];"
           "image/jpeg,width=[1,640],height=[1,480] ! decodebin")
 
@@ -34,8 +33,8 @@ def option_parser(program, description, address, port):
 
 
 def find_elements(names, packages):
-    """Raises RuntimeError if GStreamer lacks a plugin of this project or one of these elements, which
-    the Debian `packages` contain."""
+    """Raises RuntimeError if a plugin of this project, or one of these elements from the Debian `packages`, is
+    missing."""
     find_plugins()
     if missing := [name for name in names if not Gst.ElementFactory.find(name)]:
         raise RuntimeError(f"GStreamer has no {', '.join(missing)}; on Debian, install: {packages}")
@@ -48,7 +47,7 @@ def port_number(text):
 
 
 def host_of(address):
-    """Host part of the printed URLs."""
+    """Host part of URLs."""
     if address.is_unspecified:
         return socket.gethostname()
     return f"[{address}]" if address.version == 6 else str(address)
@@ -59,7 +58,7 @@ class Capture:
     appsrcs. on_element_message(message) is called for messages of its elements."""
 
     def __init__(self, device, launch, on_element_message=None):
-        # Drops frames that arrive faster than they are processed, so that latency does not grow.
+        # The queue drops frames that arrive too fast, so latency does not grow.
         self.pipeline = Gst.parse_launch(
             f"{CAMERA if device else SCENE} ! queue leaky=downstream max-size-buffers=2 ! {launch}"
             " ! appsink name=captured emit-signals=true sync=false")
@@ -72,7 +71,7 @@ class Capture:
         self._loop = GLib.MainLoop()
 
     def attach(self, appsrc, pipeline):
-        """Feeds `appsrc`. Its `pipeline` takes the capture's clock, so that timestamps stay valid."""
+        """Feeds `appsrc`, whose `pipeline` gets the capture's clock and base time."""
         pipeline.use_clock(self.pipeline.get_clock())
         pipeline.set_start_time(Gst.CLOCK_TIME_NONE)
         pipeline.set_base_time(self.pipeline.get_base_time())

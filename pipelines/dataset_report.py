@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What a data set has besides its events: manifest, lists of its parts, statistics, and a sheet of pictures."""
+"""The reports of a data set: manifest, lists of its parts, statistics, and a page of pictures."""
 import html
 import json
 import os
@@ -7,7 +7,7 @@ import urllib.parse
 
 import numpy as np
 
-# What a manifest holds of a record: all that does not depend on the machine's file system.
+# Fields of a record that go to the manifest: all that do not depend on the machine's file system.
 PUBLISHED = ("name", "split", "input", "making", "parameters", "written", "figures", "warnings", "versions")
 STYLE = """body { font: 14px sans-serif; margin: 2em; background: #fff; color: #222 }
 .videos { display: flex; flex-wrap: wrap; gap: 1em }
@@ -27,8 +27,8 @@ def write_text(path, text):
     os.replace(path + ".new", path)
 
 
-def write_reports(output, recipe, videos, records):
-    """Of the videos that have a record, which is None for the others."""
+def write_reports(output, recipe, records):
+    """Writes them from the records, by name, which are None for videos that are not made."""
     made = [record for record in records.values() if record and "written" in record]
     refused = {record["name"]: record["refused"] for record in records.values() if record and "refused" in record}
     with open(recipe.path, encoding="utf-8") as file:
@@ -65,14 +65,14 @@ def statistics_of(made):
 
 
 def page_of(recipe, made, statistics):
-    """A page that needs no network: the pictures are beside it."""
+    """An offline page; its pictures lie beside it."""
     header = "".join(f"<th>{key}</th>" for key in statistics["all"])
     rows = "".join(f"<tr><td>{html.escape(part)}</td>" + "".join(f"<td>{value}</td>" for value in figures.values())
                    + "</tr>" for part, figures in statistics.items())
     return (f'<!DOCTYPE html><html lang="en"><meta charset="utf-8"><title>{html.escape(os.path.basename(recipe.path))}'
             f"</title><style>{STYLE}</style><h1>{html.escape(os.path.basename(recipe.path))}</h1>"
             f"<table><tr><th></th>{header}</tr>{rows}</table>"
-            "<p>Of each video, the busiest of a few intervals between two frames; ON blue, OFF red.</p>"
+            "<p>For each video, the busiest of a few frame intervals; ON blue, OFF red.</p>"
             f'<div class="videos">{"".join(map(figure_of, made))}</div>\n')
 
 

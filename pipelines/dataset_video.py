@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Simulates one video of a data set, and records what it was made from: hashes, parameters, figures, versions."""
+"""Simulates one video of a data set, and records its hashes, parameters, figures and versions."""
+import contextlib
 import hashlib
 import json
 import os
@@ -16,7 +17,7 @@ from gst_eventcamera.recordings import WRITERS
 from gst_eventcamera.sources import SINK
 from gst_eventcamera.tensors import TENSOR_CAPS, tensor_of
 
-# What must be the same whenever the same events are written.
+# Settings of writers without which the same events give other bytes.
 SAME_BYTES = {"h5": "commit-interval=0", "hdf5": "commit-interval=0"}
 PREVIEW_SIDE = 160  # pixels
 MAX_KEPT = 16  # arrays of events
@@ -60,7 +61,7 @@ class NpyFile:
 
 
 class Figures:
-    """Counts of a stream of events, and a few of its arrays, evenly spread."""
+    """Counts the events of a stream, and keeps a few evenly spaced arrays of it."""
 
     def __init__(self):
         self.events = self.on = self.chunks = 0
@@ -68,7 +69,7 @@ class Figures:
         self.start = self.end = None
         self._kept, self._spacing = [], 1
 
-    def take(self, chunk):
+    def add(self, chunk):
         if self.chunks % self._spacing == 0:
             self._kept.append(chunk)
         if len(self._kept) > MAX_KEPT:
@@ -83,7 +84,7 @@ class Figures:
             self.max_rate = max(self.max_rate, len(chunk) / (chunk.end - chunk.start))
 
     def busiest(self):
-        """Of the arrays that are kept."""
+        """The kept array with the most events."""
         return max(self._kept, key=len)
 
     def described(self, frames):
@@ -94,7 +95,7 @@ class Figures:
 
 
 def hash_of(path):
-    """SHA-256 of a file; of a folder of pictures, that of the list that sha256sum prints of them."""
+    """SHA-256 of a file, or of sha256sum's output for a folder of pictures."""
     if os.path.isdir(path):
         lines = "".join(f"{hash_of(picture)}  {os.path.basename(picture)}\n" for picture in pictures_of(path))
         return hashlib.sha256(lines.encode()).hexdigest()
@@ -103,14 +104,14 @@ def hash_of(path):
 
 
 def state_of(path):
-    """Tells without reading a file whether it may have changed: its sizes and times."""
+    """Number, sizes and times of files, which change if their content does."""
     files = pictures_of(path) if os.path.isdir(path) else [path]
     found = [os.stat(file) for file in files]
     return [len(found), sum(one.st_size for one in found), max((one.st_mtime_ns for one in found), default=0)]
 
 
 def making_of(video):
-    """What determines the output, besides the input."""
+    """All that determines the output besides the input."""
     recipe = video.recipe
     making = {"line": video.line, "output": recipe.output}
     if recipe.output == TENSORS:
@@ -127,78 +128,82 @@ def extension_of(recipe):
 
 
 def path_in(output, folder, name, extension):
-    """Of a file of a data set, whose folders are made."""
+    """Path of a file of a data set; creates its folders."""
     path = os.path.join(output, folder, f"{name}.{extension}")
     os.makedirs(os.path.dirname(path), exist_ok=True)
     return path
 
 
-def record_of(video, output, keep=True, clips=None):
-    """Simulates a video, and returns its record. The file of events is complete or not there, whenever the
-    process is killed; without `keep`, only its hash is. Its clips, if given, have been simulated before."""
+def record_of(video, output, scratch, keep=True):
+    """Simulates a video, and returns its record. Its file of events is either complete or missing, even if the process
+    is killed; without `keep`, only its hash is recorded. The folder `scratch` is on the same file system as the
+    output."""
+    if keep:
+        remove_events(output, video.name)
     record = {"name": video.name, "state": state_of(video.path),
               "input": {"path": os.path.relpath(video.path, os.path.dirname(video.recipe.path)),
                         "sha256": hash_of(video.path)},
               "making": making_of(video), "parameters": dict(video.parameters), "split": video.split}
-    unfinished = os.path.join(output, "unfinished")
-    os.makedirs(unfinished, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=unfinished) as folder:
-        path = os.path.join(folder, "events")
-        try:
-            figures, picture, warnings, decoders = simulate(video, path, clips)
-        except Refused as reason:
-            return record | {"refused": str(reason)}
-        except ec.PipelineError as failure:
-            if is_of_machine(failure):
-                raise
-            return record | {"refused": f"corrupt or not supported: {failure}"}
-        written = {"path": f"data/{video.name}.{extension_of(video.recipe)}", "size": os.path.getsize(path),
-                   "sha256": hash_of(path)}
-        if keep:
-            with open(path_in(output, "previews", video.name, "png"), "wb") as file:
-                file.write(picture)
-            os.replace(path, path_in(output, "data", video.name, extension_of(video.recipe)))
+    path = os.path.join(scratch, "events")
+    try:
+        figures, picture, warnings, decoders = simulate(video, path)
+    except Refused as reason:
+        return record | {"refused": str(reason)}
+    except ec.PipelineError as failure:
+        if is_of_machine(failure):
+            raise
+        return record | {"refused": f"corrupt or not supported: {failure}"}
+    written = {"path": f"data/{video.name}.{extension_of(video.recipe)}", "size": os.path.getsize(path),
+               "sha256": hash_of(path)}
+    if keep:
+        with open(path_in(output, "previews", video.name, "png"), "wb") as file:
+            file.write(picture)
+        os.replace(path, path_in(output, "data", video.name, extension_of(video.recipe)))
     return record | {"written": written, "figures": figures, "warnings": warnings,
                      "versions": versions() | {"decoders": decoders}}
 
 
+def remove_events(output, name):
+    """Removes a video's file of events, in any format."""
+    for extension in (*WRITERS, ".npy"):
+        with contextlib.suppress(FileNotFoundError):
+            os.remove(path_in(output, "data", name, extension[1:]))
+
+
 def write_record(path, record):
-    """The whole record or none."""
+    """Writes all of the record or nothing."""
     with tempfile.NamedTemporaryFile("w", dir=os.path.dirname(path), delete=False, encoding="utf-8") as file:
         json.dump(record, file, indent=1, sort_keys=True)
     os.chmod(file.name, 0o644)
     os.replace(file.name, path)
 
 
-def simulate(video, path, clips):
-    """Writes the events, or tensors, of a video or of all its clips. Returns figures, a picture, warnings,
-    and the decoders."""
-    figures = Figures()
+def simulate(video, path):
+    """Writes the events or tensors of a video. Returns figures, a picture, warnings, and the decoders."""
+    figures, frames = Figures(), Frames()
     is_tensors = video.recipe.output == TENSORS
     writer = f"eventtensor {video.recipe.tensors} ! {TENSOR_CAPS} ! appsink name=tensors sync=false async=false"
     if not is_tensors:
         writer = f"{WRITERS['.' + video.recipe.output]} {SAME_BYTES.get(video.recipe.output, '')} async=false"
 
-    rest = f"tee name=events ! queue ! {writer}  events. ! queue ! {SINK}"
     # One thread, since there is a job for each processor.
-    with clips.playing(rest) if clips else video.playing(rest, threads=1) as pipeline:
-        frames, decoders = (clips.frames, clips.decoders) if clips else (Frames(), decoders_of(pipeline))
+    with video.playing(f"tee name=events ! queue ! {writer}  events. ! queue ! {SINK}", threads=1) as pipeline:
+        decoders = decoders_of(pipeline)
         pipeline.gaps_as_buffers()
-        if not clips:
-            frames.watch(pipeline.element("decoded").get_static_pad("sink"))
+        frames.watch(pipeline.element("decoded").get_static_pad("sink"))
         array = None
         if is_tensors:
             array = NpyFile(path)
         else:
             pipeline.element("file").set_property("location", utf8_path(path))
         for sample in pipeline.samples():
-            figures.take(events_of(sample))
+            figures.add(events_of(sample))
             while array and (tensor := pipeline.element("tensors").try_pull_sample(0)):
                 array.append(tensor_of(tensor))
         for tensor in pipeline.samples("tensors") if array else ():
             array.append(tensor_of(tensor))
         pipeline.wait()
-        duration = clips.duration if clips else duration_of(pipeline)
+        duration = duration_of(pipeline)
     if fault := video.fault(frames, duration):
         raise Refused(fault)
     if figures.chunks == 0:
@@ -209,13 +214,13 @@ def simulate(video, path, clips):
 
 
 def is_of_machine(failure):
-    """True if the video is not at fault."""
+    """True if the machine is at fault, not the video."""
     return failure.element == "file" or (failure.error is not None and any(
         failure.error.matches(Gst.ResourceError.quark(), code) for code in MACHINE_ERRORS))
 
 
 def decoders_of(pipeline):
-    """A set that gets the decoders that the pipeline adds."""
+    """A set to which the decoders of a pipeline are added as it starts."""
     decoders = set()
 
     def note(element):

@@ -1,10 +1,10 @@
 #!/usr/bin/python3 -B
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Finds the contrast thresholds at which a simulator generates as many ON and OFF events from a
-video as a real camera recorded of the same scene; for eventsim-dvs also its response, upsampling,
-denoising, adaptation, threshold jitter, refractory period and exposure pulses, and thresholds that fit
-the standard deviation over the pixels as well as the numbers. Prints them, and how similar the two
-streams then are. Both streams are compared where the frames are not overexposed.
+video as a real camera recorded of the same scene. For eventsim-dvs it also finds response, upsampling,
+denoising, adaptation, threshold jitter, refractory period and exposure pulses, and balances the errors of
+mean and standard deviation over the pixels. Prints the settings, and how similar the two streams are.
+Overexposed parts of the frames are excluded.
 
     event-calibrate drive.mp4 drive.raw --profile camera.profile --to 2
 
@@ -19,12 +19,11 @@ import sys
 import time
 from statistics import harmonic_mean
 
-# First, since it says which packages are missing.
+# Imported first: it reports missing packages.
 from event_streams import (GLib, Gst, Span, compare, delayed, expect_writable, read_mask, read_recording,
                            read_video, seconds, simulate, until)
 import numpy as np
 from plugins import find_plugins
-from progress import Progress
 from threshold_search import ROUGH_PRECISION, Setting, find_thresholds
 
 # Parts of the calibrated time for cross-validation.
@@ -39,7 +38,7 @@ RESPONSE = {
     "linear-light": ["false", "true"],
     "exposure-compensation": ["false", "true"],
 }
-# Compensation of an exposure that does not change makes no difference, and the exposure may change later.
+# Exposure compensation changes nothing while the exposure is constant, and the exposure may change later.
 FIRST_RESPONSE = {"log-eps": 0.02, "overexposed-light": 1, "response": "log", "linear-light": "false",
                   "exposure-compensation": "true"}
 UPSAMPLING = ["linear", "motion"]
@@ -48,17 +47,17 @@ STAGES = {
     "adaptation": [0, 0.05, 0.1, 0.2, 0.3, 0.4],
     "refractory-period": [0, 300_000, 600_000, 1_000_000, 2_000_000],
 }
-# Those in units of the response, as shares of the mean threshold.
+# Stages in units of the response, as shares of the mean threshold.
 RELATIVE_STAGES = {
     "threshold-jitter": [0, 0.1, 0.2, 0.3, 0.4],
     "exposure-pulse": [0, 0.04, 0.08, 0.12, 0.16, 0.24],
 }
-# Those whose first value turns them off, as it does if they gain less.
+# Their first value turns them off; it is chosen if they improve the likeness by less than MIN_GAIN.
 OPTIONAL = {"overexposed-light", *STAGES, *RELATIVE_STAGES}
 MIN_GAIN = 0.002
-# Numbers of events differ from the recording's by no more than this factor if their deviation is off.
+# Maximum factor between the numbers of events, when mean and standard deviation are balanced.
 MAX_BALANCE = 1.1
-# The element whose settings a profile holds.
+# The element that has profiles.
 PROFILED = "eventsim-dvs"
 
 
@@ -66,7 +65,7 @@ def likeness(figures):
     """Similarity of two streams, from 0 to 1: the mean of the map correlation, the harmonic means of the shares of
     recorded and of simulated events that have a match within 1, 5 and 10 ms, which count twice, the ratio of the
     variances over the pixels, and the ratio between the times from event to event. A harmonic mean is close to the
-    smaller share, so that neither is bought with the other."""
+    smaller share, so a simulator cannot trade one share for the other."""
     def both(limit):
         return harmonic_mean([figures[f"{side}-matches"][f"within-{limit}ms"] for side in ("reference", "candidate")])
 
@@ -76,19 +75,34 @@ def likeness(figures):
                             weights=[1, 2, 2, 2, 1, 1]))
 
 
+class Progress:
+    """Prints progress: one line, overwritten, on a terminal; a line per step elsewhere."""
+
+    def __init__(self):
+        self.on_terminal = sys.stderr.isatty()
+
+    def tell(self, text):
+        print(f"\r{text:<78}" if self.on_terminal else text, end="" if self.on_terminal else "\n", file=sys.stderr,
+              flush=True)
+
+    def end(self):
+        if self.on_terminal:
+            print(file=sys.stderr)
+
+
 class Choices:
-    """Tries property values and rates them by cross-validation: by the likeness of a stream of which each
-    part was simulated with thresholds that fit the other parts."""
+    """Tries property values and rates them by cross-validation: each part of a stream is simulated with
+    thresholds that fit the other parts; the likeness of the stream is the rating."""
 
     def __init__(self, video, recorded, span, element, progress):
         self.video, self.recorded, self.span = video, recorded, span
         self.element, self.progress = element, progress
         self.made = Gst.ElementFactory.make(element.split()[0])
         self.parts = parts_of(video, span)
-        # The last stream of a search for thresholds is the one that is rated.
+        # The last stream of a threshold search is rated.
         self.simulated_by = functools.lru_cache(maxsize=4)(functools.partial(simulate, video))
         self.rated = {}
-        self.thresholds = None  # of the last setting, close to those of the next
+        self.thresholds = None  # of the last setting, the first guess for the next one
         self.began = time.monotonic()
         self.expected = 0
 
@@ -117,7 +131,7 @@ class Choices:
         return self.rated_by(chosen, self.parts)
 
     def rough_rating(self, chosen):
-        """The likeness of a stream with thresholds that fit the same time."""
+        """The likeness without cross-validation."""
         return self.rated_by(chosen, [self.span])
 
     def rated_by(self, chosen, parts):
@@ -130,8 +144,8 @@ class Choices:
         return self.rated[key]
 
     def predicted(self, part, parts, setting):
-        """The simulated events of a part, with the thresholds of the others; of the same, if it is the
-        only one."""
+        """The simulated events of a part, with thresholds that fit the other parts, or itself if it is the only
+        one."""
         others = [other for other in parts if other is not part] or [part]
         self.thresholds = find_thresholds(self.simulated_by, self.recorded, others, setting, self.progress,
                                           self.thresholds, ROUGH_PRECISION)
@@ -145,14 +159,14 @@ class Choices:
         return setting.with_thresholds(self.thresholds)
 
     def balanced(self, chosen):
-        """The element with thresholds between those that fit the mean event rate and those that fit its standard
-        deviation over the pixels: one is as much too small as the other is too large."""
+        """The element with thresholds that balance the errors of the mean event rate and of its standard deviation
+        over the pixels: one is too small by the factor that the other is too large."""
         figures = compare(self.video, self.recorded, self.simulated_by(self.calibrated(chosen)), self.span)
         mean, deviation = (figures["candidate"][field] / figures["reference"][field] for field in ("mean", "std-dev"))
         return self.calibrated(chosen, np.clip(np.sqrt(mean / deviation), 1 / MAX_BALANCE, MAX_BALANCE))
 
     def best_response(self):
-        """The best response along motion, and the values of what may be chosen of it."""
+        """The best response with motion, and the values of its free properties."""
         axes = {name: values for name, values in RESPONSE.items() if self.is_free(name)}
         if "response" not in axes and "response=log" not in self.element.split():
             axes.pop("log-eps", None)
@@ -183,7 +197,7 @@ class Choices:
         return chosen
 
     def pruned(self, chosen, axes):
-        """Without those of OPTIONAL that gain nothing."""
+        """`chosen` without the OPTIONAL stages that improve nothing."""
         for name in filter(OPTIONAL.__contains__, axes):
             without = chosen | {name: axes[name][0]}
             if self.rating(without) > self.rating(chosen) - MIN_GAIN:
@@ -221,7 +235,7 @@ def calibrate(video, recorded, span, element, progress):
             chosen |= {"exposure-lead": lead}
     if not axes | stages:
         return choices.calibrated(chosen)
-    # From a pixel without these stages and from one with all of them, since they depend on each other.
+    # Start without any stage and with all of them, since they depend on each other.
     starts = [chosen | {name: values[i] for name, values in stages.items()} for i in (0, 2)]
     climbed = (choices.climb(start, axes | stages, choices.rating) for start in starts)
     best = choices.pruned(max(climbed, key=choices.rating), axes | stages)
@@ -231,7 +245,7 @@ def calibrate(video, recorded, span, element, progress):
 
 
 def fit_thresholds(video, recorded, span, element, progress):
-    """The element with thresholds that fit, and otherwise as it is."""
+    """The element with calibrated thresholds, and otherwise unchanged."""
     setting = Setting(element)
     simulated_by = functools.partial(simulate, video)
     return setting.with_thresholds(find_thresholds(simulated_by, recorded, [span], setting, progress))
@@ -255,7 +269,7 @@ def find_exposure_lead(video, recorded, span):
     burst = int(np.argmax(heights))
     if heights[burst] < 50 * len(seen) or heights[burst] < 10 * np.median(heights):
         return None
-    # The burst begins at its earliest events, which have the longest lead.
+    # The burst starts with its earliest events, which have the longest lead.
     while burst + 1 < len(heights) and heights[burst + 1] > heights.max() / 4:
         burst += 1
     return int(edges[burst + 1]) * 1000
@@ -288,8 +302,8 @@ def lag_of_polarities(video, recorded):
 
 def find_lag(video, recorded, span, element, progress):
     """The lag: the time, in seconds, from a frame's timestamp, which may be the start of its exposure, to
-    the moment that it shows. The polarities alone overestimate it, since a pixel fires only once it has
-    changed by the contrast threshold; so a simulator corrects it. `span` is without lag."""
+    the moment that it shows. Polarities alone overestimate it, since a pixel fires only after a change by the
+    contrast threshold; a simulator corrects the estimate. `span` excludes the lag."""
     def late(lag):
         return delayed(video, lag), Span(span.start + round(lag * 1e6), span.end + round(lag * 1e6))
 
@@ -368,7 +382,7 @@ def options():
                         " default, estimates it from two frame intervals or more")
     parser.add_argument("--mask", metavar="PICTURE",
                         help="a picture that is white where pixels of the camera can fire; events elsewhere"
-                        " are left out of both streams")
+                        " are excluded from both streams")
     parser.add_argument("--profile", metavar="FILE",
                         help="write the settings of eventsim-dvs, for its property profile")
     parser.add_argument("--map", metavar="PNG", help="write a picture of the event counts per pixel")
@@ -378,7 +392,7 @@ def options():
 
 
 def write_profile(path, element, video, recording):
-    """The settings of an eventsim-dvs that are not its defaults."""
+    """Writes the settings of an eventsim-dvs that differ from the defaults."""
     made = Gst.parse_launch(element)
     lines = [f"# Fitted by event-calibrate @VERSION@ to {os.path.basename(recording)} and {os.path.basename(video)}",
              f"[{PROFILED}]"]
@@ -399,8 +413,8 @@ def has_several_intervals(video, end):
 
 
 def span_of(video, recorded, lag, start, end):
-    """From `start` to `end` after the video's first frame; by default the time that both cover, without
-    the first of several frame intervals: at the first frame, the pixels have no history yet."""
+    """The time from `start` to `end` after the video's first frame. By default the time that both cover, without
+    the first of several frame intervals, which warms up the pixels."""
     latest_start = max(video.frames[0].time // 1000, int(recorded["t"][0]) - 1)
     earliest_end = min(video.frames[-1].time // 1000, int(recorded["t"][-1]))
     origin = video.origin // 1000
@@ -459,14 +473,13 @@ def main():
     simulated = simulate(video, element)
     figures = compare(video, recorded, simulated, measured)
     if args.lag == "find" and not is_found:
-        print("One frame interval does not tell when frames show the scene: at their timestamps, unless --lag says"
-              " when.")
+        print("The lag cannot be estimated from one frame interval, and is taken as 0; set it with --lag.")
     if lag != 0:
         print(f"Frames show the scene {lag * 1000:.1f} ms later than their timestamps.")
     if hidden >= 0.005:
-        print(f"{100 * hidden:.0f} % of the recorded events are left out: the frames are overexposed there.")
+        print(f"{100 * hidden:.0f} % of the recorded events are excluded: the frames are overexposed there.")
     print(describe(element, figures), flush=True)
-    # After the result, so that it stays if a disk is full.
+    # After the result, which is then not lost if a disk is full.
     if args.profile:
         write_profile(args.profile, element, args.video, args.recording)
     if args.map:

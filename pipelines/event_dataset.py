@@ -1,64 +1,39 @@
 #!/usr/bin/python3 -B
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Makes a data set of events from videos or folders of pictures, as a recipe says:
+"""Makes a data set of events from videos or folders of pictures, following a recipe:
 
     event-dataset recipe.yaml
     event-dataset verify recipe.yaml
 
-The folder beside the recipe, of its name, gets the events, a manifest of all hashes, lists of the parts,
-statistics and a page of pictures. A second call makes only what is missing or has changed. "verify" makes
-the events again, keeps none, and compares their hashes, and those of the files in data/, with the manifest."""
+Events, a manifest with all hashes, lists of the parts, statistics and a page of pictures go to a folder beside
+the recipe, with the same name. A second call makes only what is missing or has changed. "verify" simulates the
+events again without keeping them, and compares their hashes, and those of the files in data/, with the
+manifest."""
 import argparse
 import concurrent.futures
 import contextlib
 import fcntl
-import glob
+import hashlib
 import json
 import os
 import re
 import shlex
 import shutil
-import struct
 import subprocess
 import sys
-import time
 
 try:
-    import dataset_clips
     import gst_eventcamera as ec
     from dataset_report import write_reports
     from dataset_video import extension_of, hash_of, making_of, path_in, record_of, state_of, write_record
     from gst_eventcamera.recipe import uniform_number
     from plugins import find_plugins
-    from progress import Progress
 except ImportError as missing:
     sys.exit(f"error: {missing}\nInstall python3-gst-eventcamera, a Debian package of gst-eventsim, and python3-yaml,"
              " or in a checkout run ./pipelines/event-dataset")
 
 HERE = os.path.dirname(os.path.realpath(__file__))
-STEP = re.compile(r"^(\d+) of (\d+) steps")
-MAX_TOLD = 20  # lines about videos of a kind
-LOCK_SIZE = 1 << 60  # bytes that stand for all videos; a part locks its share of them
-FLOCK = struct.Struct("hhqqi4x")  # of the C library
-
-
-class VideosDone(Progress):
-    """Tells of each video on a terminal, of each tenth of the videos elsewhere."""
-
-    def __init__(self, count):
-        super().__init__()
-        self._count = count
-        self._began = time.monotonic()
-        self._told = 0
-
-    def tell(self, done):
-        done = min(done, self._count)
-        if not self.on_terminal and done * 10 // self._count == self._told:
-            return
-        self._told = done * 10 // self._count
-        left = (self._count - done) * (time.monotonic() - self._began) / max(done, 1)
-        super().tell(f"{done} of {self._count} videos, about {left // 3600:.0f}:{left // 60 % 60:02.0f}:"
-                     f"{left % 60:02.0f} left")
+MAX_LINES = 20  # printed of a kind
 
 
 def options():
@@ -77,15 +52,12 @@ def options():
                         " a name that Snakemake knows")
     parser.add_argument("--part", type=part_of_all, default=(1, 1), metavar="K/N",
                         help="make only the K-th of N parts, such as 3/100, for data sets of more than 10,000 videos")
-    parser.add_argument("--clip-duration", type=int, default=300, metavar="SECONDS",
-                        help="a video of two or more clips of this length is simulated in a job for each; the"
-                        " events are the same (default: %(default)s, 0 = never)")
     parser.add_argument("--manifest", metavar="FILE",
                         help="the manifest that verify compares with (default: that of the folder)")
     parser.add_argument("--video", metavar="NAME", help="make one video only, as the jobs do; needs --file")
     parser.add_argument("--file", help="the file of that video")
-    parser.add_argument("--cuts", nargs="+", type=int, default=[], help=argparse.SUPPRESS)
-    parser.add_argument("--clip-number", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--unlock", action="store_true",
+                        help="remove the lock that a killed run has left, and exit")
     parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
                         help="print the version and exit")
     args = parser.parse_args()
@@ -94,8 +66,8 @@ def options():
         parser.error(f"give one recipe, not {' '.join(args.words)}")
     if (args.video is None) != (args.file is None):
         parser.error("--video and --file need each other")
-    if args.cores < 1 or args.retries < 0 or args.clip_duration < 0:
-        parser.error("--cores is at least 1, --retries and --clip-duration at least 0")
+    if args.cores < 1 or args.retries < 0:
+        parser.error("--cores must be at least 1, --retries at least 0")
     args.recipe = args.words[-1]
     args.output = os.path.abspath(args.output or os.path.splitext(args.recipe)[0])
     return args
@@ -112,7 +84,7 @@ def part_of_all(text):
 
 
 def read_json(path):
-    """None if there is no such file, or not whole."""
+    """None if the file does not exist or is incomplete."""
     try:
         with open(path, encoding="utf-8") as file:
             return json.load(file)
@@ -120,164 +92,8 @@ def read_json(path):
         return None
 
 
-def reason_to_make(video, record, output):
-    """Why a video has to be made; empty if it need not."""
-    if not record or "written" not in record:
-        return "missing"
-    try:
-        written = os.path.getsize(os.path.join(output, record["written"]["path"]))
-    except FileNotFoundError:
-        return "missing"
-    if written != record["written"]["size"]:
-        return "its events are not those that were written"
-    if record["making"] != making_of(video) or record["figures"]["frames"] < video.recipe.min_frames:
-        return "the recipe has changed"
-    try:
-        if record.get("state") != state_of(video.path) and record["input"]["sha256"] != hash_of(video.path):
-            return "the input has changed since the manifest"
-    except OSError as failure:  # such as a disk that is not mounted
-        print(f"{video.name}: kept as it was made; its input cannot be read: {failure}", file=sys.stderr)
-    return ""
-
-
-def stale_videos(videos, records, output):
-    """The videos that have to be made, without their records and events; says which have changed."""
-    stale = []
-    for video in videos:
-        record = records[video.name]
-        reason = reason_to_make(video, record, output)
-        if not reason:
-            continue
-        stale.append(video)
-        if reason != "missing":
-            print(f"{video.name}: {reason}; making it again", file=sys.stderr)
-        paths = {path_in(output, "records", video.name, "json"),
-                 path_in(output, "data", video.name, extension_of(video.recipe))}
-        if record and "written" in record:
-            written_as = os.path.splitext(record["written"]["path"])[1].removeprefix(".")
-            paths.add(path_in(output, "data", video.name, written_as))
-        for path in paths:
-            if os.path.exists(path):
-                os.remove(path)
-    return stale
-
-
-# the workflow
-
-
-def locked(output, part):
-    """Refuses to work beside another process on the same videos; returns what keeps others away until it and its
-    copies in other processes are closed."""
-    lock = open(os.path.join(output, ".lock"), "w", encoding="utf-8")
-    start, end = (place * LOCK_SIZE // part[1] for place in (part[0] - 1, part[0]))
-    try:
-        fcntl.fcntl(lock, fcntl.F_OFD_SETLK, FLOCK.pack(fcntl.F_WRLCK, os.SEEK_SET, start, end - start, 0))
-    except BlockingIOError:
-        raise RuntimeError(f"another event-dataset works in {output}; wait for it, or name another folder") from None
-    return lock
-
-
-def log_of(args):
-    """What Snakemake writes."""
-    number, count = args.part
-    return os.path.join(args.output, "snakemake.log" if count == 1 else f"snakemake-{number}-of-{count}.log")
-
-
-def profile_options(profile):
-    """Our own profiles by their names; Snakemake finds others. It gives a shell the path of a profile's
-    program without quotes."""
-    own = os.path.join(HERE, profile)
-    if os.sep in profile or not os.path.isfile(os.path.join(own, "config.yaml")):
-        return ["--profile", profile]
-    return ["--profile", own, "--cluster-status", shlex.quote(os.path.join(own, "status"))]
-
-
-def clips_root(args):
-    return "verified-clips" if args.verify else "clips"
-
-
-def clips_folder(args, name):
-    return dataset_clips.folder_of(args.output, clips_root(args), name)
-
-
-def job_of(args, video):
-    """What the workflow has to know of a video. Clips of another input or recipe are removed."""
-    cuts = dataset_clips.cuts_of(video, args.clip_duration)
-    if cuts and (reason := dataset_clips.reason_against(video)):
-        print(f"{video.name}: in one job, not in clips: {reason}", file=sys.stderr)
-        cuts = []
-    dataset_clips.remove_others(video, clips_folder(args, video.name), cuts)
-    return {"path": os.path.abspath(video.path), "cuts": cuts, "in-order": dataset_clips.has_state(video)}
-
-
-def make(args, videos, lock):
-    """Runs a job for each video, or for each of its clips and then one that joins them. Those that fail
-    leave no record."""
-    command = [os.path.realpath(__file__), *["verify"] * args.verify, os.path.abspath(args.recipe),
-               "--output", args.output]
-    jobs = ".jobs-{}-of-{}.json".format(*args.part)
-    with (concurrent.futures.ThreadPoolExecutor(args.cores) as pool,
-          open(os.path.join(args.output, jobs), "w", encoding="utf-8") as file):
-        found = pool.map(lambda video: job_of(args, video), videos)
-        json.dump({"videos": {video.name: job for video, job in zip(videos, found)}, "command": shlex.join(command),
-                   "records": records_folder(args), "clips": clips_root(args)}, file)
-    where = profile_options(args.profile) if args.profile else ["--cores", str(args.cores)]
-    snakemake = subprocess.Popen(
-        ["snakemake", "--snakefile", os.path.join(HERE, "dataset.smk"), "--directory", args.output, *where,
-         "--nolock", "--keep-going", "--rerun-incomplete", "--retries", str(args.retries), "--nocolor",
-         "--rerun-triggers", "mtime", "--drop-metadata", "--scheduler", "greedy",
-         "--config", f"jobs={jobs}"],  # read as YAML, so that it has no paths of the user
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", pass_fds=[lock.fileno()])
-    progress = VideosDone(len(videos))
-    try:
-        with open(log_of(args), "w", encoding="utf-8") as log:
-            for line in snakemake.stdout:
-                log.write(line)
-                log.flush()
-                if step := STEP.match(line):
-                    progress.tell(int(step[1]) * len(videos) // (int(step[2]) - 1))
-    finally:
-        progress.end()
-        for _ in snakemake.stdout:  # it ends its jobs at Ctrl-C, and cannot while nobody reads what it writes
-            continue
-        snakemake.wait()
-        with contextlib.suppress(OSError):  # another part uses it, or a job was killed
-            os.rmdir(os.path.join(args.output, "unfinished"))
-    return snakemake.returncode
-
-
-def records_folder(args):
-    return "verified" if args.verify else "records"
-
-
-def failure_of(args, name):
-    """The last line that the jobs of a video wrote."""
-    logs = glob.glob(glob.escape(clips_folder(args, name)) + "/*.log")
-    for path in [*sorted(logs), os.path.join(args.output, "logs", f"{name}.log")]:
-        with contextlib.suppress(FileNotFoundError), open(path, encoding="utf-8", errors="replace") as file:
-            if lines := file.read().strip().splitlines():
-                return lines[-1]
-    return f"its job did not start or was killed; see {os.path.basename(log_of(args))}"
-
-
-def tell(kind, lines):
-    for line in lines[:MAX_TOLD]:
-        print(f"{kind}: {line}")
-    if len(lines) > MAX_TOLD:
-        print(f"{kind}: and {len(lines) - MAX_TOLD} more")
-
-
-def records_of(args, videos):
-    """With the parts of today's recipe, which do not need another simulation."""
-    found = {}
-    for video in videos:
-        record = read_json(os.path.join(args.output, records_folder(args), f"{video.name}.json"))
-        found[video.name] = record | {"split": video.split} if is_record(record) else None
-    return found
-
-
 def is_record(record):
-    """True if it has what is looked up in it."""
+    """True if it has the fields that are read."""
     def has(part, *keys):
         return isinstance(part, dict) and all(key in part for key in keys)
 
@@ -287,33 +103,133 @@ def is_record(record):
                  and has(record["written"], "path", "size", "sha256")))
 
 
+def id_of(name):
+    """ID of a video's job."""
+    return hashlib.sha256(name.encode()).hexdigest()[:16]
+
+
+def records_folder(args):
+    return "verified" if args.verify else "records"
+
+
+def record_path(args, name):
+    return os.path.join(args.output, records_folder(args), id_of(name) + ".json")
+
+
+def read_records(args, videos):
+    """Records by name, None if missing. The split follows today's recipe, which needs no new simulation."""
+    found = {}
+    for video in videos:
+        record = read_json(record_path(args, video.name))
+        found[video.name] = record | {"split": video.split} if is_record(record) else None
+    return found
+
+
+def reason_to_make(video, record, output):
+    """Why a video has to be made; empty if it need not."""
+    if not record or "written" not in record:
+        return "missing"
+    try:
+        size = os.path.getsize(os.path.join(output, record["written"]["path"]))
+    except FileNotFoundError:
+        return "missing"
+    if size != record["written"]["size"]:
+        return "the size of its file of events has changed"
+    if record["making"] != making_of(video) or record["figures"]["frames"] < video.recipe.min_frames:
+        return "the recipe has changed"
+    try:
+        if record.get("state") != state_of(video.path) and record["input"]["sha256"] != hash_of(video.path):
+            return "the input has changed since the manifest"
+    except OSError as failure:  # such as a disk that is not mounted
+        print(f"{video.name}: kept; its input cannot be read: {failure}", file=sys.stderr)
+    return ""
+
+
+def stale_videos(videos, records, output):
+    """The videos that have to be made; prints which have changed."""
+    reasons = [(video, reason_to_make(video, records[video.name], output)) for video in videos]
+    for video, reason in reasons:
+        if reason not in ("", "missing"):
+            print(f"{video.name}: {reason}; making it again", file=sys.stderr)
+    return [video for video, reason in reasons if reason]
+
+
+# the workflow
+
+
+def profile_options(profile):
+    """Options for one of our profiles, by name, or any other that Snakemake finds."""
+    own = os.path.join(HERE, profile)
+    if os.sep in profile or not os.path.isfile(os.path.join(own, "config.yaml")):
+        return ["--profile", profile]
+    # Snakemake passes the path of a profile's program to a shell without quotes.
+    return ["--profile", own, "--cluster-status", shlex.quote(os.path.join(own, "status"))]
+
+
+def run_snakemake(args, videos, *options):
+    """Runs a job for each video, and returns the exit status. Jobs that fail leave no record. Snakemake locks the
+    records that it makes against other runs."""
+    command = [os.path.realpath(__file__), *["verify"] * args.verify, os.path.abspath(args.recipe),
+               "--output", args.output]
+    jobs = ".jobs-{}-of-{}.json".format(*args.part)
+    with open(os.path.join(args.output, jobs), "w", encoding="utf-8") as file:
+        json.dump({"videos": {id_of(video.name): {"name": video.name, "file": os.path.abspath(video.path)}
+                              for video in videos},
+                   "command": shlex.join(command), "records": records_folder(args)}, file)
+    where = profile_options(args.profile) if args.profile else ["--cores", str(args.cores)]
+    snakemake = subprocess.Popen(
+        ["snakemake", "--snakefile", os.path.join(HERE, "dataset.smk"), "--directory", args.output, *where,
+         "--forceall", "--rerun-incomplete", "--keep-going", "--retries", str(args.retries), "--scheduler", "greedy",
+         *options, "--config", f"jobs={jobs}"])  # read as YAML, so no path of the user
+    try:
+        return snakemake.wait()
+    except KeyboardInterrupt:
+        snakemake.wait()  # stops its jobs
+        raise
+
+
+def make(args, videos):
+    status = run_snakemake(args, videos)
+    with contextlib.suppress(OSError):  # in use by another part, or a job was killed
+        os.rmdir(os.path.join(args.output, "unfinished"))
+    return status
+
+
+def expect_success(status, failed):
+    """Raises RuntimeError if Snakemake failed for another reason than these videos, such as a lock."""
+    if status != 0 and not failed:
+        raise RuntimeError(f"Snakemake ended with status {status}, for the reason above")
+
+
+def failure_of(args, name):
+    """The last line that the job of a video wrote."""
+    path = os.path.join(args.output, "logs", id_of(name) + ".log")
+    with contextlib.suppress(FileNotFoundError), open(path, encoding="utf-8", errors="replace") as file:
+        if lines := file.read().strip().splitlines():
+            return lines[-1]
+    return "its job did not start or was killed"
+
+
+def print_lines(kind, lines):
+    for line in lines[:MAX_LINES]:
+        print(f"{kind}: {line}")
+    if len(lines) > MAX_LINES:
+        print(f"{kind}: and {len(lines) - MAX_LINES} more")
+
+
 # the commands
 
 
 def make_one(args, recipe):
-    name = args.video
-    video = ec.DatasetVideo(recipe, name, args.file)
-    folder, clips, notes = clips_folder(args, name), None, {}
-    if args.clip_number is not None:
-        dataset_clips.make_clip(video, folder, args.cuts, args.clip_number)
-        return
-    if args.cuts:
-        try:
-            clips = dataset_clips.Clips(video, folder, args.cuts)
-        except dataset_clips.NotJoinable as reason:
-            notes = {"whole": f"made as a whole, not in clips: {reason}"}
-    record = record_of(video, args.output, keep=not args.verify, clips=clips)
-    write_record(path_in(args.output, records_folder(args), name, "json"), record | notes)
-    shutil.rmtree(folder, ignore_errors=True)
-
-
-def remove_clips(args, videos):
-    """In case a job was killed before it did so."""
-    for video in videos:
-        folder = clips_folder(args, video.name)
-        shutil.rmtree(folder, ignore_errors=True)
-        with contextlib.suppress(OSError):  # other clips are there, or none have been
-            os.removedirs(os.path.dirname(folder))
+    video = ec.DatasetVideo(recipe, args.video, args.file)
+    unfinished = os.path.join(args.output, "unfinished", id_of(video.name))
+    shutil.rmtree(unfinished, ignore_errors=True)  # of a job that was killed
+    os.makedirs(unfinished)
+    try:
+        record = record_of(video, args.output, unfinished, keep=not args.verify)
+        write_record(record_path(args, video.name), record)
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
 
 
 def selected(args, videos):
@@ -330,35 +246,28 @@ def expect_own_folder(output, videos):
 
 
 def make_all(args, recipe):
-    """The exit status."""
+    """Returns the exit status."""
     videos = list(ec.Dataset(recipe))
     expect_own_folder(args.output, videos)
     os.makedirs(args.output, exist_ok=True)
-    with locked(args.output, args.part) as lock:
-        if args.part == (1, 1):
-            shutil.rmtree(os.path.join(args.output, "unfinished"), ignore_errors=True)
-        mine = selected(args, videos)
-        stale = stale_videos(mine, records_of(args, mine), args.output)
-        status = make(args, stale, lock) if stale else 0
-        with open(os.path.join(args.output, ".lock-reports"), "w", encoding="utf-8") as reports:
-            fcntl.flock(reports, fcntl.LOCK_EX)  # other parts write them as well, with all records
-            records = records_of(args, videos)
-            write_reports(args.output, recipe, videos, records)
-        remove_clips(args, [video for video in mine if records[video.name]])
-    refused = [f"{name}: {record['refused']}" for name, record in records.items() if record and "refused" in record]
+    mine = selected(args, videos)
+    stale = stale_videos(mine, read_records(args, mine), args.output)
+    status = make(args, stale) if stale else 0
+    with open(os.path.join(args.output, ".lock-reports"), "w", encoding="utf-8") as reports:
+        fcntl.flock(reports, fcntl.LOCK_EX)  # other parts write them, too, from all records
+        records = read_records(args, videos)
+        write_reports(args.output, recipe, records)
     failed = [video.name for video in stale if not records[video.name]]
-    tell("warning", [f"{name}: {warning}" for name, record in records.items() if record
-                     for warning in record.get("warnings", ())])
-    tell("note", [f"{video.name}: {records[video.name]['whole']}" for video in stale
-                  if "whole" in (records[video.name] or {})])
-    tell("refused", refused)
-    tell("failed", [f"{name}: {failure_of(args, name)}" for name in failed])
-    made = sum(1 for video in stale if records[video.name] and "written" in records[video.name])
+    expect_success(status, failed)
+    made = [record for record in records.values() if record and "written" in record]
+    refused = [f"{name}: {record['refused']}" for name, record in records.items() if record and "refused" in record]
+    print_lines("warning", [f"{record['name']}: {warning}" for record in made for warning in record["warnings"]])
+    print_lines("refused", refused)
+    print_lines("failed", [f"{name}: {failure_of(args, name)}" for name in failed])
+    new = sum(1 for video in stale if "written" in (records[video.name] or {}))
     absent = sum(1 for record in records.values() if not record) - len(failed)
-    print(f"{len(videos)} videos: {made} made, {len(mine) - len(stale)} unchanged, {len(refused)} refused,"
+    print(f"{len(videos)} videos: {new} made, {len(mine) - len(stale)} unchanged, {len(refused)} refused,"
           f" {len(failed)} failed, {absent} not made yet; {args.output}")
-    if status != 0 and not failed:
-        raise RuntimeError(f"Snakemake ended with status {status}; see {log_of(args)}")
     return 1 if refused or failed else 0
 
 
@@ -374,15 +283,9 @@ def verify_all(args, recipe):
     present = [video for video in videos if video.name in expected]
     expect_own_folder(args.output, videos)
     os.makedirs(args.output, exist_ok=True)
-    with locked(args.output, args.part) as lock:
-        remove_clips(args, present)
-        for video in present:
-            with contextlib.suppress(FileNotFoundError):
-                os.remove(path_in(args.output, records_folder(args), video.name, "json"))
-        if present:
-            make(args, present, lock)
-        records = records_of(args, present)
-        remove_clips(args, [video for video in present if records[video.name]])
+    status = make(args, present) if present else 0
+    records = read_records(args, present)
+    expect_success(status, [name for name, record in records.items() if not record])
     differences = [f"{name}: not among the videos" for name in expected
                    if args.part == (1, 1) and name not in records]
     differences += [f"{video.name}: not in the manifest" for video in videos
@@ -395,7 +298,7 @@ def verify_all(args, recipe):
         found = pool.map(lambda video: is_damaged(expected[video.name]["written"], args.output), present)
         differences += [f"{video.name}: its file of events is not that of the manifest"
                         for video, damaged in zip(present, found) if damaged]
-    tell("different", differences)
+    print_lines("different", differences)
     print(f"{len(present)} videos of the manifest compared, {len(differences)} differences")
     return 1 if differences else 0
 
@@ -430,6 +333,8 @@ def main():
         return 0
     if not shutil.which("snakemake"):
         raise RuntimeError("Snakemake is missing; on Debian, install: snakemake")
+    if args.unlock:
+        return run_snakemake(args, [], "--unlock")
     return verify_all(args, recipe) if args.verify else make_all(args, recipe)
 
 

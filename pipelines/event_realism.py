@@ -15,14 +15,14 @@ import os
 import sys
 from dataclasses import dataclass
 
-# First, since it says which packages are missing.
+# Imported first: it reports missing packages.
 from event_streams import (GLib, Gst, Sensor, Span, compare, expect_writable, png_of, read_mask, read_recording,
                            read_video, seconds)
 import numpy as np
 from plugins import find_plugins
 
 LIMITS = (1, 5, 10)  # of matches, ms
-# How far a figure may be beyond the ceiling, which is an estimate too.
+# Tolerance for figures beyond the ceiling, which is an estimate.
 TOLERANCE = 0.05
 SPLITS = 20
 COLOURS = ["#808080", "#4080d0", "#d07020", "#309060", "#a050c0", "#c04060", "#60a0a0"]
@@ -37,7 +37,7 @@ class Stream:
 
 @dataclass
 class Row:
-    """A figure of every stream, as text; whether it is beyond the ceiling."""
+    """A figure of every stream, as text, and whether it is beyond the ceiling."""
 
     title: str
     ceiling: str
@@ -51,9 +51,9 @@ def counts_per_pixel(sensor, events):
 
 
 def spread_by_chance(sensor, events):
-    """How much the mean and the standard deviation of two recordings would differ, as a share: twice the
-    root mean square of the differences between halves of the events, divided by the root of two, since a
-    whole has twice as many events as a half."""
+    """Difference to expect between the means, and the standard deviations, of two recordings, as a share: twice
+    the root mean square of the differences between random halves of the events, divided by the root of two,
+    since a recording has twice as many events as a half."""
     random = np.random.default_rng(1)
     differences = []
     for _ in range(SPLITS):
@@ -126,8 +126,8 @@ def map_of(counts, max_count):
 
 
 def chart(title, x_title, y_title, curves, logarithmic=(False, False)):
-    """Curves as SVG: x and y of each stream. `logarithmic` says which of the axes are so, to the base 10; they
-    begin at the lowest value, the others at 0."""
+    """An SVG of curves, given as x and y of each stream. A logarithmic axis, to the base 10, starts at the lowest
+    value, a linear one at 0."""
     points = []
     for curve in curves:
         curve = np.array(curve, float).reshape(2, -1)
@@ -164,7 +164,7 @@ def chart(title, x_title, y_title, curves, logarithmic=(False, False)):
 
 
 def intervals_of(sensor, events):
-    """The times between successive events of a pixel, at least half a microsecond."""
+    """Times between successive events of a pixel, rounded up to half a microsecond."""
     pixels = sensor.pixels_of(events)
     order = np.argsort(pixels, kind="stable")
     same = np.diff(pixels[order]) == 0
@@ -178,7 +178,7 @@ def interval_curve(sensor, events):
 
 
 def travels_of(path, sensor, span):
-    """How far the logarithm of each pixel rises, and falls, in the frames of a time span of a video."""
+    """Total rise and total fall of each pixel's logarithm, in the frames of a time span of a video."""
     video = read_video(path, 0, float("inf"))
     if (video.width, video.height) != (sensor.width, sensor.height):
         raise RuntimeError(f"{path} has {video.width} x {video.height} pixels, the recording has"
@@ -192,7 +192,7 @@ def travels_of(path, sensor, span):
 
 
 def response_curve(sensor, events, travels):
-    """Mean number of events of a pixel and polarity, by how far its signal travels."""
+    """Mean number of events of a pixel and polarity, by the total change of its signal."""
     is_on = events["p"]
     counts = np.concatenate([counts_per_pixel(sensor, events[part]).ravel() for part in (is_on, ~is_on)])
     travel = np.concatenate([each.ravel() for each in travels])
@@ -203,7 +203,7 @@ def response_curve(sensor, events, travels):
 
 
 def charts_of(sensor, real, simulated, travels):
-    """The curves of the page; of the response to the light if it is known how far that travels."""
+    """The curves of the page, with the response to light if the changes of the light are known."""
     streams = [real] + simulated
     rates = []
     for i, stream in enumerate(streams):
@@ -275,7 +275,7 @@ def options():
     parser.add_argument("--to", type=seconds, metavar="SECONDS", help="end of the comparison")
     parser.add_argument("--mask", metavar="PICTURE",
                         help="a picture that is white where pixels of the camera can fire; events elsewhere"
-                        " are left out of all streams")
+                        " are excluded from all streams")
     parser.add_argument("--video", metavar="VIDEO",
                         help="the frames, for the page's response curve: a video, or a text file of lines"
                         " \"seconds picture\"")
@@ -286,7 +286,7 @@ def options():
 
 
 def span_of(streams, start, end):
-    """From `start` to `end` after the first real event; by default the time that all streams cover."""
+    """The time from `start` to `end` after the first real event; by default the time that all streams cover."""
     origin = int(streams[0].events["t"][0])
     first = max(int(stream.events["t"][0]) for stream in streams) if start is None else origin + round(start * 1e6)
     last = min(int(stream.events["t"][-1]) for stream in streams) if end is None else origin + round(end * 1e6)
@@ -306,7 +306,7 @@ def main():
     args = options()
     find_plugins()
     if args.video and not args.html:
-        raise RuntimeError("--video is for the page; name that with --html")
+        raise RuntimeError("--video needs a page; name one with --html")
     if args.html:
         expect_writable(args.html, filter(None, [args.real, *args.simulated, args.mask, args.video]))
     sensor = Sensor()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Videos and recordings as NumPy arrays: reading them, simulating one from the other, and comparing two."""
+"""Reads videos and recordings as NumPy arrays, simulates events from videos, and compares two streams."""
 import argparse
 import json
 import math
@@ -28,10 +28,10 @@ MAX_BUFFER = 1 << 31
 # Frames simulated before a span, so that pixels have a history.
 PAST_FRAMES = 5
 
-# Grey levels below white from which on a pixel counts as overexposed, of 255.
+# A pixel within this many grey levels of white, of 255, counts as overexposed.
 WHITE_MARGIN = 5
 
-# Times in seconds are below, so that they are clock times of GStreamer in nanoseconds.
+# Limit of times in seconds, so that nanoseconds fit a GStreamer clock time.
 MAX_SECONDS = 1e9
 
 
@@ -49,7 +49,7 @@ class Sensor:
     mask: np.ndarray = None  # by row and column: whether a pixel of the camera can fire
 
     def of_camera(self, events):
-        """The events of pixels that the camera has."""
+        """The events of pixels that can fire."""
         if self.mask is None:
             return events
         return events[self.mask[events["y"], events["x"]]]
@@ -85,8 +85,7 @@ class Video(Sensor):
         return frame.overexposed
 
     def visible(self, events):
-        """The events that frames can show: all but those of pixels that are white in the frames before and
-        after them."""
+        """All events except of pixels that are white in the frames before and after them."""
         cuts = np.searchsorted(events["t"], [frame.time // 1000 for frame in self.frames], side="right")
         parts = [events[:cuts[0]]]
         for before, after, first, last in zip(self.frames, self.frames[1:], cuts, cuts[1:]):
@@ -128,7 +127,7 @@ def seconds(text, signed=False):
 
 
 def expect_writable(path, inputs):
-    """Raises the error before the work whose result will be written there, instead of one of the inputs."""
+    """Raises RuntimeError if the path cannot be written, or is an input; called before long work."""
     for read in inputs:
         if os.path.exists(path) and os.path.exists(read) and os.path.samefile(path, read):
             raise RuntimeError(f"{path} is read, so it cannot be written; name another file")
@@ -142,8 +141,8 @@ def expect_writable(path, inputs):
 
 
 def samples_of(description, feeds=()):
-    """Plays a pipeline, and yields what its appsink `out` gets. Each feed is the name of an appsrc, its caps and
-    its buffers."""
+    """Plays a pipeline, and yields the samples of its appsink `out`. Each feed is the name of an appsrc, its caps
+    and its buffers."""
     with Pipeline(description) as pipeline:
         for name, caps, _ in feeds:
             pipeline.element(name).set_property("caps", Gst.Caps.from_string(caps))
@@ -156,7 +155,7 @@ def samples_of(description, feeds=()):
 
 
 def png_of(pixels):
-    """Grey values by row and column, or red, green and blue of each, from 0 to 255, as PNG."""
+    """Encodes grey or RGB values from 0 to 255, by row and column, as PNG."""
     height, width, *colours = pixels.shape
     rows = pixels.astype(np.uint8).reshape(height, -1)
     rows = np.pad(rows, ((0, 0), (0, -rows.shape[1] % 4)))  # as GStreamer pads them
@@ -217,7 +216,7 @@ def decode(path, start, end):
             break
         if buffer.pts - video.origin <= start:
             del video.frames[:-PAST_FRAMES]
-        # Decoders have few buffers and wait for them.
+        # A decoder waits for its few buffers to come back.
         video.frames.append(Frame(buffer.pts, buffer.copy_deep()))
     if not video.frames:
         raise RuntimeError(f"{path}: no video frames; name a video, or a text file of lines \"seconds picture\"")
@@ -244,7 +243,7 @@ def read_recording(path, sensor):
     """All events of a file."""
     try:
         if os.path.splitext(path)[1].lower() in (".csv", ".txt") and sensor.width > 0:
-            # Text files do not store the sensor size.
+            # Text files do not state the sensor size.
             chunks = list(ec.live(f"filesrc location={quoted(path)} ! eventcsvdec"
                                   f" ! application/x-event-camera,width={sensor.width},height={sensor.height}"
                                   " ! identity"))
@@ -259,9 +258,9 @@ def read_recording(path, sensor):
         raise RuntimeError(f"{path}: it has {events.width} x {events.height} pixels, more than the {sensor.width} x"
                            f" {sensor.height} that it is compared with")
     if len(events) > 0 and (events.width, events.height) != (sensor.width, sensor.height):
-        # Where a file does not tell it, the size is that of the smallest known sensor with these events.
+        # If a file does not state its size, readers assume the smallest known sensor that holds the events.
         print(f"warning: {path} has {events.width} x {events.height} pixels, what it is compared with has {sensor.width}"
-              f" x {sensor.height}; this is right only if the file does not tell its size", file=sys.stderr)
+              f" x {sensor.height}; this is right only if the file does not state its size", file=sys.stderr)
     return events
 
 
@@ -269,9 +268,9 @@ def read_recording(path, sensor):
 
 
 def simulate(video, element):
-    """The events that an element, with its properties, generates from a video where its frames can show them."""
+    """The events that an element generates from a video, where the frames are not overexposed."""
     buffers = []
-    # A lag may move frames before 0, but a PTS cannot be negative.
+    # A lag may move frames before 0, where there is no PTS.
     origin = -min(video.frames[0].time // 1000, 0)
     for frame in video.frames:
         # Buffer.copy() would only take another reference.
@@ -291,7 +290,7 @@ def compare(sensor, recorded, simulated, span, picture=None):
     """The figures of eventcompare over a time span."""
     caps = (f"application/x-event-camera,format=XYTP,width={sensor.width},height={sensor.height},"
             "framerate=0/1")
-    # A span that includes the time 0 starts before it, but a PTS cannot be negative.
+    # A span that includes the time 0 starts before it, where there is no PTS.
     shift = max(0, -span.start)
     feeds = []
     for name, events in (("recorded", recorded), ("simulated", simulated)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Finding the plugins that the programs need."""
+"""Finds the plugins that the programs need."""
 from gi.repository import Gst
 
 

@@ -26,9 +26,9 @@ from capture import Capture, described, find_elements, host_of, option_parser  #
 
 ELEMENTS = ["vp8enc", "rtpvp8pay"]
 
-# What every simulator and the encoder take.
+# A format that every simulator and the encoder support.
 CAPTURED = "videoconvert ! video/x-raw,format=I420"
-# The appsrc drops frames while a client pauses, and the queues if a simulator or an encoder is too slow.
+# The appsrc drops frames while a client pauses; the queues drop them if a simulator or an encoder is too slow.
 FRAMES = ("appsrc name=frames is-live=true format=time leaky-type=downstream max-buffers=2 max-bytes=0"
           " max-time=0")
 QUEUE = "queue leaky=downstream max-size-buffers=2"
@@ -54,7 +54,7 @@ class Server:
         permissions = GstRtspServer.RTSPPermissions.new()
         for permission in ("media.factory.access", "media.factory.construct"):
             permissions.add_permission_for_role(VIEWER, permission, True)
-        # Errors are for the user now, not for the first client.
+        # Reports errors at the start, not to the first client.
         Gst.parse_launch_full(MEDIA["/both"].format(simulator=simulator), None, Gst.ParseFlags.FATAL_ERRORS)
         for path, launch in MEDIA.items():
             factory = GstRtspServer.RTSPMediaFactory()

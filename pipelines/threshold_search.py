@@ -5,20 +5,19 @@ from dataclasses import dataclass, field
 import numpy as np
 from event_streams import Gst, counts
 
-# Thresholds are found when the event counts are this close, relatively; those that only rate other
-# properties, when they are roughly. Where none are, because frames have whole grey levels, the search
-# restarts at most MAX_ROUNDS times.
+# Relative precision of event counts; ROUGH_PRECISION suffices for rating other properties. If no thresholds
+# reach it, because frames have whole grey levels, the search restarts at most MAX_ROUNDS times.
 PRECISION = 1e-3
 ROUGH_PRECISION = 1e-2
 MAX_ROUNDS = 3
 MAX_TRIALS = 60
-# How fast event counts change with thresholds at first, in a log-log plot.
+# First guess of the slope of event counts over thresholds, in a log-log plot.
 USUAL_SLOPE = -1.5
 
 
 @dataclass
 class Setting:
-    """An element with its properties, but for its thresholds and those that are shares of their mean."""
+    """An element with its properties, without thresholds; `shares` are properties relative to their mean."""
 
     element: str
     shares: dict = field(default_factory=dict)
@@ -44,9 +43,8 @@ def threshold_limits(element):
 
 
 class ThresholdSearch:
-    """Finds the thresholds at which a simulator generates as many ON and OFF events as there are in `goal`, both
-    at once, from the values `first`: secant steps in a log-log plot as long as they at least halve the error,
-    else bisection."""
+    """Finds the thresholds at which a simulator generates the numbers `goal` of ON and OFF events, starting from
+    `first`: by secant steps in a log-log plot while they at least halve the error, otherwise by bisection."""
 
     def __init__(self, goal, limits, first, precision):
         minimum, self.maximum, default = limits
@@ -54,7 +52,7 @@ class ThresholdSearch:
         self.goal, self.precision = goal, precision
         self.low, self.high = np.full(2, self.minimum), np.full(2, min(self.maximum, default * 20))
         self.next = np.sqrt(self.low * self.high) if first is None else first
-        self.trusts_slope = first is not None  # the usual one, after the first trial
+        self.trusts_slope = first is not None  # USUAL_SLOPE is good after the first trial
         # The best threshold of each polarity need not be the best pair: an event of one polarity also resets the
         # reference level for the other.
         self.each, self.each_error = np.full(2, default), np.full(2, np.inf)
@@ -70,8 +68,8 @@ class ThresholdSearch:
         """The thresholds to try next."""
         return self.each.copy() if self.is_closed() else self.next
 
-    def take(self, made):
-        """Takes the numbers of events at these thresholds. True if the search ends."""
+    def add(self, made):
+        """Adds the numbers of events at these thresholds. Returns True if the search ends."""
         thresholds, closed = self.pair(), self.is_closed()
         log_ratio = np.log(np.maximum(made, 0.5) / self.goal)
         self._keep(thresholds, np.abs(log_ratio))
@@ -95,7 +93,7 @@ class ThresholdSearch:
             self.best, self.best_error = thresholds, error
 
     def _restart(self):
-        """Around the best pair."""
+        """Restarts around the best pair."""
         self.low, self.high = np.maximum(self.best / 1.3, self.minimum), np.minimum(self.best * 1.3, self.maximum)
         self.each, self.each_error = self.best, self.best_error
         self.before = None
@@ -116,8 +114,8 @@ class ThresholdSearch:
 
 
 def find_thresholds(simulated_by, recorded, spans, setting, progress, first=None, precision=PRECISION, share=1.0):
-    """The thresholds at which the simulator generates this share of the ON and OFF events that the recording has
-    within the spans."""
+    """The thresholds at which the simulator generates this share of the recorded ON and OFF events within the
+    spans."""
     goal = share * sum(counts(span.of(recorded)) for span in spans)
     if goal.min() == 0:
         raise RuntimeError("the recording lacks ON or OFF events in the time to calibrate on; choose another with"
@@ -130,6 +128,6 @@ def find_thresholds(simulated_by, recorded, spans, setting, progress, first=None
         progress.tell(f"{setting}: trial {trial + 1}, thresholds {thresholds[0]:.4g} and"
                       f" {thresholds[1]:.4g}, {made[0] / goal[0]:.3f} of the ON and"
                       f" {made[1] / goal[1]:.3f} of the OFF events")
-        if search.take(made):
+        if search.add(made):
             break
     return search.best

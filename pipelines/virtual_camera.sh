@@ -41,7 +41,7 @@ while [ $# -gt 0 ]; do
           echo "error: there is no camera $2; list those that are there: ls /dev/video*" >&2
           exit 1
         fi
-        # By default v4l2src selects the largest frames, which many cameras deliver only a few times a second.
+        # The default of v4l2src is the largest frame size, which many cameras deliver only a few times a second.
         camera=(v4l2src device="$2" !
           "video/x-raw,width=[1,640],height=[1,480];image/jpeg,width=[1,640],height=[1,480]" ! decodebin)
       fi
@@ -79,8 +79,8 @@ if [ ! -S "$remote" ]; then
 fi
 echo "Offering the camera \"Event camera\" to PipeWire until Ctrl-C"
 # pipewiresink 0.3.65 offers buffers without memory if the allocation query reaches it, and crashes if an application
-# connects before the first picture. It lists the camera when caps arrive, and funnel holds them back until then.
-# A leaky queue would reset the simulator at each dropped frame, with an empty picture.
+# connects before the first picture. It lists the camera when caps arrive; funnel delays them until the first picture.
+# A leaky queue would reset the simulator, with an empty picture, at each dropped frame.
 exec gst-launch-1.0 -q "${camera[@]}" ! queue max-size-buffers=2 ! "${simulator[@]}" ! videoconvert ! \
   video/x-raw,format=YUY2 ! identity drop-allocation=true ! funnel ! \
   pipewiresink sync=false mode=provide client-name=event-camera \

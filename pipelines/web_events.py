@@ -37,7 +37,7 @@ DRAW_AND_ENCODE = (
     " ! video/x-raw,framerate=30/1 ! videoconvert ! queue leaky=downstream max-size-buffers=2"
     " ! vp8enc name=encoder deadline=1 cpu-used=8 threads=2 target-bitrate=4000000"
     " keyframe-max-dist=3600")
-# If a browser is too slow, frames are dropped, and it requests a key frame.
+# If a browser is too slow, frames are dropped, and the browser requests a key frame.
 SEND = ("appsrc name=encoded is-live=true format=time leaky-type=downstream"
         " max-buffers=8 max-bytes=0 max-time=0 ! rtpvp8pay picture-id-mode=15-bit ! webrtcbin"
         " name=webrtc bundle-policy=max-bundle")
@@ -219,8 +219,8 @@ class Server:
             self._http.disconnect()
 
     def _check(self, message):
-        """Rejects requests that cannot be parsed, and those for or from another site, against DNS rebinding: an
-        attacker's host name may resolve to this machine, but an IP address or a known name is not theirs."""
+        """Rejects malformed and cross-origin requests. Against DNS rebinding, the host must be an IP address or a
+        known name: an attacker's name may resolve to this machine."""
         headers = message.get_request_headers()
         host = headers.get_one("Host")
         message.get_response_headers().replace("Connection", "close")  # libsoup keeps closed ones otherwise
@@ -266,8 +266,8 @@ class Server:
 def main():
     parser = option_parser("web-events", __doc__, "127.0.0.1", 8080)
     parser.add_argument("--host", action="append", default=[],
-                        help="name by which browsers may call this machine, besides localhost, its host name and"
-                        " IP addresses; may be repeated")
+                        help="further name of this machine that browsers may use, besides localhost, its host"
+                        " name and IP addresses; may be repeated")
     args = parser.parse_args()
     Gst.init(None)
     find_elements(ELEMENTS, "gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-nice")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Data sets made from recipes on the fly."""
+"""Data sets that are simulated on the fly from a recipe."""
 from __future__ import annotations
 
 import contextlib
@@ -8,7 +8,6 @@ import functools
 import os
 import re
 import tempfile
-from types import MappingProxyType
 from typing import Iterator, Mapping, Optional, Sequence, overload
 
 import numpy as np
@@ -37,7 +36,7 @@ class DatasetVideo:
 
     @functools.cached_property
     def parameters(self) -> Mapping[str, Value]:
-        """Drawn from the recipe's seed and the name of the video."""
+        """Properties of the simulator, drawn from the recipe's seed and the name of the video."""
         return self.recipe.drawn(self.name)
 
     @property
@@ -47,7 +46,7 @@ class DatasetVideo:
 
     @property
     def split(self) -> str:
-        """The part of the data set that it belongs to, such as "train"; empty if the recipe has no split."""
+        """Its part of the data set, such as "train"; empty if the recipe has no split."""
         return self.recipe.part_of(self.name)
 
     def __iter__(self) -> Iterator[Events] | Iterator[np.ndarray]:
@@ -64,7 +63,7 @@ class DatasetVideo:
             yield from map(events_of, self._samples(pipeline))
 
     def _samples(self, pipeline: Pipeline) -> Iterator[Gst.Sample]:
-        """Plays to the end. Raises PipelineError if the video cannot be used."""
+        """The output of a pipeline. At its end, raises PipelineError if the video cannot be used."""
         frames = Frames()
         frames.watch(pipeline.element("decoded").get_static_pad("sink"))
         yield from pipeline.samples()
@@ -73,23 +72,20 @@ class DatasetVideo:
 
     def fault(self, frames: Frames, duration: float) -> str:
         """Why a video of these frames cannot be used, such as "corrupt: 2 of 90 frames"; empty if it can.
-        The duration is that of the file, in seconds, 0 if not known."""
+        duration: of the file, in seconds; 0 = unknown."""
         pictures = len(pictures_of(self.path)) if os.path.isdir(self.path) else 0
         return frames.fault(self.recipe.min_frames, duration, pictures)
 
     @contextlib.contextmanager
-    def playing(self, rest: str, threads: int = 0, more: Mapping[str, Value] = MappingProxyType({}),
-                filters: bool = True) -> Iterator[Pipeline]:
+    def playing(self, rest: str, threads: int = 0) -> Iterator[Pipeline]:
         """A pipeline in which the elements `rest` take the events. Its element `decoded` gets the frames.
 
-        threads: of the simulator, 0 = one per processor; the events do not depend on it.
-        more: further properties of the simulator.
-        filters: whether the events pass the filters of the recipe."""
+        threads: of the simulator, 0 = one per processor; the events do not depend on it."""
         recipe = self.recipe
-        parameters = {**self.parameters, **more}
+        parameters = dict(self.parameters)
         if threads > 0 and "n-threads" in property_limits(recipe.simulator):
             parameters["n-threads"] = threads
-        line = recipe.line(parameters, filters)
+        line = recipe.line(parameters)
         with contextlib.ExitStack() as stack:
             if recipe.window:
                 source = "appsrc name=window format=time"
@@ -143,13 +139,13 @@ def pictures_of(folder: str) -> list[str]:
 
 
 def _framerate(recipe: Recipe) -> str:
-    """As a field of caps."""
+    """The framerate as a field of caps."""
     assert recipe.framerate
     return f"framerate={recipe.framerate.numerator}/{recipe.framerate.denominator}"
 
 
 def _numbered_pictures(path: str, folder: str, recipe: Recipe) -> str:
-    """A source of the pictures of a folder, by links of the names that multifilesrc reads."""
+    """A source of the pictures of a folder: multifilesrc, which reads links with numbers as names."""
     if not recipe.framerate:
         raise PipelineError(f"{path} is a folder of pictures, and the recipe has no framerate")
     pictures = pictures_of(path)
@@ -163,7 +159,7 @@ def _numbered_pictures(path: str, folder: str, recipe: Recipe) -> str:
 
 
 def _scaled_picture(path: str, window: Window) -> np.ndarray:
-    """A picture, scaled and cropped to hold the window in each of its places."""
+    """A picture, scaled and cropped to hold the window in each of its positions."""
     width, height = window.width + window.distance, window.height + window.distance
     with Pipeline(f"filesrc location={quoted(path)} ! decodebin ! videoconvert"
                   f" ! aspectratiocrop aspect-ratio={width}/{height} ! videoscale"
@@ -177,7 +173,7 @@ def _scaled_picture(path: str, window: Window) -> np.ndarray:
 
 
 def _moving_window(picture: np.ndarray, window: Window) -> Iterator[np.ndarray]:
-    """The window in each of its places on a scaled picture."""
+    """The window in each of its positions on a scaled picture."""
     for left, top in window.corners():
         yield picture[top:top + window.height, left:left + window.width]
 

@@ -112,10 +112,6 @@ class Pipeline:
     def element(self, name: str) -> Gst.Element:
         return self._pipeline.get_by_name(name)
 
-    def first(self, factory: str) -> Gst.Element:
-        """An element that this factory made."""
-        return self._pipeline.iterate_all_by_element_factory_name(factory).next()[1]
-
     def on_element(self, configure: Callable[[Gst.Element], None]) -> None:
         """Calls configure() for each element that a decodebin adds."""
         self._pipeline.connect("deep-element-added", lambda _, __, element: configure(element))

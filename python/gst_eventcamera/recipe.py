@@ -189,10 +189,10 @@ class Recipe:
                 return value
         raise RecipeError(f"parameters: {parameter} is hardly ever within {low:g} to {high:g}")
 
-    def line(self, parameters: Mapping[str, Value], filters: bool = True) -> str:
-        """The elements from frames to events, or to those before the filters, as gst-launch-1.0 takes them."""
+    def line(self, parameters: Mapping[str, Value]) -> str:
+        """The elements from frames to events, in the syntax of gst-launch-1.0."""
         values = [f"{name}={_written(value)}" for name, value in parameters.items()]
-        elements = [self.frames, " ".join([self.simulator, *values]), self.filters if filters else ""]
+        elements = [self.frames, " ".join([self.simulator, *values]), self.filters]
         return " ! ".join(filter(None, elements))
 
     def part_of(self, name: str) -> str:

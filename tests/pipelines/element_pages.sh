@@ -1,7 +1,34 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The pages of docs/elements/ describe the elements as they are.
+# The pages of docs/elements/ describe the elements as they are, and lines of documents are not too long.
 set -eu
 source "$SOURCE/tests/pipelines/scratch_folder.sh"
 "$SOURCE/docs/describe-elements" "$work/pages"
 diff -r "$SOURCE/docs/elements" "$work/pages" || fail "run docs/describe-elements in the shell of: meson devenv -C build -w ."
+
+# A comment without an example is named.
+mkdir docs
+cp "$SOURCE/docs/describe-elements" docs
+cp -r "$SOURCE/elements" .
+sed -i 's/## Example launch line/## Example/' elements/eventcam/filters/eventcrop.cpp
+if docs/describe-elements pages 2>errors; then fail "eventcrop needs no example"; fi
+grep -q 'error: SECTION:element-eventcrop in .*"## Example launch line"' errors || fail "$(cat errors)"
+
+# Lines have at most 120 characters, except tables, code, images and addresses.
+/usr/bin/python3 - "$SOURCE" <<'PYTHON' || fail "break these lines"
+import re
+import sys
+from pathlib import Path
+
+UNWRAPPED = {"methods", "formats", "filters", "rendering", "measuring", "network", "cameras", "rtp-payload-format", "api"}
+source = Path(sys.argv[1])
+long = []
+for page in [*source.glob("docs/*.md"), *(source / f"{name}.md" for name in ("README", "CONTRIBUTING", "SECURITY"))]:
+    if page.stem in UNWRAPPED:
+        continue
+    text = re.sub(r"^```.*?^```$", lambda code: "\n" * code[0].count("\n"), page.read_text(), flags=re.M | re.S)
+    long += [f"{page}:{number}: {len(line)} characters" for number, line in enumerate(text.split("\n"), 1)
+             if len(line) > 120 and not re.match(r"[|<!]", line) and "://" not in line]
+if long:
+    sys.exit("\n".join(long))
+PYTHON

@@ -43,16 +43,6 @@ eval "$(grep "^python3 .*loadmat" "$SOURCE/docs/formats.md" | sed 's#^#/usr/bin/
 convert n-mnist.npz matlab.csv
 cmp n-mnist.bin.lines matlab.csv || fail "n-mnist.mat has other events"
 
-# From each format to each. The same bytes as above have the same events.
-for in in "${!types[@]}"; do
-  for out in "${!types[@]}"; do
-    convert "ball.$in" "pair.$out"
-    cmp -s "ball.$out" "pair.$out" && continue
-    convert "pair.$out" pair.lines.csv
-    cmp ball.csv pair.lines.csv || fail "ball.$in as $out has other events"
-  done
-done
-
 # The content of a file tells its format, whatever its name is.
 for ending in "${!types[@]}"; do
   cp "ball.$ending" "content of $ending.bin"

@@ -1,13 +1,15 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Lines that a user would type, run by gst-launch-1.0.
+# Lines that a user would type, run by gst-launch-1.0; none leaks a GStreamer object.
 set -eu
 source "$SOURCE/tests/pipelines/pixel_files.sh"
 source "$SOURCE/tests/pipelines/scratch_folder.sh"
 
 launch() {
   echo "gst-launch-1.0 $*"
-  timeout 60 "$GST_LAUNCH" -q "$@"
+  GST_TRACERS=leaks GST_DEBUG=GST_TRACER:7 GST_DEBUG_NO_COLOR=1 GST_DEBUG_FILE=alive timeout 120 "$GST_LAUNCH" -q "$@" || return
+  if grep "object-alive, " alive | grep -v "new format string"; then fail "leaked objects"; fi
+  grep -q GST_TRACER alive || fail "no tracer"
 }
 
 interrupt() { # FILE SIZE ARGUMENT...: Ctrl-C when the file has this size

@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Pipelines leak no GStreamer objects.
+# Pipelines leak no GStreamer objects when they fail or stop early. launch_lines.sh checks those that run to the end.
 set -eu
-source "$SOURCE/tests/pipelines/pixel_files.sh"
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 export GST_TRACERS=leaks GST_DEBUG=GST_TRACER:7 GST_DEBUG_NO_COLOR=1 GST_DEBUG_FILE=$log
@@ -27,69 +26,39 @@ check() {
   grep -q "GST_TRACER" "$log" # the tracer was active
 }
 
-for element in frame dense sparse diff; do
-  check videotestsrc num-buffers=8 ! eventsim-$element ! fakesink
-  check videotestsrc num-buffers=8 ! eventsim-$element ! videoconvert ! fakesink
-done
-# Event files, written and read, completely and partly.
+# Event files, read in part, and files of another kind.
 work=$(mktemp -d)
 trap 'rm -rf "$log" "$work"' EXIT
 for pair in evtenc:evtdec eventdatenc:eventdatdec eventesenc:eventesdec eventcsvenc:eventcsvdec eventnpyenc:eventnpydec eventnpzenc:eventnpzdec eventmcapenc:eventmcapdec; do
   file=$work/${pair%:*}
   check videotestsrc num-buffers=8 ! eventsim-frame ! "${pair%:*}" ! filesink location="$file"
-  check filesrc location="$file" ! "${pair#*:}" ! fakesink
   check filesrc location="$file" ! queue ! "${pair#*:}" ! fakesink num-buffers=1
-  check filesrc location="$file" ! decodebin caps=application/x-event-camera ! fakesink
   check filesrc location="$0" ! "${pair#*:}" ! fakesink
 done
 for layout in dsec metavision; do
   file=$work/$layout.h5
   check videotestsrc num-buffers=8 ! eventsim-frame ! eventhdf5sink format=$layout location="$file"
-  check filesrc location="$file" ! eventhdf5dec ! fakesink
   check filesrc location="$file" ! queue ! eventhdf5dec ! fakesink num-buffers=1
-  check filesrc location="$file" ! decodebin caps=application/x-event-camera ! fakesink
   check filesrc location="$file" ! decodebin3 ! fakesink
   check filesrc location="$file" ! eventhdf5dec ! identity error-after=2 ! eventhdf5sink location="$file.out"
 done
 check filesrc location="$0" ! eventhdf5dec ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! eventhdf5sink location=/nowhere/at/all.h5
-check videotestsrc num-buffers=8 ! eventsim-frame ! evtenc ! application/x-event-camera,format=EVT2 ! evtdec ! fakesink
 aedat=$work/aedat
 video="videotestsrc num-buffers=30 ! video/x-raw,format=GRAY8,framerate=25/1"
 # shellcheck disable=SC2086
 check $video ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location="$aedat"
-for way in identity "queue max-size-bytes=1000"; do
-  # shellcheck disable=SC2086
-  check filesrc location="$aedat" ! $way ! aedatdemux name=d  d.events_0 ! queue ! fakesink  d.video_0 ! queue ! fakesink
-done
-check filesrc location="$aedat" ! aedatdemux ! fakesink
-check filesrc location="$aedat" ! decodebin ! fakesink
-for mode in accumulate decay time-surface count; do
-  check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender mode=$mode ! videoconvert ! fakesink
-done
+check filesrc location="$aedat" ! queue max-size-bytes=1000 ! aedatdemux name=d  d.events_0 ! queue ! fakesink  d.video_0 ! queue ! fakesink
 check eventmerge name=merge ! identity error-after=2 ! fakesink  videotestsrc num-buffers=8 ! eventsim-frame ! merge.  videotestsrc num-buffers=8 ! eventsim-diff ! merge.
-for representation in voxel-grid time-surface; do
-  check videotestsrc num-buffers=8 ! eventsim-frame ! eventtensor representation=$representation data-type=float16 accumulation-time=50000000 overlap=0.5 ! fakesink
-done
-check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! fakesink  t. ! queue ! eventsim-frame ! overlay.event_sink
-for element in frame dense sparse diff; do
-  check videotestsrc num-buffers=8 ! video/x-raw,width=64,height=48 ! glupload ! gleventsim-$element ! fakesink
-done
-check videotestsrc num-buffers=8 ! glupload ! gleventsim-frame ! 'video/x-raw(memory:GLMemory)' ! fakesink
-check videotestsrc num-buffers=8 ! gleventsim-frame ! fakesink
 check videotestsrc num-buffers=8 ! glupload ! gleventsim-frame ! identity error-after=2 ! fakesink
-check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay ! rtpeventdepay ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay max-latency=1000000000 ! rtpeventdepay ! fakesink num-buffers=1
 for format in spif jaer; do
   pay="eventdatagrampay format=$format"
   depay="eventdatagramdepay format=$format width=320 height=240"
   # shellcheck disable=SC2086
-  check videotestsrc num-buffers=8 ! eventsim-frame ! $pay ! $depay ! fakesink
-  # shellcheck disable=SC2086
   check videotestsrc num-buffers=8 ! eventsim-frame ! $pay ! identity error-after=2 ! $depay ! fakesink
 done
 check videotestsrc num-buffers=8 ! eventsim-frame ! eventdatagrampay ! eventdatagramdepay format=es width=20 height=20 ! fakesink
-check videotestsrc num-buffers=8 ! eventsim-frame ! evtenc ! application/x-event-camera,format=EVT3 ! evtparse ! evtdec ! fakesink
 check videotestsrc num-buffers=8 ! video/x-raw,format=GRAY8 ! evtparse format=EVT3 width=320 height=240 ! fakesink
 # Errors in mid-stream.
 check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay ! rtpeventdepay ! identity error-after=2 ! fakesink
@@ -99,21 +68,13 @@ check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! aedatmux
 check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! identity error-after=4 ! eventsim-frame ! eventrender ! fakesink
 check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! identity error-after=2 ! fakesink  t. ! queue ! eventsim-frame ! overlay.event_sink
-make_pixel_files "$work"
-for filter in eventantiflicker eventcrop eventdenoise eventflip eventhotpixel "eventmask location=$work/mask.png" eventpolarity eventratecontrol eventrefractory eventscale eventtrail "eventundistort location=$work/camera.yaml" "eventundistort location=/nowhere"; do
-  # shellcheck disable=SC2086
-  check videotestsrc num-buffers=8 ! eventsim-frame ! $filter ! fakesink
-done
+check videotestsrc num-buffers=8 ! eventsim-frame ! eventundistort location=/nowhere ! fakesink
 # Bags of events and images.
 /usr/bin/python3 "$SOURCE/tests/formats/bag_files.py" "$work"
 for file in "$work"/evt3.{mcap,bag,db3}; do
-  for way in identity queue; do
-    check filesrc location="$file" ! $way ! eventbagdec name=d  d.events_0 ! queue ! fakesink  d.video_0 ! queue ! fakesink
-  done
+  check filesrc location="$file" ! queue ! eventbagdec name=d  d.events_0 ! queue ! fakesink  d.video_0 ! queue ! fakesink
   check filesrc location="$file" ! eventbagdec ! fakesink num-buffers=1
-  check filesrc location="$file" ! decodebin caps=application/x-event-camera ! fakesink
 done
 check filesrc location="$0" ! eventbagdec ! fakesink
-check videotestsrc num-buffers=8 ! eventsim-frame ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! identity error-after=4 ! eventsim-dense ! fakesink
