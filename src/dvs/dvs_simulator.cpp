@@ -396,10 +396,8 @@ class PixelSimulator final : public DvsSimulator {
       case Solver::pixels:
         return solve_pixels(solved);
       case Solver::lines:
-        return solve_lines(solved);
-      case Solver::varying_thresholds:
         if (current_.shot_noise_rate > 0) solve_noisy_pixels(solved, candidates);
-        return solve_varying_thresholds(solved);
+        return solve_lines(solved);
       case Solver::row:
         return solve_row(solved, scratch.unsolved);
     }

@@ -9,7 +9,4 @@ namespace eventcamera {
 /// latency, after which the reference is the level.
 void solve_lines(const RowToSolve& row);
 
-/// Like solve_lines(), with thresholds that vary: by adaptation, and by jitter without mismatch.
-void solve_varying_thresholds(const RowToSolve& row);
-
 }  // namespace eventcamera

@@ -233,17 +233,12 @@ void solve_noisy_pixels(const RowToSolve& row, Candidates& candidates) {
 }
 
 Solver solver_for(const DvsSettings& settings) {
-  const bool has_lines = settings.cutoff_frequency == 0;
   const bool has_side_effects = settings.pixel_latency > 0 || settings.pixel_latency_jitter > 0 ||
                                 settings.refractory_reset == RefractoryReset::signal;
-  const bool has_jitter = settings.threshold_jitter > 0;
-  if (settings.adaptation > 0 || has_jitter) {
-    const bool has_many_means = has_jitter && settings.threshold_sigma > 0;
-    const bool is_fast = has_lines && !has_side_effects && !has_many_means;
-    return is_fast ? Solver::varying_thresholds : Solver::pixels;
-  }
-  const bool is_simple = has_lines && !has_side_effects && settings.shot_noise_rate == 0;
-  return is_simple ? Solver::lines : Solver::row;
+  const bool has_many_means = settings.threshold_jitter > 0 && settings.threshold_sigma > 0;
+  if (settings.cutoff_frequency == 0 && !has_side_effects && !has_many_means) return Solver::lines;
+  const bool thresholds_vary = settings.adaptation > 0 || settings.threshold_jitter > 0;
+  return thresholds_vary ? Solver::pixels : Solver::row;
 }
 
 }  // namespace eventcamera

@@ -93,7 +93,7 @@ void solve_pixels(const RowToSolve& row);
 void solve_noisy_pixels(const RowToSolve& row, Candidates& candidates);
 
 /// Solvers: solve_pixels(), or a faster one for settings that allow it.
-enum class Solver { pixels, lines, varying_thresholds, row };
+enum class Solver { pixels, lines, row };
 Solver solver_for(const DvsSettings& settings);
 
 }  // namespace eventcamera
