@@ -17,7 +17,6 @@
 #include "src/dvs/interval_events.hpp"
 #include "src/dvs/interval_plans.hpp"
 #include "src/dvs/line_solver.hpp"
-#include "src/dvs/motion_tiles.hpp"
 #include "src/dvs/moving_light.hpp"
 #include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/readout.hpp"
@@ -277,17 +276,14 @@ class PixelSimulator final : public DvsSimulator {
   void advance_along_motion(double duration) {
     const auto flow = find_flow();
     const int max_steps = current_.max_interpolated_frames + 1;
-    tiles_.measure(last_.view(), now_.view(), flow, max_steps, threads());
+    tiles_.measure(flow, max_steps, threads());
     begin_plans(duration, max_steps, true);
     for (int row = 0; row < tiles_.rows(); ++row)
       for (int column = 0; column < tiles_.columns(); ++column)
-        plans_.make(tiles_.at(column, row).steps);
+        plans_.make(tiles_.steps(column, row));
     for_each_band([&](const BandRows& rows, Scratch& scratch, const IntervalEvents::Band& events) {
       scratch.moving.resize(static_cast<std::size_t>(max_steps) * moving_stride);
       for (int top = rows.first; top < rows.last; top += MotionTiles::height) {
-        const auto tile_at = [&](int x) -> const MotionTiles::Tile& {
-          return tiles_.at(x / MotionTiles::width, top / MotionTiles::height);
-        };
         // Row by row, which leaves the events of a microsecond nearly in raster order.
         for (int y = top; y < std::min(top + MotionTiles::height, rows.last); ++y) {
           const PixelRow pixels = pixels_.row(y);
@@ -295,31 +291,18 @@ class PixelSimulator final : public DvsSimulator {
           Run run{y, 0, 0};  // of tiles with these steps
           int steps = 1;
           for (int left = 0; left < format().width; left += MotionTiles::width) {
-            const auto& tile = tile_at(left);
-            const int right = std::min(left + MotionTiles::width, format().width);
-            const bool is_skipped = try_skip({y, left, right}, pixels, tile, scratch);
-            const bool is_full = steps > 1 && run.width() == max_moving;
-            if (is_skipped || is_full || tile.steps != steps) {
+            const int here = tiles_.steps(left / MotionTiles::width, top / MotionTiles::height);
+            if (here != steps || (steps > 1 && run.width() == max_moving)) {
               advance_moving(run, pixels, steps, flow, scratch, events);
-              run.first = is_skipped ? right : left;
-              steps = tile.steps;
+              run.first = left;
+              steps = here;
             }
-            run.last = right;
+            run.last = std::min(left + MotionTiles::width, format().width);
           }
           advance_moving(run, pixels, steps, flow, scratch, events);
         }
       }
     });
-  }
-
-  /// Advances a run of a tile that moves through the interval if none of its pixels can fire.
-  /// Otherwise returns false.
-  bool try_skip(const Run& run, const PixelRow& pixels, const MotionTiles::Tile& tile,
-                const Scratch& scratch) const {
-    if (tile.steps == 1 || current_.cutoff_frequency > 0 || gain_ != 1) return false;
-    const void* now = scratch.luma.data() + run.first;
-    return try_skip_run(filter_of(plans_.whole(), plans_.whole_tables()), range_of(tile),
-                        {now, now}, pixels, run);
   }
 
   /// Advances a run of tiles with these steps through the interval.
@@ -339,14 +322,6 @@ class PixelSimulator final : public DvsSimulator {
           step < steps ? scratch.moving.data() + std::ptrdiff_t{step - 1} * moving_stride : now;
       advance_run({luma, has_bandwidth ? luma : now}, run, pixels, plan, i, scratch, events);
     }
-  }
-
-  LightRange range_of(const MotionTiles::Tile& tile) const {
-    const auto response = [this](int luma) {
-      const int white = static_cast<int>(responses_.size()) - 1;
-      return responses_[static_cast<std::size_t>(std::min(luma * widening(current_), white))];
-    };
-    return {response(tile.darkest), response(tile.brightest), plans_.max_rise(), plans_.max_fall()};
   }
 
   void begin_plans(double duration, int max_steps, bool is_exposed) {

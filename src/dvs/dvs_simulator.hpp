@@ -14,11 +14,11 @@
 //
 //   denoise.cpp           removes the noise of the frame camera
 //   exposure_gain.cpp     finds how its exposure changed the light, which is divided out
-//   motion_tiles.cpp      number of steps between two frames for each tile
 //   sub_intervals.cpp     divides the interval into steps, and where exposure pulses begin and end;
 //                         interval_plans.cpp: all its divisions, with bandwidth and noise, which
 //                         depend on the light (shade_tables.hpp)
-//   moving_light.cpp      luma of moving pixels at each step; light_response.hpp: its response
+//   moving_light.cpp      number of steps between two frames for each tile, and the luma of moving
+//                         pixels at each step; light_response.hpp: its response
 //   row_filter.cpp        advances pixels that cannot fire, usually most of them; the others,
 //                         candidates, are solved: they get the exact times of their events
 //   pixel_solver.cpp      solves one at a time, with crossings (trajectory.cpp), adaptation.hpp,

@@ -10,26 +10,19 @@ void IntervalPlans::begin(const DvsSettings& settings, double gain, double durat
   settings_ = settings;
   gain_ = gain;
   edges_.assign(edges.begin(), edges.end());
-  whole_ = {0, duration, 1, 1, 0, sub_interval_count_};
-  max_rise_ = max_fall_ = 0;
-  for (const auto& edge : edges_) {
-    max_rise_ += std::max(0.0F, static_cast<float>(edge.rise));
-    max_fall_ -= std::min(0.0F, static_cast<float>(edge.rise));
-  }
+  duration_ = duration;
   constexpr std::size_t max_tables = 1000;  // of varying frame times
   if (tables_.size() > max_tables) tables_.clear();
-  whole_tables_ = tables_of(duration);
   max_sub_intervals_ = 0;
   plans_.resize(static_cast<std::size_t>(max_steps) + 1);
   for (auto& plan : plans_) plan.sub_intervals.clear();
   make(1);
-  for (const auto& sub_interval : at(1).sub_intervals) whole_.rise += sub_interval.rise;
 }
 
 void IntervalPlans::make(int steps) {
   auto& plan = plans_[static_cast<std::size_t>(steps)];
   if (!plan.sub_intervals.empty()) return;
-  divide_interval(whole_.duration, steps, edges_, sub_interval_count_, plan.sub_intervals);
+  divide_interval(duration_, steps, edges_, sub_interval_count_, plan.sub_intervals);
   plan.tables.clear();
   for (const auto& sub_interval : plan.sub_intervals)
     plan.tables.push_back(tables_of(sub_interval.duration));

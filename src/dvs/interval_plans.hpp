@@ -39,14 +39,6 @@ class IntervalPlans {
   /// A plan that was made.
   const IntervalPlan& at(int steps) const { return plans_[static_cast<std::size_t>(steps)]; }
 
-  /// The interval as a single sub-interval.
-  const SubInterval& whole() const { return whole_; }
-  const ShadeTables& whole_tables() const { return *whole_tables_; }
-
-  /// Maximum rise and fall of all signals by pulses within the interval.
-  float max_rise() const { return max_rise_; }
-  float max_fall() const { return max_fall_; }
-
   /// Must be called when settings or gain change.
   void clear_tables() { tables_.clear(); }
 
@@ -65,10 +57,7 @@ class IntervalPlans {
   DvsSettings settings_;
   double gain_ = 1;
   std::vector<PulseEdge> edges_;
-  SubInterval whole_{};
-  const ShadeTables* whole_tables_ = nullptr;
-  float max_rise_ = 0;
-  float max_fall_ = 0;
+  double duration_ = 0;                   ///< of the interval
   std::map<double, ShadeTables> tables_;  ///< by duration, microseconds
   std::vector<IntervalPlan> plans_;       ///< by number of steps
   std::size_t max_sub_intervals_ = 0;     ///< of a plan

@@ -164,70 +164,6 @@ void filter_luma(const RowFilter& row_filter, const RunLuma& luma, const PixelRo
     filter_as(std::uint16_t());
 }
 
-template <class Pixel>
-bool try_skip(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
-              const PixelRow& pixels, const Run& run) {
-  const Floats floats;
-  const Words words;
-  const Counts counts;
-  const int lanes = static_cast<int>(hn::Lanes(floats));
-  const auto duration = hn::Set(floats, static_cast<float>(row_filter.sub_interval.duration));
-  const auto rise = hn::Set(floats, static_cast<float>(row_filter.sub_interval.rise));
-  const auto highest = hn::Set(floats, range.brightest);
-  const auto lowest = hn::Set(floats, range.darkest);
-  const auto margin = hn::Set(floats, rounding);
-  const auto max_rise = hn::Set(floats, range.max_rise);
-  const auto max_fall = hn::Set(floats, range.max_fall);
-  const auto white = hn::Set(words, static_cast<std::int32_t>(row_filter.responses.size()) - 1);
-  const auto noise_at = [&](int x) {
-    const auto* shades = static_cast<const Pixel*>(luma.shade) + (x - run.first);
-    const auto shade =
-        hn::ShiftRightSame(hn::Min(load_luma(shades), white), row_filter.luma_bits - 8);
-    return hn::GatherIndex(counts, row_filter.tables.noise.data(), shade);
-  };
-
-  auto may_fire = hn::FirstN(floats, 0);
-  for (int x = run.first; x < run.last; x += lanes) {
-    const auto last_target = hn::LoadU(floats, pixels.target + x);
-    const auto reference = hn::LoadU(floats, pixels.reference + x);
-    const auto leaked = hn::Mul(hn::LoadU(floats, pixels.leak + x), duration);
-    const auto top = hn::Add(hn::Add(hn::Max(last_target, highest), leaked), max_rise);
-    const auto bottom = hn::Sub(hn::Min(last_target, lowest), max_fall);
-    const auto fires = hn::Or(
-        hn::Ge(hn::Add(hn::Sub(top, reference), margin), hn::LoadU(floats, pixels.positive + x)),
-        hn::Ge(hn::Add(hn::Sub(reference, bottom), margin),
-               hn::LoadU(floats, pixels.negative + x)));
-    const auto is_refractory =
-        hn::Gt(hn::LoadU(floats, pixels.refractory_left + x), hn::Zero(floats));
-    may_fire = hn::Or(may_fire, hn::Or(fires, is_refractory));
-    if (row_filter.has_noise) {
-      const auto budget = hn::LoadU(counts, pixels.noise_budget + x);
-      may_fire = hn::Or(may_fire, hn::RebindMask(floats, hn::Not(hn::Gt(budget, noise_at(x)))));
-    }
-  }
-  if (!hn::AllFalse(floats, may_fire)) return false;
-
-  for (int x = run.first; x < run.last; x += lanes) {
-    const auto value =
-        hn::Min(load_luma(static_cast<const Pixel*>(luma.target) + (x - run.first)), white);
-    const auto target = hn::GatherIndex(floats, row_filter.responses.data(), value);
-    const auto leaked = hn::Add(hn::Mul(hn::LoadU(floats, pixels.leak + x), duration), rise);
-    hn::StoreU(target, floats, pixels.target + x);
-    hn::StoreU(hn::Sub(hn::LoadU(floats, pixels.reference + x), leaked), floats,
-               pixels.reference + x);
-    if (row_filter.has_noise)
-      hn::StoreU(hn::Sub(hn::LoadU(counts, pixels.noise_budget + x), noise_at(x)), counts,
-                 pixels.noise_budget + x);
-  }
-  return true;
-}
-
-bool try_skip_luma(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
-                   const PixelRow& pixels, const Run& run) {
-  return row_filter.luma_bits == 8 ? try_skip<std::uint8_t>(row_filter, range, luma, pixels, run)
-                                   : try_skip<std::uint16_t>(row_filter, range, luma, pixels, run);
-}
-
 }  // namespace
 }  // namespace eventcamera::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -236,16 +172,10 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 
 HWY_EXPORT(filter_luma);
-HWY_EXPORT(try_skip_luma);
 
 void filter_run(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
                 const Run& run, Candidates& candidates) {
   HWY_DYNAMIC_DISPATCH(filter_luma)(row_filter, luma, pixels, run, candidates);
-}
-
-bool try_skip_run(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
-                  const PixelRow& pixels, const Run& run) {
-  return HWY_DYNAMIC_DISPATCH(try_skip_luma)(row_filter, range, luma, pixels, run);
 }
 
 }  // namespace eventcamera

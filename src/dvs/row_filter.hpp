@@ -85,18 +85,4 @@ struct RunLuma {
 void filter_run(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
                 const Run& run, Candidates& candidates);
 
-/// Bounds of the light during an interval, in units of the response.
-struct LightRange {
-  float darkest;
-  float brightest;
-  float max_rise;  ///< of all signals, beyond the light
-  float max_fall;
-};
-
-/// Advances a run of pixels without bandwidth through a whole interval, for which `row_filter` and
-/// `luma` are, if none of them can fire in it, whatever the light does within its range. Otherwise
-/// returns false, and leaves them as they are.
-bool try_skip_run(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
-                  const PixelRow& pixels, const Run& run);
-
 }  // namespace eventcamera
