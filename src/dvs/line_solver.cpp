@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/dvs/line_solver.hpp"
+#include "src/dvs/pixel_solver.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -59,8 +59,8 @@ class Pixels {
 
   /// Fall of the references within the sub-interval.
   Values fall(const RowToSolve& row) const {
-    return hn::Add(hn::Mul(load(row, Candidates::leak), all(row.sub_interval.duration)),
-                   all(row.sub_interval.rise));
+    return hn::Add(hn::Mul(load(row, Candidates::leak), all(row.sub_interval->duration)),
+                   all(row.sub_interval->rise));
   }
 
   void store(const RowToSolve& row, Values stored, float* values) const {
@@ -81,9 +81,9 @@ class Pixels {
 
   /// Stores RowToSolve::refractory_left(), if any is or was.
   void store_refractory_left(const RowToSolve& row, Values ready) const {
-    auto left = hn::Max(all(0), hn::Sub(ready, all(row.sub_interval.duration)));
+    auto left = hn::Max(all(0), hn::Sub(ready, all(row.sub_interval->duration)));
     const auto is_short = hn::And(hn::Gt(left, all(0)), hn::Lt(left, all(min_gap)));
-    left = hn::Add(left, hn::IfThenElseZero(is_short, all(row.next_rounding)));
+    left = hn::Add(left, hn::IfThenElseZero(is_short, all(row.sub_interval->next_rounding)));
     const auto is_or_was = hn::Gt(hn::Max(left, load(row, Candidates::refractory_left)), all(0));
     if (hn::AllFalse(Doubles(), hn::And(is_or_was, exist()))) return;
     store(row, left, row.pixels.refractory_left);
@@ -110,9 +110,9 @@ constexpr std::size_t max_vectors = 16;
 /// Adds events of vectors of pixels.
 class Events {
  public:
-  explicit Events(const RowToSolve& row)
+  explicit Events(RowToSolve& row)
       : row_(row),
-        begin_(row.sub_interval.begin),
+        begin_(row.sub_interval->begin),
         end_(row.events.duration()),
         place_of_row_(static_cast<std::uint64_t>(row.pixels.y) << 48) {}
 
@@ -156,17 +156,17 @@ class Events {
       const bool is_on = event.polarity() == Polarity::on;
       const double threshold = is_on ? row_.pixels.positive[x] : row_.pixels.negative[x];
       const bool falls = (fading_bits >> lane & 1) != 0;
-      const double fall = falls ? threshold * row_.dynamics.adaptation.rate() : 0;
+      const double fall = falls ? threshold * row_.model->adaptation.rate() : 0;
       const float* last_targets = row_.candidates.column(Candidates::last_target);
       const double rise = double{row_.pixels.target[x]} - last_targets[pixels.first() + lane];
       const auto cause =
-          row_.cause_of_crossing(x, event.polarity(), rise / row_.sub_interval.duration, fall);
+          row_.cause_of_crossing(x, event.polarity(), rise / row_.sub_interval->duration, fall);
       row_.pixels.last_cause[x] = cause;
       events_[count_++] = with_cause(event, cause);
     }
   }
 
-  const RowToSolve& row_;
+  RowToSolve& row_;
   double begin_;
   double end_;
   std::uint64_t place_of_row_;
@@ -227,7 +227,7 @@ class Lines {
     fall_ = pixels_.fall(row);
     first_ = pixels_.load(row, Candidates::last_target);
     last_ = hn::Add(pixels_.load(row, Candidates::target), fall_);
-    slope_ = hn::Div(hn::Sub(last_, first_), all(row.sub_interval.duration));
+    slope_ = hn::Div(hn::Sub(last_, first_), all(row.sub_interval->duration));
     positive_ = pixels_.load(row, Candidates::positive);
     negative_ = pixels_.load(row, Candidates::negative);
     reference_ = pixels_.load(row, Candidates::reference);
@@ -235,18 +235,18 @@ class Lines {
     t_ = all(0);
     crosses_ = pixels_.exist();
     if constexpr (thresholds_vary) {
-      growth_end_ = hn::Sub(pixels_.load(row, row.pixels.growth_end), all(row.start));
-      if (row.settings.threshold_jitter > 0) begin_draws(row);
+      growth_end_ = hn::Sub(pixels_.load(row, row.pixels.growth_end), all(row.sub_interval->start));
+      if (row.model->has_threshold_jitter()) begin_draws(row);
     }
   }
 
   /// Finds the next crossing of each pixel. Returns false if there is none.
   bool advance(const RowToSolve& row, Events& events) {
     const Doubles doubles;
-    const auto& adaptation = row.dynamics.adaptation;
+    const auto& adaptation = row.model->adaptation;
     const auto rate = all(adaptation.rate());
     const auto value = hn::Sub(hn::Add(first_, hn::Mul(slope_, t_)), reference_);
-    const auto left = hn::Sub(all(row.sub_interval.duration), t_);
+    const auto left = hn::Sub(all(row.sub_interval->duration), t_);
     Values on_wait;
     Values off_wait;
     if constexpr (thresholds_vary) {
@@ -273,11 +273,11 @@ class Lines {
     reference_ = hn::IfThenElse(crosses_, level, reference_);
     const auto fires = hn::And(crosses_, hn::Ge(t_, ready_));
     events.add(pixels_, fires, is_on, hn::Gt(growth, all(0)), t_);
-    ready_ = hn::IfThenElse(fires, hn::Add(t_, all(row.dynamics.gap)), ready_);
+    ready_ = hn::IfThenElse(fires, hn::Add(t_, all(row.model->gap)), ready_);
     if constexpr (thresholds_vary) {
       const auto prolonged = hn::Add(hn::Max(t_, growth_end_), all(adaptation.duration()));
       growth_end_ = hn::IfThenElse(fires, prolonged, growth_end_);
-      if (row.settings.threshold_jitter > 0) draw_thresholds(row, fires);
+      if (row.model->has_threshold_jitter()) draw_thresholds(row, fires);
     }
     return true;
   }
@@ -287,9 +287,10 @@ class Lines {
     pixels_.store(row, hn::Sub(reference, fall_), row.pixels.reference);
     pixels_.store_refractory_left(row, ready_);
     if constexpr (thresholds_vary) {
-      if (row.dynamics.adaptation.is_on())
-        pixels_.store(row, hn::Add(all(row.start), growth_end_), row.pixels.growth_end);
-      if (row.settings.threshold_jitter > 0) {
+      if (row.model->adaptation.is_on())
+        pixels_.store(row, hn::Add(all(row.sub_interval->start), growth_end_),
+                      row.pixels.growth_end);
+      if (row.model->has_threshold_jitter()) {
         pixels_.store(row, drawn_, positive_, row.pixels.positive);
         pixels_.store(row, drawn_, negative_, row.pixels.negative);
       }
@@ -301,8 +302,8 @@ class Lines {
     const Bits bits;
     const auto numbers =
         hn::Add(hn::BitCast(bits, pixels_.x(row)), hn::Set(bits, row.pixels.first_number));
-    random_ = RandomSeries<Doubles>(row.random, numbers, Random::Purpose::event);
-    draw_ = hn::Set(bits, row.sub_interval.number * draws_per_sub_interval);
+    random_ = RandomSeries<Doubles>(row.model->random, numbers, Random::Purpose::event);
+    draw_ = hn::Set(bits, row.sub_interval->number * draws_per_sub_interval);
     drawn_ = hn::FirstN(Doubles(), 0);
   }
 
@@ -311,11 +312,11 @@ class Lines {
     const auto [first, second] = random_.normals(draw_);
     const auto drawn = [&](Values normal, double mean) HWY_ATTR {
       const auto threshold =
-          hn::Add(all(mean), hn::Mul(all(row.settings.threshold_jitter), normal));
+          hn::Add(all(mean), hn::Mul(all(row.model->settings.threshold_jitter), normal));
       return hn::Max(threshold, all(min_threshold_of(mean)));
     };
-    positive_ = hn::IfThenElse(fire, drawn(first, row.dynamics.thresholds.positive), positive_);
-    negative_ = hn::IfThenElse(fire, drawn(second, row.dynamics.thresholds.negative), negative_);
+    positive_ = hn::IfThenElse(fire, drawn(first, row.model->mean_thresholds.positive), positive_);
+    negative_ = hn::IfThenElse(fire, drawn(second, row.model->mean_thresholds.negative), negative_);
     drawn_ = hn::Or(drawn_, fire);
     const Bits bits;
     draw_ = hn::IfThenElse(hn::RebindMask(bits, fire), hn::Add(draw_, hn::Set(bits, 1)), draw_);
@@ -340,7 +341,7 @@ class Lines {
 
 /// Finds a crossing of each vector in turn, and then the next ones.
 template <class Signals>
-void solve_in_turns(const RowToSolve& row) {
+void solve_in_turns(RowToSolve& row) {
   Events events(row);
   Signals signals[max_vectors];
   std::size_t crossing[max_vectors];
@@ -366,8 +367,8 @@ void solve_in_turns(const RowToSolve& row) {
   }
 }
 
-void solve(const RowToSolve& row) {
-  if (row.settings.adaptation > 0 || row.settings.threshold_jitter > 0)
+void solve(RowToSolve& row) {
+  if (row.model->adaptation.is_on() || row.model->has_threshold_jitter())
     solve_in_turns<Lines<true>>(row);
   else
     solve_in_turns<Lines<false>>(row);
@@ -382,7 +383,8 @@ namespace eventcamera {
 
 HWY_EXPORT(solve);
 
-void solve_lines(const RowToSolve& row) {
+void solve_lines(RowToSolve& row) {
+  if (row.model->has_noise()) solve_noisy_pixels(row);
   HWY_DYNAMIC_DISPATCH(solve)(row);
 }
 

@@ -6,7 +6,7 @@
 
 #include "src/core/image.hpp"
 #include "src/core/thread_pool.hpp"
-#include "src/dvs/run.hpp"
+#include "src/dvs/pixel_array.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "src/simulate/warp.hpp"
 
