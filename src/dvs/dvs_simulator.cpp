@@ -15,34 +15,18 @@
 #include "src/dvs/denoise.hpp"
 #include "src/dvs/exposure_gain.hpp"
 #include "src/dvs/interval_events.hpp"
-#include "src/dvs/interval_plans.hpp"
-#include "src/dvs/line_solver.hpp"
-#include "src/dvs/motion_tiles.hpp"
+#include "src/dvs/light_response.hpp"
 #include "src/dvs/moving_light.hpp"
+#include "src/dvs/pixel_array.hpp"
 #include "src/dvs/pixel_solver.hpp"
-#include "src/dvs/readout.hpp"
 #include "src/dvs/row_filter.hpp"
-#include "src/dvs/row_solver.hpp"
 #include "src/dvs/state_bytes.hpp"
+#include "src/dvs/sub_intervals.hpp"
 #include "src/simulate/difference.hpp"
 #include "src/simulate/frame_flow.hpp"
 
 namespace eventcamera {
 namespace {
-
-/// True if both settings give each pixel the same traits.
-bool have_same_traits(const DvsSettings& a, const DvsSettings& b) {
-  return a.positive_threshold == b.positive_threshold &&
-         a.negative_threshold == b.negative_threshold && a.threshold_sigma == b.threshold_sigma &&
-         a.leak_rate == b.leak_rate && a.leak_spread == b.leak_spread &&
-         a.hot_pixels == b.hot_pixels && a.dead_pixels == b.dead_pixels && a.seed == b.seed;
-}
-
-bool have_same_response(const DvsSettings& a, const DvsSettings& b) {
-  return a.linear_light == b.linear_light && a.exposure_compensation == b.exposure_compensation &&
-         a.response == b.response && a.log_eps == b.log_eps &&
-         a.overexposed_light == b.overexposed_light;
-}
 
 /// A state begins with this; the last character is the version of its format.
 constexpr std::array<char, 8> state_magic{'D', 'V', 'S', 'S', 'T', 'A', 'T', '3'};
@@ -66,17 +50,9 @@ std::uint64_t hash_of(const DvsSettings& settings) {
   return checksum_of(writer.finish());
 }
 
-/// Limit of the gain since the first frame, in case many estimates err in the same direction.
-constexpr double max_total_gain = 64;
-
-/// Event rate limit that no array reaches, events per second.
-constexpr double unlimited = 1e18;
-
-/// Scratch memory of a thread.
+/// Memory of a thread.
 struct alignas(64) Scratch {
-  Candidates candidates;
-  UnsolvedPixels unsolved;
-  std::vector<Event> added;           ///< events of a band
+  RowToSolve row;
   std::vector<std::uint16_t> luma;    ///< a row, padded for vectors
   std::vector<std::uint16_t> moving;  ///< a run for each blended frame, padded
 };
@@ -94,7 +70,7 @@ class PixelSimulator final : public DvsSimulator {
 
   std::vector<std::uint8_t> state() override {
     StateWriter writer;
-    serialize_origin(writer, current_);
+    serialize_origin(writer, pixels_.model().settings);
     serialize(writer);
     return writer.finish();
   }
@@ -103,10 +79,10 @@ class PixelSimulator final : public DvsSimulator {
     last_time_.reset();
     StateReader reader(state);
     serialize_origin(reader, settings_);
-    adopt(settings_, true);
+    response_.set(settings_);
+    pixels_.start(settings_, threads());
     serialize(reader);
     reader.finish();
-    responses_ = responses_to_luma(current_);
     frame_flow_.forget();
   }
 
@@ -132,72 +108,61 @@ class PixelSimulator final : public DvsSimulator {
   void serialize(Archive& archive) {
     Nanoseconds time = last_time_.value_or(0);
     archive.value(time, is_within<Nanoseconds>(0, std::numeric_limits<Nanoseconds>::max()));
-    plans_.serialize(archive);
-    archive.value(clock_, is_within(0.0, max_state_clock));
-    archive.value(gain_, is_within(1 / max_total_gain, max_total_gain));
-    std::uint8_t is_narrow = is_narrow_ ? 1 : 0;
-    archive.value(is_narrow, is_within<std::uint8_t>(0, 1));
-    if constexpr (Archive::is_reading) is_narrow_ = is_narrow == 1;
+    timeline_.serialize(archive);
+    response_.serialize(archive);
     archive.image(last_, is_anything);
-    pulse_.serialize(archive);
     pixels_.serialize(archive);
-    fired_.serialize(archive, format().width, format().height);
-    std::uint8_t has_readout = readout_ ? 1 : 0;
-    archive.value(has_readout, is_within<std::uint8_t>(0, 1));
-    if constexpr (Archive::is_reading) {
-      readout_.reset();
-      if (has_readout == 1) readout_.emplace(format().width, format().height);
-      last_time_ = time;
-    }
-    if (readout_) readout_->serialize(archive);
+    fired_.serialize(archive);
+    if constexpr (Archive::is_reading) last_time_ = time;
   }
 
   bool needs_flow() const override { return settings_.upsampling == Upsampling::motion; }
 
   void start(const LumaView& frame) override {
-    copy_luma(frame, last_);
+    see(frame, last_);
     frame_flow_.forget();
-    plans_.restart();
-    clock_ = 0;
-    fired_.reset();
-    if (readout_) readout_->reset();
-    if (gain_ != 1) responses_.clear();  // of another exposure
-    keep_causes();
-    adopt(settings_, true);
-    settle();
-    for (int y = 0; y < format().height; ++y)
-      std::fill_n(pixels_.row(y).refractory_left, format().width, 0.0F);
+    timeline_.restart();
+    fired_.restart();
+    response_.restart();
+    response_.set(settings_);
+    set_labels();
+    pixels_.start(settings_, threads());
+    pixels_.settle(last_, response_, threads());
   }
 
   void simulate(const LumaView& frame, const StepTimes& interval, const Settings&,
                 EventBuckets& events) override {
-    copy_luma(frame, now_);
-    const double duration = begin(interval, events);
-    if (current_.exposure_compensation) compensate_exposure();
-    if (current_.upsampling == Upsampling::motion)
-      advance_along_motion(duration);
+    see(frame, now_);
+    change_settings();
+    const double gain = response_.compensate(last_.view(), now_.view(), threads());
+    const bool moves = settings_.upsampling == Upsampling::motion;
+    if (gain != 1 && moves) {
+      expose(last_, format().bits, settings_.linear_light, gain, threads());
+      frame_flow_.forget();  // its copy has the old exposure
+    }
+    begin(interval, true, events);
+    if (moves)
+      advance_along_motion();
     else
-      advance_straight(duration, true);
-    finish(duration, events);
+      advance_straight();
+    end();
     std::swap(last_, now_);
   }
 
   bool hold(const StepTimes& interval, const Settings&, EventBuckets& events) override {
     now_.assign(last_.view());
-    const double duration = begin(interval, events);
-    advance_straight(duration, false);
-    finish(duration, events);
+    change_settings();
+    begin(interval, false, events);
+    advance_straight();
+    end();
     return true;
   }
 
   void label(const LabelledEvents& events) override { separate_causes(events); }
 
   /// Copies the luma of a frame, denoised.
-  void copy_luma(const LumaView& frame, Image<Pixel>& out) {
-    if (frame.is_narrow != is_narrow_) {
-      is_narrow_ = frame.is_narrow;
-      if (!responses_.empty()) responses_ = responses_to_luma(current_);
-    }
+  void see(const LumaView& frame, Image<Pixel>& out) {
+    response_.set_range(frame.is_narrow);
     const int white = (1 << format().bits) - 1;
     const int limit = static_cast<int>(std::lround(settings_.denoise / 255 * white));
     if (limit > 0)
@@ -206,151 +171,111 @@ class PixelSimulator final : public DvsSimulator {
       out.assign(frame.as<Pixel>());
   }
 
-  /// Divides out the gain of the exposure from the last frame to this one.
-  void compensate_exposure() {
-    if (!exposure_gain_) exposure_gain_.emplace(format().bits, current_.linear_light);
-    const double gain = exposure_gain_->between(last_.view(), now_.view(), threads());
-    const double total = gain_ * gain;
-    if (gain == 1 || std::max(total, 1 / total) > max_total_gain) return;
-    gain_ = total;
-    plans_.clear_tables();
-    responses_ = responses_to_luma(current_);
-    if (current_.upsampling == Upsampling::linear) return;
-    expose(last_, format().bits, current_.linear_light, gain, threads());
-    frame_flow_.forget();  // its copy has the old exposure
+  void set_labels() {
+    if (has_labels() == pixels_.has_labels()) return;
+    pixels_.set_labels(has_labels());
+    if (!has_labels()) fired_.drop_causes();
   }
 
-  /// Returns the duration of the interval in microseconds.
-  double begin(const StepTimes& interval, EventBuckets& events) {
-    keep_causes();
-    if (settings_ != current_) change_to(settings_);
-    if (current_.max_rate > 0 && !readout_) readout_.emplace(format().width, format().height);
-    const double duration = in_microseconds(interval.duration());
-    const auto rounding_of = [](Nanoseconds time) { return in_microseconds(time % 1000); };
-    next_rounding_ =
-        std::max(0.0, rounding_of(*last_time_ + interval.duration()) - rounding_of(*last_time_));
-    fired_.begin(duration, band_count(format().height), readout_ ? unread_ : events);
+  /// Applies new settings mid-stream. Pixels keep their state unless its units change.
+  void change_settings() {
+    set_labels();
+    if (settings_ == pixels_.model().settings) return;
+    const bool keeps_units = response_.has_units_of(settings_);
+    response_.set(settings_);
+    pixels_.change(settings_, threads());
+    if (keeps_units) return;
+    timeline_.end_pulse();
+    pixels_.settle(last_, response_, threads());
+  }
+
+  void begin(const StepTimes& interval, bool is_exposed, EventBuckets& events) {
+    timeline_.begin(settings_, response_.gain(), *last_time_, interval.duration(), is_exposed);
+    fired_.begin(timeline_.duration(), settings_.max_rate, events);
     scratch_.resize(static_cast<std::size_t>(threads().threads()));
-    return duration;
   }
 
-  /// Starts or stops finding the causes of events.
-  void keep_causes() {
-    if (has_labels() == pixels_.keeps_causes()) return;
-    pixels_.keep_causes(has_labels());
-    if (has_labels()) return;
-    fired_.drop_causes();
-    if (readout_) readout_->drop_causes();
-  }
-
-  void finish(double duration, EventBuckets& events) {
-    plans_.end();
-    clock_ += duration;
-    if (!readout_) return;
-    const bool is_limited = current_.max_rate > 0;
-    sorted_.resize(unread_.size());
-    unread_.write_to(sorted_.data(), threads());
-    readout_->read(sorted_, duration, is_limited ? current_.max_rate : unlimited, events);
-    if (!is_limited) readout_.reset();  // no events are waiting any more
+  void end() {
+    timeline_.end();
+    fired_.end(threads());
   }
 
   /// Advances all pixels with linear interpolation.
-  void advance_straight(double duration, bool is_exposed) {
+  void advance_straight() {
     frame_flow_.forget();  // does not see this frame
-    begin_plans(duration, 1, is_exposed);
-    const bool is_widened = luma_bits(current_) != format().bits;
-    for_each_band([&](const BandRows& rows, Scratch& scratch, const IntervalEvents::Band& events) {
-      for (int y = rows.first; y < rows.last; ++y) {
-        const void* luma = now_.row(y);
-        if (is_widened) {
-          widen(now_.row(y), format().width, scratch.luma.data());
-          luma = scratch.luma.data();
-        }
-        const Run run{y, 0, format().width};
-        const PixelRow pixels = pixels_.row(y);
-        for (std::size_t i = 0; i < plans_.at(1).sub_intervals.size(); ++i)
-          advance_run({luma, luma}, run, pixels, plans_.at(1), i, scratch, events);
-      }
+    for_each_row([&](int y, Scratch& scratch) {
+      const void* luma =
+          response_.is_widened() ? widened(y, scratch) : static_cast<const void*>(now_.row(y));
+      for (const auto& sub_interval : timeline_.plan(1))
+        advance({y, 0, format().width}, sub_interval, {luma, luma}, scratch.row);
     });
   }
 
-  void advance_along_motion(double duration) {
+  /// Row by row, which leaves the events of a microsecond nearly in raster order.
+  void advance_along_motion() {
     const auto flow = find_flow();
-    const int max_steps = current_.max_interpolated_frames + 1;
-    tiles_.measure(last_.view(), now_.view(), flow, max_steps, threads());
-    begin_plans(duration, max_steps, true);
+    const int max_steps = settings_.max_interpolated_frames + 1;
+    tiles_.measure(flow, max_steps, threads());
     for (int row = 0; row < tiles_.rows(); ++row)
       for (int column = 0; column < tiles_.columns(); ++column)
-        plans_.make(tiles_.at(column, row).steps);
-    for_each_band([&](const BandRows& rows, Scratch& scratch, const IntervalEvents::Band& events) {
+        timeline_.make_plan(tiles_.steps(column, row));
+    for_each_row([&](int y, Scratch& scratch) {
       scratch.moving.resize(static_cast<std::size_t>(max_steps) * moving_stride);
-      for (int top = rows.first; top < rows.last; top += MotionTiles::height) {
-        const auto tile_at = [&](int x) -> const MotionTiles::Tile& {
-          return tiles_.at(x / MotionTiles::width, top / MotionTiles::height);
-        };
-        // Row by row, which leaves the events of a microsecond nearly in raster order.
-        for (int y = top; y < std::min(top + MotionTiles::height, rows.last); ++y) {
-          const PixelRow pixels = pixels_.row(y);
-          widen(now_.row(y), format().width, scratch.luma.data());
-          Run run{y, 0, 0};  // of tiles with these steps
-          int steps = 1;
-          for (int left = 0; left < format().width; left += MotionTiles::width) {
-            const auto& tile = tile_at(left);
-            const int right = std::min(left + MotionTiles::width, format().width);
-            const bool is_skipped = try_skip({y, left, right}, pixels, tile, scratch);
-            const bool is_full = steps > 1 && run.width() == max_moving;
-            if (is_skipped || is_full || tile.steps != steps) {
-              advance_moving(run, pixels, steps, flow, scratch, events);
-              run.first = is_skipped ? right : left;
-              steps = tile.steps;
-            }
-            run.last = right;
-          }
-          advance_moving(run, pixels, steps, flow, scratch, events);
-        }
+      widened(y, scratch);
+      for (Run run{y, 0, 0}; run.first < format().width; run.first = run.last) {
+        const int steps = extend_over_tiles(run);
+        advance_moving(run, steps, flow, scratch);
       }
     });
   }
 
-  /// Advances a run of a tile that moves through the interval if none of its pixels can fire.
-  /// Otherwise returns false.
-  bool try_skip(const Run& run, const PixelRow& pixels, const MotionTiles::Tile& tile,
-                const Scratch& scratch) const {
-    if (tile.steps == 1 || current_.cutoff_frequency > 0 || gain_ != 1) return false;
-    const void* now = scratch.luma.data() + run.first;
-    return try_skip_run(filter_of(plans_.whole(), plans_.whole_tables()), range_of(tile),
-                        {now, now}, pixels, run);
+  /// Extends an empty run over the tiles that have the steps of the first one, which it returns.
+  int extend_over_tiles(Run& run) const {
+    const auto steps_at = [&](int x) {
+      return tiles_.steps(x / MotionTiles::width, run.y / MotionTiles::height);
+    };
+    const int steps = steps_at(run.first);
+    const int end = steps > 1 ? std::min(run.first + max_moving, format().width) : format().width;
+    while (run.last < end && steps_at(run.last) == steps) run.last += MotionTiles::width;
+    run.last = std::min(run.last, format().width);
+    return steps;
   }
 
-  /// Advances a run of tiles with these steps through the interval.
-  void advance_moving(const Run& run, const PixelRow& pixels, int steps,
-                      const ImageView<Flow>& flow, Scratch& scratch,
-                      const IntervalEvents::Band& events) {
-    if (run.width() == 0) return;
+  void advance_moving(const Run& run, int steps, const ImageView<Flow>& flow, Scratch& scratch) {
     if (steps > 1)
       move_light(Warp<Pixel>{last_.view(), now_.view(), steps}, flow, run, scratch.moving.data(),
                  moving_stride);
-    const void* now = scratch.luma.data() + run.first;
-    const bool has_bandwidth = current_.cutoff_frequency > 0;
-    const IntervalPlan& plan = plans_.at(steps);
-    for (std::size_t i = 0; i < plan.sub_intervals.size(); ++i) {
-      const int step = plan.sub_intervals[i].step;
-      const void* luma =
+    const std::uint16_t* now = scratch.luma.data() + run.first;
+    const bool has_bandwidth = pixels_.model().has_bandwidth();
+    for (const auto& sub_interval : timeline_.plan(steps)) {
+      const int step = sub_interval.step;
+      const std::uint16_t* luma =
           step < steps ? scratch.moving.data() + std::ptrdiff_t{step - 1} * moving_stride : now;
-      advance_run({luma, has_bandwidth ? luma : now}, run, pixels, plan, i, scratch, events);
+      advance(run, sub_interval, {luma, has_bandwidth ? luma : now}, scratch.row);
     }
   }
 
-  LightRange range_of(const MotionTiles::Tile& tile) const {
-    const auto response = [this](int luma) {
-      const int white = static_cast<int>(responses_.size()) - 1;
-      return responses_[static_cast<std::size_t>(std::min(luma * widening(current_), white))];
-    };
-    return {response(tile.darkest), response(tile.brightest), plans_.max_rise(), plans_.max_fall()};
+  /// Advances a run of pixels through a sub-interval.
+  void advance(const Run& run, const SubInterval& sub_interval, const RunLuma& luma,
+               RowToSolve& row) const {
+    row.candidates.count = 0;
+    filter_run(pixels_.model(), response_, sub_interval, luma, row.pixels, run, row.candidates);
+    if (row.candidates.count == 0) return;
+    row.sub_interval = &sub_interval;
+    switch (row.model->solver) {
+      case Solver::pixels:
+        return solve_pixels(row);
+      case Solver::lines:
+        return solve_lines(row);
+      case Solver::row:
+        return solve_row(row);
+    }
   }
 
-  void begin_plans(double duration, int max_steps, bool is_exposed) {
-    plans_.begin(current_, gain_, duration, pulse_.next(current_, duration, is_exposed), max_steps);
+  /// The luma of a row of the frame, with the depth of move_light().
+  const std::uint16_t* widened(int y, Scratch& scratch) const {
+    widen(now_.row(y), format().width, scratch.luma.data());
+    return scratch.luma.data();
   }
 
   ImageView<Flow> find_flow() {
@@ -362,154 +287,34 @@ class PixelSimulator final : public DvsSimulator {
     return frame_flow_.find(FlowMethod::dis_mq, format().bits, last_, now_, changed, threads());
   }
 
-  RowFilter filter_of(const SubInterval& sub_interval, const ShadeTables& tables) const {
-    return {sub_interval,
-            tables,
-            responses_,
-            luma_bits(current_),
-            current_.cutoff_frequency > 0,
-            current_.shot_noise_rate > 0,
-            gain_ != 1};
-  }
-
-  /// Advances a run of pixels through sub-interval i of a plan.
-  void advance_run(const RunLuma& luma, const Run& run, const PixelRow& pixels,
-                   const IntervalPlan& plan, std::size_t i, Scratch& scratch,
-                   const IntervalEvents::Band& events) {
-    const SubInterval& sub_interval = plan.sub_intervals[i];
-    const ShadeTables& tables = *plan.tables[i];
-    auto& candidates = scratch.candidates;
-    candidates.count = 0;
-    filter_run(filter_of(sub_interval, tables), luma, pixels, run, candidates);
-    if (candidates.count == 0) return;
-    const RowToSolve solved{current_,
-                            dynamics_,
-                            random_,
-                            sub_interval,
-                            tables,
-                            pixels,
-                            candidates,
-                            events,
-                            clock_ + sub_interval.begin,
-                            i + 1 == plan.sub_intervals.size() ? next_rounding_ : 0};
-    switch (solver_) {
-      case Solver::pixels:
-        return solve_pixels(solved);
-      case Solver::lines:
-        return solve_lines(solved);
-      case Solver::varying_thresholds:
-        if (current_.shot_noise_rate > 0) solve_noisy_pixels(solved, candidates);
-        return solve_varying_thresholds(solved);
-      case Solver::row:
-        return solve_row(solved, scratch.unsolved);
-    }
-  }
-
-  /// Bit depth of the luma that is passed to the pixels.
-  int luma_bits(const DvsSettings& settings) const {
-    const bool is_widened = settings.upsampling == Upsampling::motion && sizeof(Pixel) == 1;
-    return is_widened ? 16 : format().bits;
-  }
-
-  std::vector<float> responses_to_luma(const DvsSettings& settings) const {
-    return responses(settings, luma_bits(settings), is_narrow_, gain_);
-  }
-
-  /// Factor from the luma of frames to that of luma_bits().
-  int widening(const DvsSettings& settings) const {
-    return luma_bits(settings) == format().bits ? 1 : 257;
-  }
-
-  void adopt(const DvsSettings& settings, bool restarts) {
-    const bool is_first = responses_.empty();
-    const bool starts_over = is_first || !have_same_response(settings, current_);
-    if (starts_over) {
-      gain_ = 1;
-      exposure_gain_.reset();
-    }
-    if (starts_over || settings.upsampling != current_.upsampling)
-      responses_ = responses_to_luma(settings);
-    plans_.clear_tables();
-    random_ = Random(settings.seed);
-    // Thresholds that events have drawn stay until time or the jitter ends.
-    const bool had_jitter = current_.threshold_jitter > 0;
-    const bool keeps_drawn =
-        had_jitter && settings.threshold_jitter > 0 && !restarts && settings.seed == current_.seed;
-    if (is_first || !have_same_traits(settings, current_) || (had_jitter && !keeps_drawn))
-      for_each_row(threads(), format().height, [&](int y) {
-        if (keeps_drawn)
-          pixels_.change_traits(y, current_, settings, random_);
-        else
-          pixels_.draw_traits(y, settings, random_);
-      });
-    current_ = settings;
-    dynamics_ = PixelDynamics(settings);
-    solver_ = solver_for(settings);
-  }
-
-  /// Changes settings mid-stream. Pixels keep their state unless its units changed.
-  void change_to(const DvsSettings& settings) {
-    const bool is_comparable = have_same_response(settings, current_);
-    const bool had_bandwidth = current_.cutoff_frequency > 0;
-    adopt(settings, false);
-    if (!is_comparable)
-      settle();
-    else if (!had_bandwidth)
-      for_each_row(threads(), format().height, [&](int y) {
-        const PixelRow pixels = pixels_.row(y);
-        std::copy_n(pixels.target, format().width, pixels.signal);
-      });
-  }
-
-  /// Settles the pixels as if the last frame had been shown for a long time.
-  void settle() {
-    pulse_.reset();
-    const int white = static_cast<int>(responses_.size()) - 1;
-    for_each_row(threads(), format().height, [&](int y) {
-      float* target = pixels_.row(y).target;
-      for (int x = 0; x < format().width; ++x)
-        target[x] = responses_[static_cast<std::size_t>(
-            std::min(last_.at(x, y) * widening(current_), white))];
-      pixels_.settle(y, current_, random_);
-    });
-  }
-
-  /// Calls body(rows, scratch, events) for each band of rows, in parallel.
-  template <class Body>
-  void for_each_band(const Body& body) {
+  /// Calls advance_row(y, scratch) for each row, band by band in parallel.
+  template <class AdvanceRow>
+  void for_each_row(const AdvanceRow& advance_row) {
     threads().for_each(band_count(format().height), [&](int band, int thread) {
       auto& scratch = scratch_[static_cast<std::size_t>(thread)];
-      scratch.candidates.resize(format().width);
+      auto& row = scratch.row;
+      row.model = &pixels_.model();
+      row.events.begin(fired_, band);
+      row.candidates.resize(format().width);
       scratch.luma.resize(static_cast<std::size_t>(format().width) + max_lanes);
-      const IntervalEvents::Band events(fired_, band, scratch.added);
-      body(BandRows(band, format().height), scratch, events);
-      events.end();
+      const BandRows rows(band, format().height);
+      for (int y = rows.first; y < rows.last; ++y) {
+        row.pixels = pixels_.row(y);
+        advance_row(y, scratch);
+      }
+      row.events.end();
     });
   }
 
   Image<Pixel> last_{format().width, format().height};
   Image<Pixel> now_{format().width, format().height};
+  LightResponse response_{format().bits};
   PixelArray pixels_{format().width, format().height};
-  DvsSettings current_;  ///< applied to the pixels
-  PixelDynamics dynamics_{current_};
-  Solver solver_ = solver_for(current_);
-  Random random_{0};
-  std::optional<ExposureGain> exposure_gain_;
-  double gain_ = 1;               ///< of the exposure since the first frame
-  bool is_narrow_ = false;        ///< range of luma
-  std::vector<float> responses_;  ///< by luma value
-  ExposurePulse pulse_;
-  IntervalPlans plans_;
-  double clock_ = 0;          ///< start of this interval, microseconds since the first frame
-  double next_rounding_ = 0;  ///< RowToSolve::next_rounding of its last sub-interval
-  IntervalEvents fired_;
-  EventBuckets unread_;        ///< events that go to the readout
-  std::vector<Event> sorted_;  ///< the same, sorted
-  std::optional<Readout> readout_;
-  std::vector<Scratch> scratch_;  ///< by thread
-
+  Timeline timeline_;
+  IntervalEvents fired_{format().width, format().height};
   FrameFlow frame_flow_;
   MotionTiles tiles_;
+  std::vector<Scratch> scratch_;  ///< by thread
 };
 
 }  // namespace

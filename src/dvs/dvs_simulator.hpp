@@ -9,25 +9,24 @@
 #include "src/dvs/dvs_settings.hpp"
 #include "src/simulate/simulator.hpp"
 
-// Guide to this folder: which file does what from frames to events, in this order. The equations
-// are in docs/methods.md.
+// Guide to this folder, from frames to events; the equations are in docs/methods.md.
 //
 //   denoise.cpp           removes the noise of the frame camera
-//   exposure_gain.cpp     finds how its exposure changed the light, which is divided out
-//   motion_tiles.cpp      number of steps between two frames for each tile
-//   sub_intervals.cpp     divides the interval into steps, and where exposure pulses begin and end;
-//                         interval_plans.cpp: all its divisions, with bandwidth and noise, which
-//                         depend on the light (shade_tables.hpp)
-//   moving_light.cpp      luma of moving pixels at each step; light_response.hpp: its response
+//   light_response.cpp    response of the photoreceptor to luma, without the exposure that
+//                         exposure_gain.cpp finds
+//   moving_light.cpp      number of steps between two frames for each tile, and the luma of moving
+//                         pixels at each step
+//   sub_intervals.cpp     timeline: divides the interval into sub-intervals at steps and exposure
+//                         pulses, with tables of bandwidth and noise, which depend on the light
+//   pixel_model.cpp       what pixels have in common, and how they differ
+//   pixel_array.cpp       state of all pixels
 //   row_filter.cpp        advances pixels that cannot fire, usually most of them; the others,
 //                         candidates, are solved: they get the exact times of their events
-//   pixel_solver.cpp      solves one at a time, with crossings (trajectory.cpp), adaptation.hpp,
-//                         shot_noise.hpp, latency and refractory period; chooses the solver
-//   line_solver.cpp       the same for many straight lines at a time, without latency
-//   row_solver.cpp        the same for many pixels at a time whose thresholds do not vary
+//   pixel_solver.cpp      solves any pixel, one at a time, with the crossings of trajectory.cpp
+//   line_solver.cpp       many straight lines at a time, without latency
+//   row_solver.cpp        many pixels at a time whose thresholds do not vary
 //   interval_events.hpp   collects the events, and defers those past the interval
 //   readout.cpp           reads them out row by row at a limited rate
-// Pixels have the state and the mismatch of pixel_array.cpp, and random numbers of random.hpp.
 
 namespace eventcamera {
 

@@ -2,18 +2,20 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "src/core/event_buckets.hpp"
 #include "src/core/label.hpp"
 #include "src/core/thread_pool.hpp"
+#include "src/dvs/readout.hpp"
 #include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
-/// Collects the events of an interval, which bands of rows add in any order. Events past its end
-/// are deferred to the next interval.
+/// Events of an interval, which bands of rows add in any order. Events past its end are deferred to
+/// the next interval. With a limited rate, a Readout delays the others.
 class IntervalEvents {
   struct DeferredEvent {
     double t;  ///< microseconds after the start of the next interval
@@ -22,101 +24,131 @@ class IntervalEvents {
   struct alignas(64) Deferred : std::vector<DeferredEvent> {};
 
  public:
-  /// Begins an interval of `duration` microseconds. Events are written to `events`, with_cause().
-  void begin(double duration, int bands, EventBuckets& events) {
+  IntervalEvents(int width, int height)
+      : width_(width), height_(height), deferred_(static_cast<std::size_t>(band_count(height))) {}
+
+  /// Begins an interval of `duration` microseconds, whose events are written to `out`,
+  /// with_cause(). `max_rate` is in events per second; 0 = no limit.
+  void begin(double duration, double max_rate, EventBuckets& out) {
     duration_ = duration;
-    events_ = &events;
-    events.reset_slices(static_cast<std::uint32_t>(duration), bands);
-    deferred_.resize(static_cast<std::size_t>(bands));
+    max_rate_ = max_rate;
+    if (max_rate > 0 && !readout_) readout_.emplace(width_, height_);
+    out_ = &out;
+    fired_ = readout_ ? &unread_ : &out;
+    fired_->reset_slices(static_cast<std::uint32_t>(duration), band_count(height_));
   }
 
-  /// Drops the causes of the deferred events.
+  /// Ends the interval, after the last event.
+  void end(ThreadPool& threads) {
+    if (!readout_) return;
+    sorted_.resize(unread_.size());
+    unread_.write_to(sorted_.data(), threads);
+    readout_->read(sorted_, duration_, max_rate_ > 0 ? max_rate_ : unlimited, *out_);
+    if (max_rate_ == 0) readout_.reset();  // no events are waiting any more
+  }
+
+  /// Drops the causes of the deferred and waiting events.
   void drop_causes() {
     for (auto& band : deferred_)
       for (auto& deferred : band) deferred.event = without_cause(deferred.event);
+    if (readout_) readout_->drop_causes();
   }
 
-  /// Drops the deferred events.
-  void reset() { deferred_.clear(); }
+  /// Drops the deferred and waiting events.
+  void restart() {
+    for (auto& band : deferred_) band.clear();
+    if (readout_) readout_->reset();
+  }
 
   /// Writes the deferred events of a sensor of this size to a StateWriter, or reads them from a
   /// StateReader.
   template <class Archive>
-  void serialize(Archive& archive, int width, int height) {
-    deferred_.resize(static_cast<std::size_t>(band_count(height)));
-    for (int band = 0; band < band_count(height); ++band) {
-      const BandRows rows(band, height);
+  void serialize(Archive& archive) {
+    for (int band = 0; band < band_count(height_); ++band) {
+      const BandRows rows(band, height_);
       auto& deferred = deferred_[static_cast<std::size_t>(band)];
       deferred.resize(archive.count(deferred.size(), sizeof(double) + sizeof(Event)));
       for (auto& [t, event] : deferred) {
         archive.value(t, is_within(0.0, max_state_time));
-        archive.value(event, is_event_within({0, rows.first, width, rows.last}));
+        archive.value(event, is_event_within({0, rows.first, width_, rows.last}));
       }
     }
+    std::uint8_t has_readout = readout_ ? 1 : 0;
+    archive.value(has_readout, is_within<std::uint8_t>(0, 1));
+    if constexpr (Archive::is_reading) {
+      readout_.reset();
+      if (has_readout == 1) readout_.emplace(width_, height_);
+    }
+    if (readout_) readout_->serialize(archive);
   }
 
-  /// One band of rows. Different bands may be added to from different threads.
+  /// Adds the events of one band of rows at a time. Several may add to the same interval, from
+  /// different threads.
   class Band {
    public:
-    /// Begins with the deferred events of the last interval. Until end(), events are in `added`,
-    /// which is emptied first.
-    Band(IntervalEvents& events, int band, std::vector<Event>& added)
-        : duration_(events.duration_),
-          events_(*events.events_),
-          band_(band),
-          deferred_(events.deferred_[static_cast<std::size_t>(band)]),
-          added_(added) {
+    /// Begins with the deferred events of the last interval.
+    void begin(IntervalEvents& events, int band) {
+      duration_ = events.duration_;
+      fired_ = events.fired_;
+      band_ = band;
+      deferred_ = &events.deferred_[static_cast<std::size_t>(band)];
       added_.clear();
       std::size_t kept = 0;
-      for (const auto& [t, event] : deferred_) {
+      for (const auto& [t, event] : *deferred_) {
         if (t > duration_)
-          deferred_[kept++] = {t - duration_, event};
+          (*deferred_)[kept++] = {t - duration_, event};
         else
           add_within(t, event);
       }
-      deferred_.resize(kept);
+      deferred_->resize(kept);
     }
 
     /// Duration of the interval, microseconds.
     double duration() const { return duration_; }
 
     /// Adds events within the interval.
-    void add(std::span<const Event> events) const {
+    void add(std::span<const Event> events) {
       added_.insert(added_.end(), events.begin(), events.end());
     }
 
-    void add(double t, int x, int y, Polarity polarity, Cause cause) const {
-      add(t, with_cause(Event::at(x, y, 0, polarity), cause));
-    }
-
     /// Adds an event `t` microseconds after the start of the interval, instead of its own time.
-    void add(double t, const Event& event) const {
+    void add(double t, const Event& event) {
       if (t > duration_)
-        deferred_.push_back({t - duration_, event});
+        deferred_->push_back({t - duration_, event});
       else
         add_within(t, event);
     }
 
     /// Must be called after the last event.
-    void end() const { events_.add_slices(band_, added_); }
+    void end() { fired_->add_slices(band_, added_); }
 
    private:
-    void add_within(double t, Event event) const {
+    void add_within(double t, Event event) {
       event.t = static_cast<std::uint32_t>(t);
       added_.push_back(event);
     }
 
-    double duration_;
-    EventBuckets& events_;
-    int band_;
-    Deferred& deferred_;
-    std::vector<Event>& added_;
+    double duration_ = 0;
+    EventBuckets* fired_ = nullptr;
+    int band_ = 0;
+    Deferred* deferred_ = nullptr;
+    std::vector<Event> added_;
   };
 
  private:
+  /// Event rate limit that no array reaches, events per second.
+  static constexpr double unlimited = 1e18;
+
+  int width_;
+  int height_;
   double duration_ = 0;
-  EventBuckets* events_ = nullptr;
+  double max_rate_ = 0;
+  EventBuckets* out_ = nullptr;
+  EventBuckets* fired_ = nullptr;   ///< out_, or unread_
   std::vector<Deferred> deferred_;  ///< by band
+  EventBuckets unread_;             ///< events that go to the readout
+  std::vector<Event> sorted_;       ///< the same, sorted
+  std::optional<Readout> readout_;
 };
 
 }  // namespace eventcamera

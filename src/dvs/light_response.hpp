@@ -4,9 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
+#include "src/core/image.hpp"
+#include "src/core/thread_pool.hpp"
 #include "src/dvs/dvs_settings.hpp"
+#include "src/dvs/exposure_gain.hpp"
+#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -23,36 +28,64 @@ inline double luma_of(double light, bool linear_light) {
   return light <= 0.04045 / 12.92 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
 }
 
-/// Factor of the light of bright luma, which is `overexposed_light` at white and falls to 1 over 20
-/// of 255 grey levels below.
-inline double overexposure_of(double luma, bool is_narrow, double overexposed_light) {
-  constexpr double width = 20.0 / 255;
-  const double white = is_narrow ? 235.0 / 255 : 1;
-  return 1 + (overexposed_light - 1) * std::clamp((luma - white) / width + 1, 0.0, 1.0);
-}
+/// Response of the photoreceptor to the luma of frames, in which it divides out the exposure.
+class LightResponse {
+ public:
+  explicit LightResponse(int frame_bits) : frame_bits_(frame_bits) {}
 
-/// Response of the photoreceptor to light, white is 1.
-inline double response_of(double light, Response response, double log_eps) {
-  constexpr double linear_up_to = 20;  // 8-bit grey levels, as in v2e
-  if (response == Response::log) return std::log(log_eps + light);
-  if (response == Response::linear) return std::log(255.0) * light;
-  const double x = 255 * light;
-  return x <= linear_up_to ? x * std::log(linear_up_to) / linear_up_to : std::log(x);
-}
+  /// Applies to the next frames. Starts over with the exposure unless has_units_of().
+  void set(const DvsSettings& settings);
+  /// True if the responses with these settings are comparable to those so far.
+  bool has_units_of(const DvsSettings& settings) const;
 
-/// Responses to all luma values of a bit depth, 8 to 16, in a frame with `gain` times the exposure
-/// of the first one.
-inline std::vector<float> responses(const DvsSettings& settings, int bits, bool is_narrow,
-                                    double gain) {
-  std::vector<float> values(std::size_t{1} << bits);
-  const auto max_luma = static_cast<double>(values.size() - 1);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const double luma = static_cast<double>(i) / max_luma;
-    const double light = light_of(luma, settings.linear_light) *
-                         overexposure_of(luma, is_narrow, settings.overexposed_light) / gain;
-    values[i] = static_cast<float>(response_of(light, settings.response, settings.log_eps));
+  void set_range(bool is_narrow);
+
+  /// The next frame has the exposure 1.
+  void restart();
+
+  /// Adapts to the exposure of a frame, if settings say so. Returns its gain since the last frame.
+  template <class Pixel>
+  double compensate(const ImageView<Pixel>& last, const ImageView<Pixel>& now, ThreadPool& threads);
+
+  /// Exposure of the last frame; that of the first one is 1.
+  double gain() const { return gain_; }
+
+  /// Bit depth of the luma that pixels see: frames of 8 bits have 16 while they move.
+  int bits() const {
+    return settings_.upsampling == Upsampling::motion && frame_bits_ == 8 ? 16 : frame_bits_;
   }
-  return values;
-}
+  bool is_widened() const { return bits() != frame_bits_; }
+
+  const std::vector<float>& table() const { return table_; }  ///< by luma of bits()
+  int white() const { return static_cast<int>(table_.size()) - 1; }
+
+  /// Response to the luma of a frame.
+  float operator()(int luma) const {
+    const int seen = is_widened() ? 257 * luma : luma;
+    return table_[static_cast<std::size_t>(std::min(seen, white()))];
+  }
+
+  /// Writes gain and range to a StateWriter, or reads them from a StateReader.
+  template <class Archive>
+  void serialize(Archive& archive) {
+    archive.value(gain_, is_within(1.0 / 64, 64.0));
+    std::uint8_t is_narrow = is_narrow_ ? 1 : 0;
+    archive.value(is_narrow, is_within<std::uint8_t>(0, 1));
+    if constexpr (Archive::is_reading) {
+      is_narrow_ = is_narrow == 1;
+      make_table();
+    }
+  }
+
+ private:
+  void make_table();
+
+  int frame_bits_;
+  DvsSettings settings_;
+  bool is_narrow_ = false;
+  double gain_ = 1;
+  std::optional<ExposureGain> exposure_gain_;
+  std::vector<float> table_;
+};
 
 }  // namespace eventcamera

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/dvs/line_solver.hpp"
+#include "src/dvs/pixel_solver.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -59,8 +59,8 @@ class Pixels {
 
   /// Fall of the references within the sub-interval.
   Values fall(const RowToSolve& row) const {
-    return hn::Add(hn::Mul(load(row, Candidates::leak), all(row.sub_interval.duration)),
-                   all(row.sub_interval.rise));
+    return hn::Add(hn::Mul(load(row, Candidates::leak), all(row.sub_interval->duration)),
+                   all(row.sub_interval->rise));
   }
 
   void store(const RowToSolve& row, Values stored, float* values) const {
@@ -81,9 +81,9 @@ class Pixels {
 
   /// Stores RowToSolve::refractory_left(), if any is or was.
   void store_refractory_left(const RowToSolve& row, Values ready) const {
-    auto left = hn::Max(all(0), hn::Sub(ready, all(row.sub_interval.duration)));
+    auto left = hn::Max(all(0), hn::Sub(ready, all(row.sub_interval->duration)));
     const auto is_short = hn::And(hn::Gt(left, all(0)), hn::Lt(left, all(min_gap)));
-    left = hn::Add(left, hn::IfThenElseZero(is_short, all(row.next_rounding)));
+    left = hn::Add(left, hn::IfThenElseZero(is_short, all(row.sub_interval->next_rounding)));
     const auto is_or_was = hn::Gt(hn::Max(left, load(row, Candidates::refractory_left)), all(0));
     if (hn::AllFalse(Doubles(), hn::And(is_or_was, exist()))) return;
     store(row, left, row.pixels.refractory_left);
@@ -110,9 +110,9 @@ constexpr std::size_t max_vectors = 16;
 /// Adds events of vectors of pixels.
 class Events {
  public:
-  explicit Events(const RowToSolve& row)
+  explicit Events(RowToSolve& row)
       : row_(row),
-        begin_(row.sub_interval.begin),
+        begin_(row.sub_interval->begin),
         end_(row.events.duration()),
         place_of_row_(static_cast<std::uint64_t>(row.pixels.y) << 48) {}
 
@@ -156,103 +156,22 @@ class Events {
       const bool is_on = event.polarity() == Polarity::on;
       const double threshold = is_on ? row_.pixels.positive[x] : row_.pixels.negative[x];
       const bool falls = (fading_bits >> lane & 1) != 0;
-      const double fall = falls ? threshold * row_.dynamics.adaptation.rate() : 0;
+      const double fall = falls ? threshold * row_.model->adaptation.rate() : 0;
       const float* last_targets = row_.candidates.column(Candidates::last_target);
       const double rise = double{row_.pixels.target[x]} - last_targets[pixels.first() + lane];
       const auto cause =
-          row_.cause_of_crossing(x, event.polarity(), rise / row_.sub_interval.duration, fall);
+          row_.cause_of_crossing(x, event.polarity(), rise / row_.sub_interval->duration, fall);
       row_.pixels.last_cause[x] = cause;
       events_[count_++] = with_cause(event, cause);
     }
   }
 
-  const RowToSolve& row_;
+  RowToSolve& row_;
   double begin_;
   double end_;
   std::uint64_t place_of_row_;
   std::size_t count_ = 0;
   Event events_[(max_vectors + 1) * max_lanes / 2];
-};
-
-/// Signals that are straight lines, of a vector of pixels.
-class Lines {
- public:
-  // Not defaulted: GCC 12 compiles a defaulted constructor without the target's instructions.
-  Lines() {}  // NOLINT(*-member-init,*-use-equals-default)
-
-  void begin(const RowToSolve& row, std::size_t candidate) {
-    const auto zero = all(0);
-    pixels_.begin(row, candidate);
-    fall_ = pixels_.fall(row);
-    const auto first = pixels_.load(row, Candidates::last_target);
-    const auto reference = pixels_.load(row, Candidates::reference);
-    const auto change = hn::Sub(hn::Add(pixels_.load(row, Candidates::target), fall_), first);
-    is_constant_ = hn::Eq(change, zero);
-    rises_ = hn::Or(hn::Gt(change, zero), hn::And(is_constant_, hn::Gt(first, reference)));
-    first_ = upright(first);
-    rise_ = upright(change);
-    const auto positive = pixels_.load(row, Candidates::positive);
-    const auto negative = pixels_.load(row, Candidates::negative);
-    threshold_ = hn::IfThenElse(rises_, positive, negative);
-    threshold_behind_ = hn::IfThenElse(rises_, negative, positive);
-    reference_ = upright(reference);
-    ready_ = pixels_.load(row, Candidates::refractory_left);
-    crosses_ = pixels_.exist();
-    is_beyond_ = hn::And(crosses_, hn::Le(first_, hn::Sub(reference_, threshold_behind_)));
-  }
-
-  /// Finds the next crossing of each pixel. Returns false if there is none.
-  bool advance(const RowToSolve& row, Events& events) {
-    const Doubles doubles;
-    const auto zero = all(0);
-    if (HWY_UNLIKELY(!hn::AllFalse(doubles, is_beyond_))) return fall_back(row, events);
-    const auto level = hn::Add(reference_, threshold_);
-    crosses_ = hn::And(crosses_, hn::Le(level, hn::Add(last(), all(rounding))));
-    if (hn::AllFalse(doubles, crosses_)) return false;
-    const auto share = hn::Min(hn::Max(hn::Div(hn::Sub(level, first_), rise_), zero), all(1));
-    const auto t =
-        hn::IfThenElse(is_constant_, zero, hn::Mul(share, all(row.sub_interval.duration)));
-    const auto fires = hn::And(crosses_, hn::Ge(t, ready_));
-    reference_ = hn::IfThenElse(crosses_, level, reference_);
-    ready_ = hn::IfThenElse(fires, hn::Add(t, all(row.dynamics.gap)), ready_);
-    events.add(pixels_, fires, rises_, hn::FirstN(doubles, 0), t);
-    return true;
-  }
-
-  void end(const RowToSolve& row) const {
-    const auto reference = upright(hn::IfThenElse(crosses_, last(), reference_));
-    pixels_.store(row, hn::Sub(reference, fall_), row.pixels.reference);
-    pixels_.store_refractory_left(row, ready_);
-  }
-
- private:
-  /// Crossings at the start of signals that recede from a level they are beyond, because the
-  /// threshold has been lowered.
-  bool fall_back(const RowToSolve& row, Events& events) {
-    const auto fires = hn::And(is_beyond_, hn::Ge(all(0), ready_));
-    reference_ = hn::IfThenElse(is_beyond_, hn::Sub(reference_, threshold_behind_), reference_);
-    ready_ = hn::IfThenElse(fires, all(row.dynamics.gap), ready_);
-    events.add(pixels_, fires, hn::Not(rises_), hn::FirstN(Doubles(), 0), all(0));
-    is_beyond_ = hn::And(is_beyond_, hn::Le(first_, hn::Sub(reference_, threshold_behind_)));
-    return true;
-  }
-
-  /// Turns signals that fall upside down, and back.
-  Values upright(Values value) const { return hn::IfThenElse(rises_, value, hn::Neg(value)); }
-  Values last() const { return hn::Add(first_, rise_); }
-
-  Pixels pixels_;
-  Mask rises_;
-  Mask is_constant_;
-  Mask crosses_;             ///< in all passes so far
-  Mask is_beyond_;           ///< the level behind, from the start
-  Values threshold_behind_;  ///< of the other polarity
-  Values fall_;              ///< of the references
-  Values first_;             ///< signals at the start of the sub-interval
-  Values rise_;              ///< of the signals, including the fall of the references
-  Values threshold_;
-  Values reference_;
-  Values ready_;  ///< earliest time of the next event
 };
 
 /// Growth of the thresholds of a vector of pixels, as a fraction of them. It falls to 0, or until
@@ -266,7 +185,17 @@ struct Growth {
 };
 
 /// Time until signals that start at `value`, and have this slope, reach thresholds; infinite if
-/// they do not.
+/// they do not before the sub-interval ends, in `left` microseconds.
+HWY_INLINE Values wait(Values value, Values slope, Values threshold, Values left) {
+  const auto is_beyond = hn::Ge(value, threshold);
+  const auto meets =
+      hn::Ge(hn::Add(value, hn::Mul(slope, left)), hn::Sub(threshold, all(rounding)));
+  const auto time = hn::Div(hn::Sub(threshold, value), slope);
+  const auto found = hn::IfThenElseZero(hn::Not(is_beyond), hn::Min(hn::Max(time, all(0)), left));
+  return hn::IfThenElse(hn::Or(is_beyond, meets), found, hn::Inf(Doubles()));
+}
+
+/// The same for thresholds that have grown, and fall.
 HWY_INLINE Values wait(Values value, Values slope, Values threshold, const Growth& growth) {
   const auto one = all(1);
   const auto margin = all(rounding);
@@ -285,56 +214,71 @@ HWY_INLINE Values wait(Values value, Values slope, Values threshold, const Growt
   return hn::IfThenElse(hn::Or(is_beyond, hn::Or(meets, reaches)), found, hn::Inf(Doubles()));
 }
 
-/// Like Lines, with thresholds that vary: by adaptation, and by jitter without mismatch.
-class VaryingThresholds {
+/// Signals that are straight lines, of a vector of pixels. Their thresholds may vary: by
+/// adaptation, and by jitter without mismatch.
+template <bool thresholds_vary>
+class Lines {
  public:
-  // Not defaulted, like that of Lines.
-  VaryingThresholds() {}  // NOLINT(*-member-init,*-use-equals-default)
+  // Not defaulted: GCC 12 compiles a defaulted constructor without the target's instructions.
+  Lines() {}  // NOLINT(*-member-init,*-use-equals-default)
 
   void begin(const RowToSolve& row, std::size_t candidate) {
     pixels_.begin(row, candidate);
     fall_ = pixels_.fall(row);
     first_ = pixels_.load(row, Candidates::last_target);
     last_ = hn::Add(pixels_.load(row, Candidates::target), fall_);
-    slope_ = hn::Div(hn::Sub(last_, first_), all(row.sub_interval.duration));
+    slope_ = hn::Div(hn::Sub(last_, first_), all(row.sub_interval->duration));
     positive_ = pixels_.load(row, Candidates::positive);
     negative_ = pixels_.load(row, Candidates::negative);
     reference_ = pixels_.load(row, Candidates::reference);
     ready_ = pixels_.load(row, Candidates::refractory_left);
-    growth_end_ = hn::Sub(pixels_.load(row, row.pixels.growth_end), all(row.start));
     t_ = all(0);
     crosses_ = pixels_.exist();
-    if (row.settings.threshold_jitter > 0) begin_draws(row);
+    if constexpr (thresholds_vary) {
+      growth_end_ = hn::Sub(pixels_.load(row, row.pixels.growth_end), all(row.sub_interval->start));
+      if (row.model->has_threshold_jitter()) begin_draws(row);
+    }
   }
 
   /// Finds the next crossing of each pixel. Returns false if there is none.
   bool advance(const RowToSolve& row, Events& events) {
     const Doubles doubles;
-    const auto& adaptation = row.dynamics.adaptation;
+    const auto& adaptation = row.model->adaptation;
     const auto rate = all(adaptation.rate());
     const auto value = hn::Sub(hn::Add(first_, hn::Mul(slope_, t_)), reference_);
-    const auto left = hn::Sub(all(row.sub_interval.duration), t_);
-    const auto growth_left = hn::Max(hn::Sub(growth_end_, t_), all(0));
-    const auto fall = hn::Min(growth_left, left);
-    const Growth growth{hn::Mul(rate, growth_left), hn::Mul(rate, hn::Sub(growth_left, fall)), rate,
-                        fall, left};
-    const auto on_wait = wait(value, slope_, positive_, growth);
-    const auto off_wait = wait(hn::Neg(value), hn::Neg(slope_), negative_, growth);
+    const auto left = hn::Sub(all(row.sub_interval->duration), t_);
+    Values on_wait;
+    Values off_wait;
+    if constexpr (thresholds_vary) {
+      const auto growth_left = hn::Max(hn::Sub(growth_end_, t_), all(0));
+      const auto fall = hn::Min(growth_left, left);
+      const Growth growth{hn::Mul(rate, growth_left), hn::Mul(rate, hn::Sub(growth_left, fall)),
+                          rate, fall, left};
+      on_wait = wait(value, slope_, positive_, growth);
+      off_wait = wait(hn::Neg(value), hn::Neg(slope_), negative_, growth);
+    } else {
+      on_wait = wait(value, slope_, positive_, left);
+      off_wait = wait(hn::Neg(value), hn::Neg(slope_), negative_, left);
+    }
     const auto is_on = hn::Le(on_wait, off_wait);
     const auto wait_time = hn::IfThenElse(is_on, on_wait, off_wait);
     crosses_ = hn::And(crosses_, hn::Lt(wait_time, hn::Inf(doubles)));
     if (hn::AllFalse(doubles, crosses_)) return false;
     t_ = hn::IfThenElse(crosses_, hn::Add(t_, wait_time), t_);
     const auto threshold = hn::IfThenElse(is_on, positive_, hn::Neg(negative_));
-    const auto growth_here = hn::Mul(rate, hn::Max(hn::Sub(growth_end_, t_), all(0)));
-    const auto level = hn::Add(reference_, hn::Mul(threshold, hn::Add(all(1), growth_here)));
+    auto growth = all(0);
+    if constexpr (thresholds_vary)
+      growth = hn::Mul(rate, hn::Max(hn::Sub(growth_end_, t_), all(0)));
+    const auto level = hn::Add(reference_, hn::Mul(threshold, hn::Add(all(1), growth)));
     reference_ = hn::IfThenElse(crosses_, level, reference_);
     const auto fires = hn::And(crosses_, hn::Ge(t_, ready_));
-    events.add(pixels_, fires, is_on, hn::Gt(growth_end_, t_), t_);
-    const auto prolonged = hn::Add(hn::Max(t_, growth_end_), all(adaptation.duration()));
-    growth_end_ = hn::IfThenElse(fires, prolonged, growth_end_);
-    ready_ = hn::IfThenElse(fires, hn::Add(t_, all(row.dynamics.gap)), ready_);
-    if (row.settings.threshold_jitter > 0) draw_thresholds(row, fires);
+    events.add(pixels_, fires, is_on, hn::Gt(growth, all(0)), t_);
+    ready_ = hn::IfThenElse(fires, hn::Add(t_, all(row.model->gap)), ready_);
+    if constexpr (thresholds_vary) {
+      const auto prolonged = hn::Add(hn::Max(t_, growth_end_), all(adaptation.duration()));
+      growth_end_ = hn::IfThenElse(fires, prolonged, growth_end_);
+      if (row.model->has_threshold_jitter()) draw_thresholds(row, fires);
+    }
     return true;
   }
 
@@ -342,11 +286,14 @@ class VaryingThresholds {
     const auto reference = hn::IfThenElse(crosses_, last_, reference_);
     pixels_.store(row, hn::Sub(reference, fall_), row.pixels.reference);
     pixels_.store_refractory_left(row, ready_);
-    if (row.dynamics.adaptation.is_on())
-      pixels_.store(row, hn::Add(all(row.start), growth_end_), row.pixels.growth_end);
-    if (row.settings.threshold_jitter > 0) {
-      pixels_.store(row, drawn_, positive_, row.pixels.positive);
-      pixels_.store(row, drawn_, negative_, row.pixels.negative);
+    if constexpr (thresholds_vary) {
+      if (row.model->adaptation.is_on())
+        pixels_.store(row, hn::Add(all(row.sub_interval->start), growth_end_),
+                      row.pixels.growth_end);
+      if (row.model->has_threshold_jitter()) {
+        pixels_.store(row, drawn_, positive_, row.pixels.positive);
+        pixels_.store(row, drawn_, negative_, row.pixels.negative);
+      }
     }
   }
 
@@ -355,8 +302,8 @@ class VaryingThresholds {
     const Bits bits;
     const auto numbers =
         hn::Add(hn::BitCast(bits, pixels_.x(row)), hn::Set(bits, row.pixels.first_number));
-    random_ = RandomSeries<Doubles>(row.random, numbers, Random::Purpose::event);
-    draw_ = hn::Set(bits, row.sub_interval.number * draws_per_sub_interval);
+    random_ = RandomSeries<Doubles>(row.model->random, numbers, Random::Purpose::event);
+    draw_ = hn::Set(bits, row.sub_interval->number * draws_per_sub_interval);
     drawn_ = hn::FirstN(Doubles(), 0);
   }
 
@@ -365,11 +312,11 @@ class VaryingThresholds {
     const auto [first, second] = random_.normals(draw_);
     const auto drawn = [&](Values normal, double mean) HWY_ATTR {
       const auto threshold =
-          hn::Add(all(mean), hn::Mul(all(row.settings.threshold_jitter), normal));
+          hn::Add(all(mean), hn::Mul(all(row.model->settings.threshold_jitter), normal));
       return hn::Max(threshold, all(min_threshold_of(mean)));
     };
-    positive_ = hn::IfThenElse(fire, drawn(first, row.dynamics.thresholds.positive), positive_);
-    negative_ = hn::IfThenElse(fire, drawn(second, row.dynamics.thresholds.negative), negative_);
+    positive_ = hn::IfThenElse(fire, drawn(first, row.model->mean_thresholds.positive), positive_);
+    negative_ = hn::IfThenElse(fire, drawn(second, row.model->mean_thresholds.negative), negative_);
     drawn_ = hn::Or(drawn_, fire);
     const Bits bits;
     draw_ = hn::IfThenElse(hn::RebindMask(bits, fire), hn::Add(draw_, hn::Set(bits, 1)), draw_);
@@ -394,7 +341,7 @@ class VaryingThresholds {
 
 /// Finds a crossing of each vector in turn, and then the next ones.
 template <class Signals>
-void solve_in_turns(const RowToSolve& row) {
+void solve_in_turns(RowToSolve& row) {
   Events events(row);
   Signals signals[max_vectors];
   std::size_t crossing[max_vectors];
@@ -420,12 +367,11 @@ void solve_in_turns(const RowToSolve& row) {
   }
 }
 
-void solve(const RowToSolve& row) {
-  solve_in_turns<Lines>(row);
-}
-
-void solve_varying(const RowToSolve& row) {
-  solve_in_turns<VaryingThresholds>(row);
+void solve(RowToSolve& row) {
+  if (row.model->adaptation.is_on() || row.model->has_threshold_jitter())
+    solve_in_turns<Lines<true>>(row);
+  else
+    solve_in_turns<Lines<false>>(row);
 }
 
 }  // namespace
@@ -436,14 +382,10 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 
 HWY_EXPORT(solve);
-HWY_EXPORT(solve_varying);
 
-void solve_lines(const RowToSolve& row) {
+void solve_lines(RowToSolve& row) {
+  if (row.model->has_noise()) solve_noisy_pixels(row);
   HWY_DYNAMIC_DISPATCH(solve)(row);
-}
-
-void solve_varying_thresholds(const RowToSolve& row) {
-  HWY_DYNAMIC_DISPATCH(solve_varying)(row);
 }
 
 }  // namespace eventcamera

@@ -2,10 +2,12 @@
 #include "src/dvs/moving_light.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdlib>
 
 #include "src/core/max_side.hpp"
+#include "src/flow/flow_range.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/moving_light.cpp"
@@ -354,6 +356,36 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 
 HWY_EXPORT(move_light_8);
+
+namespace {
+
+/// Steps of a tile in which pixels move by up to `max_motion` pixels. Between steps the luma is a
+/// straight line; where it bends, events err by a time in proportion to the motion, and to the
+/// inverse square of the steps. So from `fine` pixels on, steps grow with the square root of the
+/// motion, and the error stays the same.
+int steps_for(float max_motion, int max_steps) {
+  constexpr float fine = 4;
+  const float steps = max_motion <= fine ? max_motion : std::sqrt(fine * max_motion);
+  return std::clamp(static_cast<int>(std::ceil(steps)), 1, max_steps);
+}
+
+}  // namespace
+
+void MotionTiles::measure(const ImageView<Flow>& flow, int max_steps, ThreadPool& threads) {
+  const int columns = (flow.width + width - 1) / width;
+  const int rows = (flow.height + height - 1) / height;
+  if (steps_.width() != columns || steps_.height() != rows)
+    steps_ = Image<std::int32_t>(columns, rows);
+  threads.for_each(rows, [&](int row, int) {
+    for (int column = 0; column < columns; ++column) {
+      const Box box{column * width, row * height, std::min((column + 1) * width, flow.width),
+                    std::min((row + 1) * height, flow.height)};
+      const auto max_motion =
+          std::min(flow_range(flow, box).max_length(), static_cast<float>(max_side));
+      steps_.at(column, row) = steps_for(max_motion, max_steps);
+    }
+  });
+}
 
 void move_light(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, const Run& run,
                 std::uint16_t* out, std::ptrdiff_t stride) {

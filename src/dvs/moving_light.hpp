@@ -4,11 +4,33 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "src/dvs/run.hpp"
+#include "src/core/image.hpp"
+#include "src/core/thread_pool.hpp"
+#include "src/dvs/pixel_array.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "src/simulate/warp.hpp"
 
 namespace eventcamera {
+
+/// Tiles of a frame, each of which moves in steps of its own, so that one long vector does not
+/// divide the time of a whole frame.
+class MotionTiles {
+ public:
+  /// Pixels of a tile; at the right and lower border it may have fewer.
+  static constexpr int width = 32;
+  static constexpr int height = 8;
+  static_assert(rows_per_band % height == 0);
+
+  /// Finds the number of steps of each tile, at most `max_steps`.
+  void measure(const ImageView<Flow>& flow, int max_steps, ThreadPool& threads);
+
+  int columns() const { return steps_.width(); }
+  int rows() const { return steps_.height(); }
+  int steps(int column, int row) const { return steps_.at(column, row); }
+
+ private:
+  Image<std::int32_t> steps_;
+};
 
 /// Writes the luma of a run of pixels that move along the flow: a row for each blended frame j = 1
 /// ... steps - 1, at out + (j - 1) * stride. 8-bit frames (which must be views of Images) are

@@ -9,60 +9,21 @@
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
 #include "src/core/label.hpp"
+#include "src/core/thread_pool.hpp"
 #include "src/dvs/dvs_settings.hpp"
-#include "src/dvs/random.hpp"
+#include "src/dvs/light_response.hpp"
+#include "src/dvs/pixel_model.hpp"
 #include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
-/// The properties of one pixel.
-struct PixelTraits {
-  double positive_threshold;  ///< infinite if the pixel is dead
-  double negative_threshold;
-  double leak;  ///< fall of the reference per microsecond
-};
+/// Pixels [first, last) of a row.
+struct Run {
+  int y;
+  int first;
+  int last;
 
-struct ContrastThresholds {
-  double positive;
-  double negative;
-};
-
-/// A threshold of 0 would fire forever.
-inline constexpr double min_threshold = 1e-3;
-
-/// Minimum threshold of pixels that vary around a mean.
-inline double min_threshold_of(double mean) {
-  return std::max(mean / 10, min_threshold);
-}
-
-/// Thresholds without mismatch.
-inline ContrastThresholds mean_thresholds(const DvsSettings& settings) {
-  return {std::max(settings.positive_threshold, min_threshold),
-          std::max(settings.negative_threshold, min_threshold)};
-}
-
-/// Differences between pixels, determined by the seed.
-class Mismatch {
- public:
-  Mismatch(const DvsSettings& settings, const Random& random)
-      : settings_(settings), random_(random) {}
-
-  PixelTraits of(std::uint64_t pixel) const;
-  bool is_hot(std::uint64_t pixel) const;
-
-  /// Thresholds after event `counter`, if they vary between events.
-  ContrastThresholds next_thresholds(std::uint64_t pixel, std::uint64_t counter) const;
-
-  /// Fall of the reference before the first frame, if noise of this rate (1/us) resets it and the
-  /// camera has been on for a long time.
-  double leaked(std::uint64_t pixel, const PixelTraits& traits, double noise_rate) const;
-
- private:
-  double defect_of(std::uint64_t pixel) const;
-  ContrastThresholds fixed_thresholds(std::uint64_t pixel) const;
-
-  const DvsSettings& settings_;
-  const Random& random_;
+  int width() const { return last - first; }
 };
 
 /// Traits and state of a row of pixels.
@@ -80,28 +41,41 @@ struct PixelRow {
   std::uint32_t* noise_budget;  ///< expected shot noise until the next noise event, 1/noise_unit
   double* growth_end;  ///< end of the thresholds' growth, microseconds since the first frame
   Cause* last_cause;   ///< of the last event; null if events have no labels
+
+  std::uint64_t number_of(int x) const { return first_number + static_cast<std::uint64_t>(x); }
 };
 
+/// The pixels, and the model that they follow.
 class PixelArray {
  public:
   PixelArray(int width, int height);
 
   int width() const { return target_.width(); }
+  int height() const { return target_.height(); }
   PixelRow row(int y);
+  const PixelModel& model() const { return model_; }
 
   /// Starts or stops storing the cause of each pixel's last event, for labels.
-  void keep_causes(bool are_kept);
-  bool keeps_causes() const { return last_cause_.has_value(); }
+  void set_labels(bool has_labels);
+  bool has_labels() const { return last_cause_.has_value(); }
 
-  /// Draws the thresholds and leak of a row of pixels.
-  void draw_traits(int y, const DvsSettings& settings, const Random& random);
-  /// The same for settings of the same seed that change while events draw thresholds anew: these
-  /// move by as much as those that were drawn first.
-  void change_traits(int y, const DvsSettings& from, const DvsSettings& to, const Random& random);
+  /// Starts over with these settings, all pixels ready to fire; settle() must follow.
+  void start(const DvsSettings& settings, ThreadPool& threads);
 
-  /// Resets a row as if its target had been constant for a long time, and draws its initial noise
-  /// budgets. Refractory periods go on.
-  void settle(int y, const DvsSettings& settings, const Random& random);
+  /// Changes settings mid-stream; pixels keep their state. Thresholds that events have drawn move
+  /// by as much as those that were drawn first.
+  void change(const DvsSettings& settings, ThreadPool& threads);
+
+  /// Resets the pixels as if this frame had been shown for a long time, and draws their initial
+  /// noise budgets. Refractory periods go on.
+  template <class Pixel>
+  void settle(const Image<Pixel>& frame, const LightResponse& response, ThreadPool& threads) {
+    for_each_row(threads, height(), [&](int y) {
+      const PixelRow pixels = row(y);
+      for (int x = 0; x < width(); ++x) pixels.target[x] = response(frame.at(x, y));
+      settle(pixels);
+    });
+  }
 
   /// Writes all pixels to a StateWriter, or reads them from a StateReader; without the leak, which
   /// is drawn again.
@@ -109,6 +83,12 @@ class PixelArray {
   void serialize(Archive& archive);
 
  private:
+  void draw_traits(const PixelRow& pixels);
+  void move_traits(const PixelRow& pixels, const PixelModel& last);
+  void settle(const PixelRow& pixels);
+
+  PixelModel model_{DvsSettings{}};
+  bool has_traits_ = false;
   Image<float> target_;
   Image<float> signal_;
   Image<float> reference_;
@@ -128,9 +108,9 @@ void PixelArray::serialize(Archive& archive) {
   constexpr auto is_threshold = [](float threshold) {
     return std::isinf(threshold) ? threshold > 0 : is_within(1e-4F, max_level)(threshold);
   };
-  std::uint8_t has_causes = keeps_causes() ? 1 : 0;
+  std::uint8_t has_causes = last_cause_ ? 1 : 0;
   archive.value(has_causes, is_within<std::uint8_t>(0, 1));
-  if constexpr (Archive::is_reading) keep_causes(has_causes == 1);
+  if constexpr (Archive::is_reading) set_labels(has_causes == 1);
   archive.image(target_, is_level);
   archive.image(signal_, is_level);
   archive.image(reference_, is_level);

@@ -21,17 +21,15 @@ struct PixelLight {
 /// One pixel in one sub-interval. Times are microseconds after its start.
 class Pixel {
  public:
-  Pixel(const RowToSolve& row, int x, const PixelLight& light)
+  Pixel(RowToSolve& row, int x, const PixelLight& light)
       : row_(row),
-        settings_(row.settings),
-        dynamics_(row.dynamics),
-        adaptation_(row.dynamics.adaptation),
-        start_(row.start),
-        random_(row.random),
-        sub_interval_(row.sub_interval),
+        model_(*row.model),
+        adaptation_(row.model->adaptation),
+        sub_interval_(*row.sub_interval),
         pixels_(row.pixels),
+        start_(sub_interval_.start),
         x_(x),
-        number_(pixels_.first_number + static_cast<std::uint64_t>(x)),
+        number_(pixels_.number_of(x)),
         draw_(sub_interval_.number * draws_per_sub_interval),
         above_leak_(light.signal),
         reference_(pixels_.reference[x]),
@@ -39,7 +37,7 @@ class Pixel {
         negative_(pixels_.negative[x]),
         leak_(pixels_.leak[x] + sub_interval_.rise / sub_interval_.duration),
         ready_(pixels_.refractory_left[x]),
-        holds_(settings_.refractory_reset == RefractoryReset::signal),
+        holds_(model_.holds_reference()),
         growth_end_(adaptation_.is_on() ? pixels_.growth_end[x] : 0),
         noise_{light.expected_noise, static_cast<double>(pixels_.noise_budget[x])} {
     // A falling reference is equivalent to a rising signal.
@@ -72,7 +70,7 @@ class Pixel {
       }
     }
     if (happened == max_events) reference_ = end_.value;
-    noise_.skip(random_, number_, draw_);
+    noise_.skip(model_.random, number_, draw_);
     store();
   }
 
@@ -81,10 +79,10 @@ class Pixel {
 
   /// `now` is at `t` or later.
   void make_noise(TrajectoryPoint now, double t) {
-    noise_.draw(random_, number_, draw_++);
+    noise_.draw(model_.random, number_, draw_++);
     if (t < ready_) return;
     reference_ = now.value;
-    const bool is_on = random_.coin(number_, Random::Purpose::event, draw_++);
+    const bool is_on = model_.random.coin(number_, Random::Purpose::event, draw_++);
     fire(t, is_on ? Polarity::on : Polarity::off,
          row_.has_labels() ? Cause::shot_noise : Cause::unknown);
   }
@@ -144,15 +142,15 @@ class Pixel {
   /// Emits an event and starts the refractory period.
   void fire(double crossed, Polarity polarity, Cause cause) {
     growth_end_ = adaptation_.prolonged(start_ + crossed, growth_end_);
-    double t = crossed + dynamics_.latency;
-    if (dynamics_.latency_jitter > 0) {
-      const double jitter = random_.normals(number_, Random::Purpose::event, draw_++).first;
-      t = std::max(crossed, t + dynamics_.latency_jitter * jitter);
+    double t = crossed + model_.latency;
+    if (model_.latency_jitter > 0) {
+      const double jitter = model_.random.normals(number_, Random::Purpose::event, draw_++).first;
+      t = std::max(crossed, t + model_.latency_jitter * jitter);
     }
     if (!std::isinf(positive_)) row_.add_event(x_, t, polarity, cause);
-    ready_ = t + dynamics_.gap;
-    if (settings_.threshold_jitter > 0 && !std::isinf(positive_)) {
-      const auto next = Mismatch(settings_, random_).next_thresholds(number_, draw_++);
+    ready_ = t + model_.gap;
+    if (model_.has_threshold_jitter() && !std::isinf(positive_)) {
+      const auto next = model_.next_thresholds(number_, draw_++);
       positive_ = next.positive;
       negative_ = next.negative;
     }
@@ -168,14 +166,12 @@ class Pixel {
     if (adaptation_.is_on()) pixels_.growth_end[x_] = growth_end_;
   }
 
-  const RowToSolve& row_;
-  const DvsSettings& settings_;
-  const PixelDynamics& dynamics_;
+  RowToSolve& row_;
+  const PixelModel& model_;
   const Adaptation& adaptation_;
-  double start_;  ///< of the sub-interval, microseconds since the first frame
-  const Random& random_;
   const SubInterval& sub_interval_;
   const PixelRow& pixels_;
+  double start_;  ///< of the sub-interval, microseconds since the first frame
   int x_;
   std::uint64_t number_;
   std::uint64_t draw_;
@@ -193,7 +189,7 @@ class Pixel {
 };
 
 /// Solves candidate i.
-void solve_pixel(const RowToSolve& row, std::size_t i) {
+void solve_pixel(RowToSolve& row, std::size_t i) {
   const int x = row.candidates.x[i];
   const auto shade = static_cast<std::size_t>(row.candidates.shade[i]);
   const auto value = [&](Candidates::Column column) -> double {
@@ -201,28 +197,30 @@ void solve_pixel(const RowToSolve& row, std::size_t i) {
   };
   const double last_target = value(Candidates::last_target);
   const double target = value(Candidates::target);
-  const double duration = row.sub_interval.duration;
-  const bool has_bandwidth = row.settings.cutoff_frequency > 0;
-  const auto signal = has_bandwidth
-                          ? Trajectory::low_pass(value(Candidates::last_signal), last_target,
-                                                 target, duration, row.tables.bandwidth[shade])
-                          : Trajectory::line(last_target, target, duration);
+  const double duration = row.sub_interval->duration;
+  const bool has_bandwidth = row.model->has_bandwidth();
+  const auto signal =
+      has_bandwidth ? Trajectory::low_pass(value(Candidates::last_signal), last_target, target,
+                                           duration, row.sub_interval->tables->bandwidth[shade])
+                    : Trajectory::line(last_target, target, duration);
   const double last_signal = has_bandwidth ? value(Candidates::signal) : target;
-  Pixel(row, x, {signal, last_signal, row.tables.expected_noise[shade]}).solve();
+  Pixel(row, x, {signal, last_signal, row.sub_interval->tables->expected_noise[shade]}).solve();
 }
 
 }  // namespace
 
-void solve_pixels(const RowToSolve& row) {
+void solve_pixels(RowToSolve& row) {
   for (std::size_t i = 0; i < row.candidates.count; ++i) solve_pixel(row, i);
 }
 
-void solve_noisy_pixels(const RowToSolve& row, Candidates& candidates) {
+void solve_noisy_pixels(RowToSolve& row) {
+  auto& candidates = row.candidates;
   for (std::size_t i = 0; i < candidates.count;) {
     auto& budget = row.pixels.noise_budget[candidates.x[i]];
     const auto shade = static_cast<std::size_t>(candidates.shade[i]);
-    const ShotNoise noise{row.tables.expected_noise[shade], static_cast<double>(budget)};
-    if (noise.next(row.sub_interval.duration) == never) {
+    const ShotNoise noise{row.sub_interval->tables->expected_noise[shade],
+                          static_cast<double>(budget)};
+    if (noise.next(row.sub_interval->duration) == never) {
       budget = noise.left();
       ++i;
     } else {
@@ -230,20 +228,6 @@ void solve_noisy_pixels(const RowToSolve& row, Candidates& candidates) {
       candidates.remove(i);
     }
   }
-}
-
-Solver solver_for(const DvsSettings& settings) {
-  const bool has_lines = settings.cutoff_frequency == 0;
-  const bool has_side_effects = settings.pixel_latency > 0 || settings.pixel_latency_jitter > 0 ||
-                                settings.refractory_reset == RefractoryReset::signal;
-  const bool has_jitter = settings.threshold_jitter > 0;
-  if (settings.adaptation > 0 || has_jitter) {
-    const bool has_many_means = has_jitter && settings.threshold_sigma > 0;
-    const bool is_fast = has_lines && !has_side_effects && !has_many_means;
-    return is_fast ? Solver::varying_thresholds : Solver::pixels;
-  }
-  const bool is_simple = has_lines && !has_side_effects && settings.shot_noise_rate == 0;
-  return is_simple ? Solver::lines : Solver::row;
 }
 
 }  // namespace eventcamera

@@ -2,13 +2,15 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
-#include "src/dvs/adaptation.hpp"
 #include "src/dvs/interval_events.hpp"
 #include "src/dvs/pixel_array.hpp"
+#include "src/dvs/pixel_model.hpp"
 #include "src/dvs/row_filter.hpp"
-#include "src/dvs/shade_tables.hpp"
+#include "src/dvs/shot_noise.hpp"
 #include "src/dvs/sub_intervals.hpp"
 
 namespace eventcamera {
@@ -18,47 +20,63 @@ namespace eventcamera {
 /// common thresholds.
 inline constexpr int max_events = 512;
 
-/// Minimum time between two events of a pixel, microseconds: the resolution of event times.
-inline constexpr double min_gap = 1;
+/// Pixels that solve_row() has not finished: a column per variable, a row per pixel.
+class UnsolvedPixels {
+ public:
+  /// Times are microseconds after the start of the sub-interval. Values are multiplied by `sign`,
+  /// so that the slope of the trajectory never decreases: it can only turn upwards, and the level
+  /// above the reference is the far one.
+  enum Column : std::size_t {
+    index,  ///< in Candidates
+    sign,
+    t,      ///< of the last event
+    value,  ///< of the signal at t
+    end,    ///< value at the end of the sub-interval
+    offset,
+    slope,
+    bandwidth,
+    reference,
+    to_far,   ///< from the reference to the far level
+    to_near,  ///< from the near level to the reference
+    ready,    ///< earliest time of the next event
+    next_noise,
+    columns
+  };
 
-/// How pixels with these settings behave over time, in microseconds.
-struct PixelDynamics {
-  explicit PixelDynamics(const DvsSettings& settings)
-      : adaptation(settings),
-        thresholds(mean_thresholds(settings)),
-        gap(std::max(in_microseconds(settings.refractory_period), min_gap)),
-        latency(in_microseconds(settings.pixel_latency)),
-        latency_jitter(in_microseconds(settings.pixel_latency_jitter)) {}
+  std::vector<ShotNoise> noise;      ///< by index
+  std::vector<std::uint64_t> draws;  ///< by index: the counter of the next random number
 
-  Adaptation adaptation;
-  ContrastThresholds thresholds;  ///< means
-  double gap;                     ///< from an event until the pixel is ready for the next one
-  double latency;
-  double latency_jitter;
+  void resize(std::size_t size) {
+    size_ = size;
+    if (noise.size() >= size) return;
+    noise.resize(size);
+    draws.resize(size);
+    memory_.resize(columns * size);
+  }
+  double* column(Column column) { return memory_.data() + column * size_; }
+
+ private:
+  std::size_t size_ = 0;
+  std::vector<double> memory_;
 };
 
-/// Candidates of a row to be advanced through a sub-interval.
+/// Candidates of a row, and what they are advanced through a sub-interval with. One per thread: it
+/// keeps its memory; model and events are those of a band.
 struct RowToSolve {
-  const DvsSettings& settings;
-  const PixelDynamics& dynamics;
-  const Random& random;
-  const SubInterval& sub_interval;
-  const ShadeTables& tables;
-  const PixelRow& pixels;
-  const Candidates& candidates;
-  const IntervalEvents::Band& events;
-  double start;  ///< of the sub-interval, microseconds since the first frame
-  /// By how much more the start of the next interval is rounded down to microseconds than that of
-  /// this one, if the sub-interval is the last; else 0.
-  double next_rounding;
+  const PixelModel* model = nullptr;
+  IntervalEvents::Band events;
+  PixelRow pixels;
+  const SubInterval* sub_interval = nullptr;
+  Candidates candidates;
+  UnsolvedPixels unsolved;  ///< of solve_row()
 
   bool has_labels() const { return pixels.last_cause != nullptr; }
 
   /// Rest of the refractory period at the end of the sub-interval. A rest of less than min_gap
   /// comes after an event in the last microsecond, which must not be that of the next one.
   double refractory_left(double ready) const {
-    const double left = std::max(0.0, ready - sub_interval.duration);
-    return left > 0 && left < min_gap ? left + next_rounding : left;
+    const double left = std::max(0.0, ready - sub_interval->duration);
+    return left > 0 && left < min_gap ? left + sub_interval->next_rounding : left;
   }
 
   /// Cause of a crossing by pixel x, whose threshold is falling at `fall`, in light to which its
@@ -66,34 +84,37 @@ struct RowToSolve {
   Cause cause_of_crossing(int x, Polarity polarity, double light, double fall) const {
     const double sign = polarity == Polarity::on ? 1 : -1;
     const double leak = sign * pixels.leak[x];
-    const double pulse = sign * (sub_interval.rise / sub_interval.duration);
+    const double pulse = sign * (sub_interval->rise / sub_interval->duration);
     const double fastest = std::max({0.0, sign * light, leak, pulse, fall});
     if (fastest <= sign * light || fastest == 0) return Cause::light;
     if (fastest == pulse) return Cause::exposure_pulse;
     if (fastest == fall) return pixels.last_cause[x];
-    const auto number = pixels.first_number + static_cast<std::uint64_t>(x);
-    return Mismatch(settings, random).is_hot(number) ? Cause::hot_pixel : Cause::leak;
+    return model->is_hot(pixels.number_of(x)) ? Cause::hot_pixel : Cause::leak;
   }
 
   /// Adds an event of pixel x, `t` microseconds after the start of the sub-interval. The cause is
   /// unknown unless events have labels.
-  void add_event(int x, double t, Polarity polarity, Cause cause) const {
+  void add_event(int x, double t, Polarity polarity, Cause cause) {
     if (has_labels()) pixels.last_cause[x] = cause;
-    events.add(sub_interval.begin + t, x, pixels.y, polarity, cause);
+    events.add(sub_interval->begin + t, with_cause(Event::at(x, pixels.y, 0, polarity), cause));
   }
 };
 
 /// Advances reference, refractory_left and noise_budget of a row's candidates to the end of the
 /// sub-interval, one pixel at a time, with exact threshold crossings, leak, shot noise, refractory
 /// period and latency.
-void solve_pixels(const RowToSolve& row);
+void solve_pixels(RowToSolve& row);
 
 /// Solves the candidates in which shot noise fires, one at a time, and removes them. The noise of
 /// the others is done afterwards.
-void solve_noisy_pixels(const RowToSolve& row, Candidates& candidates);
+void solve_noisy_pixels(RowToSolve& row);
 
-/// Solvers: solve_pixels(), or a faster one for settings that allow it.
-enum class Solver { pixels, lines, varying_thresholds, row };
-Solver solver_for(const DvsSettings& settings);
+/// Like solve_pixels(), for PixelModels that Solver::lines is for: signals are straight lines, and
+/// events are crossings without latency, after which the reference is the level. Many pixels at a
+/// time.
+void solve_lines(RowToSolve& row);
+
+/// Like solve_pixels(), for thresholds that do not vary. Many pixels at a time.
+void solve_row(RowToSolve& row);
 
 }  // namespace eventcamera

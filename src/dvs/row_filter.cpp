@@ -26,26 +26,27 @@ hn::Vec<Words> load_luma(const Pixel* luma) {
 }
 
 template <class Pixel, bool has_bandwidth>
-void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
-            const Run& run, Candidates& candidates) {
-  const ShadeTables& tables = row_filter.tables;
-  const bool is_partial = static_cast<float>(row_filter.sub_interval.share) < 1;
+void filter(const PixelModel& model, const LightResponse& response, const SubInterval& sub_interval,
+            const RunLuma& luma, const PixelRow& pixels, const Run& run, Candidates& candidates) {
+  const ShadeTables& tables = *sub_interval.tables;
+  const bool has_noise = model.has_noise();
+  const bool keeps_saturated = response.gain() != 1;
+  const bool is_partial = static_cast<float>(sub_interval.share) < 1;
   const Floats floats;
   const Words words;
   const Counts counts;
   const int lanes = static_cast<int>(hn::Lanes(floats));
   const auto zero = hn::Zero(floats);
-  const float* responses = row_filter.responses.data();
+  const float* responses = response.table().data();
   const auto* lumas = static_cast<const Pixel*>(luma.target);
   const auto* shades = static_cast<const Pixel*>(luma.shade);
-  const auto white = hn::Set(words, static_cast<std::int32_t>(row_filter.responses.size()) - 1);
-  const auto below_saturated =
-      hn::Set(words, saturated_luma(static_cast<int>(row_filter.responses.size()) - 1) - 1);
-  const bool needs_shade = has_bandwidth || row_filter.has_noise;
-  const int shade_shift = row_filter.luma_bits - 8;
-  const auto duration = hn::Set(floats, static_cast<float>(row_filter.sub_interval.duration));
-  const auto share = hn::Set(floats, static_cast<float>(row_filter.sub_interval.share));
-  const auto rise = hn::Set(floats, static_cast<float>(row_filter.sub_interval.rise));
+  const auto white = hn::Set(words, response.white());
+  const auto below_saturated = hn::Set(words, saturated_luma(response.white()) - 1);
+  const bool needs_shade = has_bandwidth || has_noise;
+  const int shade_shift = response.bits() - 8;
+  const auto duration = hn::Set(floats, static_cast<float>(sub_interval.duration));
+  const auto share = hn::Set(floats, static_cast<float>(sub_interval.share));
+  const auto rise = hn::Set(floats, static_cast<float>(sub_interval.rise));
   float* targets = pixels.target;
   float* references = pixels.reference;
   const float* positives = pixels.positive;
@@ -64,7 +65,7 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
                                  shade_shift);
     auto target = hn::GatherIndex(floats, responses, value);
     const auto last_target = hn::LoadU(floats, targets + x);
-    if (row_filter.keeps_saturated) {
+    if (keeps_saturated) {
       const auto is_saturated = hn::RebindMask(floats, hn::Gt(value, below_saturated));
       target = hn::IfThenElse(is_saturated, hn::Max(target, last_target), target);
     }
@@ -105,7 +106,7 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
     auto happens = hn::Or(hn::Ge(max, positive), hn::Le(min, hn::Neg(negative)));
     happens = hn::Or(happens, hn::Gt(refractory_left, zero));
     auto noise_budget = hn::Zero(counts);
-    if (row_filter.has_noise) {
+    if (has_noise) {
       const auto noise = hn::GatherIndex(counts, tables.noise.data(), shade);
       const auto before = hn::LoadU(counts, noise_budgets + x);
       happens = hn::Or(happens, hn::RebindMask(floats, hn::Not(hn::Gt(before, noise))));
@@ -117,12 +118,12 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
     if constexpr (has_bandwidth) hn::StoreU(signal, floats, pixels.signal + x);
     if (HWY_LIKELY(hn::AllFalse(floats, happens))) {
       hn::StoreU(next_reference, floats, references + x);
-      if (row_filter.has_noise) hn::StoreU(noise_budget, counts, noise_budgets + x);
+      if (has_noise) hn::StoreU(noise_budget, counts, noise_budgets + x);
       continue;
     }
     const auto others = hn::Not(happens);
     hn::BlendedStore(next_reference, others, floats, references + x);
-    if (row_filter.has_noise)
+    if (has_noise)
       hn::BlendedStore(noise_budget, hn::RebindMask(counts, others), counts, noise_budgets + x);
     const FirstLanes<Floats> first_lanes(happens);
     const auto keep_integers = [&](std::int32_t* column, hn::Vec<Words> values) HWY_ATTR {
@@ -150,82 +151,19 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
   candidates.count = found;
 }
 
-void filter_luma(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
+void filter_luma(const PixelModel& model, const LightResponse& response,
+                 const SubInterval& sub_interval, const RunLuma& luma, const PixelRow& pixels,
                  const Run& run, Candidates& candidates) {
   const auto filter_as = [&]<class Pixel>(Pixel) {
-    if (row_filter.has_bandwidth)
-      filter<Pixel, true>(row_filter, luma, pixels, run, candidates);
+    if (model.has_bandwidth())
+      filter<Pixel, true>(model, response, sub_interval, luma, pixels, run, candidates);
     else
-      filter<Pixel, false>(row_filter, luma, pixels, run, candidates);
+      filter<Pixel, false>(model, response, sub_interval, luma, pixels, run, candidates);
   };
-  if (row_filter.luma_bits == 8)
+  if (response.bits() == 8)
     filter_as(std::uint8_t());
   else
     filter_as(std::uint16_t());
-}
-
-template <class Pixel>
-bool try_skip(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
-              const PixelRow& pixels, const Run& run) {
-  const Floats floats;
-  const Words words;
-  const Counts counts;
-  const int lanes = static_cast<int>(hn::Lanes(floats));
-  const auto duration = hn::Set(floats, static_cast<float>(row_filter.sub_interval.duration));
-  const auto rise = hn::Set(floats, static_cast<float>(row_filter.sub_interval.rise));
-  const auto highest = hn::Set(floats, range.brightest);
-  const auto lowest = hn::Set(floats, range.darkest);
-  const auto margin = hn::Set(floats, rounding);
-  const auto max_rise = hn::Set(floats, range.max_rise);
-  const auto max_fall = hn::Set(floats, range.max_fall);
-  const auto white = hn::Set(words, static_cast<std::int32_t>(row_filter.responses.size()) - 1);
-  const auto noise_at = [&](int x) {
-    const auto* shades = static_cast<const Pixel*>(luma.shade) + (x - run.first);
-    const auto shade =
-        hn::ShiftRightSame(hn::Min(load_luma(shades), white), row_filter.luma_bits - 8);
-    return hn::GatherIndex(counts, row_filter.tables.noise.data(), shade);
-  };
-
-  auto may_fire = hn::FirstN(floats, 0);
-  for (int x = run.first; x < run.last; x += lanes) {
-    const auto last_target = hn::LoadU(floats, pixels.target + x);
-    const auto reference = hn::LoadU(floats, pixels.reference + x);
-    const auto leaked = hn::Mul(hn::LoadU(floats, pixels.leak + x), duration);
-    const auto top = hn::Add(hn::Add(hn::Max(last_target, highest), leaked), max_rise);
-    const auto bottom = hn::Sub(hn::Min(last_target, lowest), max_fall);
-    const auto fires = hn::Or(
-        hn::Ge(hn::Add(hn::Sub(top, reference), margin), hn::LoadU(floats, pixels.positive + x)),
-        hn::Ge(hn::Add(hn::Sub(reference, bottom), margin),
-               hn::LoadU(floats, pixels.negative + x)));
-    const auto is_refractory =
-        hn::Gt(hn::LoadU(floats, pixels.refractory_left + x), hn::Zero(floats));
-    may_fire = hn::Or(may_fire, hn::Or(fires, is_refractory));
-    if (row_filter.has_noise) {
-      const auto budget = hn::LoadU(counts, pixels.noise_budget + x);
-      may_fire = hn::Or(may_fire, hn::RebindMask(floats, hn::Not(hn::Gt(budget, noise_at(x)))));
-    }
-  }
-  if (!hn::AllFalse(floats, may_fire)) return false;
-
-  for (int x = run.first; x < run.last; x += lanes) {
-    const auto value =
-        hn::Min(load_luma(static_cast<const Pixel*>(luma.target) + (x - run.first)), white);
-    const auto target = hn::GatherIndex(floats, row_filter.responses.data(), value);
-    const auto leaked = hn::Add(hn::Mul(hn::LoadU(floats, pixels.leak + x), duration), rise);
-    hn::StoreU(target, floats, pixels.target + x);
-    hn::StoreU(hn::Sub(hn::LoadU(floats, pixels.reference + x), leaked), floats,
-               pixels.reference + x);
-    if (row_filter.has_noise)
-      hn::StoreU(hn::Sub(hn::LoadU(counts, pixels.noise_budget + x), noise_at(x)), counts,
-                 pixels.noise_budget + x);
-  }
-  return true;
-}
-
-bool try_skip_luma(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
-                   const PixelRow& pixels, const Run& run) {
-  return row_filter.luma_bits == 8 ? try_skip<std::uint8_t>(row_filter, range, luma, pixels, run)
-                                   : try_skip<std::uint16_t>(row_filter, range, luma, pixels, run);
 }
 
 }  // namespace
@@ -236,16 +174,12 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 
 HWY_EXPORT(filter_luma);
-HWY_EXPORT(try_skip_luma);
 
-void filter_run(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
+void filter_run(const PixelModel& model, const LightResponse& response,
+                const SubInterval& sub_interval, const RunLuma& luma, const PixelRow& pixels,
                 const Run& run, Candidates& candidates) {
-  HWY_DYNAMIC_DISPATCH(filter_luma)(row_filter, luma, pixels, run, candidates);
-}
-
-bool try_skip_run(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
-                  const PixelRow& pixels, const Run& run) {
-  return HWY_DYNAMIC_DISPATCH(try_skip_luma)(row_filter, range, luma, pixels, run);
+  HWY_DYNAMIC_DISPATCH(filter_luma)
+  (model, response, sub_interval, luma, pixels, run, candidates);
 }
 
 }  // namespace eventcamera

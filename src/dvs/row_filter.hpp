@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "src/dvs/light_response.hpp"
 #include "src/dvs/pixel_array.hpp"
-#include "src/dvs/run.hpp"
-#include "src/dvs/shade_tables.hpp"
+#include "src/dvs/pixel_model.hpp"
 #include "src/dvs/sub_intervals.hpp"
 
 namespace eventcamera {
@@ -60,17 +60,6 @@ class Candidates {
   std::vector<float> memory_;
 };
 
-/// Parameters of filter_run(), shared by all pixels in a sub-interval.
-struct RowFilter {
-  const SubInterval& sub_interval;
-  const ShadeTables& tables;
-  const std::vector<float>& responses;  ///< by luma value
-  int luma_bits;
-  bool has_bandwidth;
-  bool has_noise;
-  bool keeps_saturated;  ///< saturated pixels keep a higher target
-};
-
 /// Luma of a run of pixels, from the first of them on: std::uint8_t if it has 8 bits, std::uint16_t
 /// otherwise.
 struct RunLuma {
@@ -82,21 +71,8 @@ struct RunLuma {
 /// pixels; references and noise budgets of those that cannot fire, usually most of them. The others
 /// become `candidates`. The decision has a margin for float rounding, and is the same on every
 /// processor. A run that does not end with the row must be a multiple of max_lanes pixels wide.
-void filter_run(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
+void filter_run(const PixelModel& model, const LightResponse& response,
+                const SubInterval& sub_interval, const RunLuma& luma, const PixelRow& pixels,
                 const Run& run, Candidates& candidates);
-
-/// Bounds of the light during an interval, in units of the response.
-struct LightRange {
-  float darkest;
-  float brightest;
-  float max_rise;  ///< of all signals, beyond the light
-  float max_fall;
-};
-
-/// Advances a run of pixels without bandwidth through a whole interval, for which `row_filter` and
-/// `luma` are, if none of them can fire in it, whatever the light does within its range. Otherwise
-/// returns false, and leaves them as they are.
-bool try_skip_run(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
-                  const PixelRow& pixels, const Run& run);
 
 }  // namespace eventcamera

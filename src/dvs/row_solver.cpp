@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/dvs/row_solver.hpp"
+#include "src/dvs/pixel_solver.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -123,12 +123,12 @@ struct Trajectories {
 
 class RowSolver {
  public:
-  RowSolver(const RowToSolve& row, UnsolvedPixels& unsolved)
+  explicit RowSolver(RowToSolve& row)
       : row_(row),
-        unsolved_(unsolved),
-        duration_(row.sub_interval.duration),
-        has_bandwidth_(row.settings.cutoff_frequency > 0),
-        holds_(row.settings.refractory_reset == RefractoryReset::signal) {}
+        unsolved_(row.unsolved),
+        duration_(row.sub_interval->duration),
+        has_bandwidth_(row.model->has_bandwidth()),
+        holds_(row.model->holds_reference()) {}
 
   void solve() {
     begin();
@@ -150,10 +150,11 @@ class RowSolver {
       const auto shade = static_cast<std::size_t>(candidates.shade[i]);
       const double budget = row_.pixels.noise_budget[candidates.x[i]];
       auto& noise = unsolved_.noise[i];
-      noise = {row_.tables.expected_noise[shade], budget};
+      noise = {row_.sub_interval->tables->expected_noise[shade], budget};
       unsolved_.column(Column::next_noise)[i] = noise.next(duration_);
     }
-    std::fill_n(unsolved_.draws.begin(), count_, row_.sub_interval.number * draws_per_sub_interval);
+    std::fill_n(unsolved_.draws.begin(), count_,
+                row_.sub_interval->number * draws_per_sub_interval);
   }
 
   void begin(std::size_t i) {
@@ -170,7 +171,7 @@ class RowSolver {
     };
     const auto duration = all(duration_);
     const auto from = load(Candidates::last_target);
-    const auto fall = hn::Add(load(Candidates::leak), all(row_.sub_interval.rise / duration_));
+    const auto fall = hn::Add(load(Candidates::leak), all(row_.sub_interval->rise / duration_));
     auto last_value = load(Candidates::target);
     const auto light_slope = hn::Div(hn::Sub(last_value, from), duration);
     auto value = from;
@@ -178,7 +179,7 @@ class RowSolver {
     auto bandwidth = all(0);
     auto sign = all(1);
     if (has_bandwidth_) {
-      bandwidth = hn::GatherIndex(doubles, row_.tables.bandwidth.data(),
+      bandwidth = hn::GatherIndex(doubles, row_.sub_interval->tables->bandwidth.data(),
                                   hn::PromoteTo(hn::RebindToSigned<Doubles>(), shade));
       value = load(Candidates::last_signal);
       last_value = load(Candidates::signal);
@@ -331,31 +332,31 @@ class RowSolver {
     keep(Column::to_far, to_far);
     keep(Column::to_near, to_near);
     keep(Column::next_noise, next_noise);
-    keep(Column::ready, hn::IfThenElse(fires, hn::Add(emitted, all(row_.dynamics.gap)), ready));
+    keep(Column::ready, hn::IfThenElse(fires, hn::Add(emitted, all(row_.model->gap)), ready));
     return hn::CountTrue(doubles, happens);
   }
 
   /// Times at which events are emitted that are due at `t`: later by the latency.
   Values emissions(std::size_t i, Values t, std::uint64_t noise_bits) {
-    const auto& dynamics = row_.dynamics;
-    if (dynamics.latency == 0 && !has_latency_jitter()) return t;
-    const auto emitted = hn::Add(t, all(dynamics.latency));
+    const PixelModel& model = *row_.model;
+    if (model.latency == 0 && !has_latency_jitter()) return t;
+    const auto emitted = hn::Add(t, all(model.latency));
     if (!has_latency_jitter()) return emitted;
     const Bits bits;
     HWY_ALIGN std::uint64_t numbers[max_lanes / 2] = {};
     HWY_ALIGN std::uint64_t counters[max_lanes / 2] = {};
     for (std::size_t lane = 0; lane < std::min(lanes(), count_ - i); ++lane) {
-      numbers[lane] = row_.pixels.first_number + static_cast<std::uint64_t>(x_of(i + lane));
+      numbers[lane] = row_.pixels.number_of(x_of(i + lane));
       // Noise draws its successor and its polarity before.
       counters[lane] = unsolved_.draws[index_of(i + lane)] + 2 * (noise_bits >> lane & 1);
     }
-    const RandomSeries<Doubles> random(row_.random, hn::Load(bits, numbers),
+    const RandomSeries<Doubles> random(row_.model->random, hn::Load(bits, numbers),
                                        Random::Purpose::event);
     const auto normal = random.normals(hn::Load(bits, counters)).first;
-    return hn::Max(t, hn::Add(emitted, hn::Mul(all(dynamics.latency_jitter), normal)));
+    return hn::Max(t, hn::Add(emitted, hn::Mul(all(model.latency_jitter), normal)));
   }
 
-  bool has_latency_jitter() const { return row_.dynamics.latency_jitter > 0; }
+  bool has_latency_jitter() const { return row_.model->latency_jitter > 0; }
 
   static HWY_INLINE Values secants(Values level, const Points& a, const Points& b) {
     const auto share = hn::Div(hn::Sub(level, a.value), hn::Sub(b.value, a.value));
@@ -388,18 +389,18 @@ class RowSolver {
   }
 
   /// Fall of the reference per microsecond.
-  double fall_of(int x) const { return row_.pixels.leak[x] + row_.sub_interval.rise / duration_; }
+  double fall_of(int x) const { return row_.pixels.leak[x] + row_.sub_interval->rise / duration_; }
 
   void make_noise(std::size_t i, double emitted, bool fires) {
     const auto index = index_of(i);
     const int x = x_of(i);
-    const auto number = row_.pixels.first_number + static_cast<std::uint64_t>(x);
+    const auto number = row_.pixels.number_of(x);
     auto& noise = unsolved_.noise[index];
     auto& draw = unsolved_.draws[index];
-    noise.draw(row_.random, number, draw++);
+    noise.draw(row_.model->random, number, draw++);
     unsolved_.column(Column::next_noise)[i] = noise.next(duration_);
     if (!fires) return;
-    const bool is_on = row_.random.coin(number, Random::Purpose::event, draw++);
+    const bool is_on = row_.model->random.coin(number, Random::Purpose::event, draw++);
     if (!std::isinf(row_.pixels.positive[x]))
       row_.add_event(x, emitted, is_on ? Polarity::on : Polarity::off,
                      row_.has_labels() ? Cause::shot_noise : Cause::unknown);
@@ -415,8 +416,7 @@ class RowSolver {
     pixels.refractory_left[x] =
         static_cast<float>(row_.refractory_left(unsolved_.column(Column::ready)[i]));
     auto& noise = unsolved_.noise[index];
-    noise.skip(row_.random, row_.pixels.first_number + static_cast<std::uint64_t>(x),
-               unsolved_.draws[index]);
+    noise.skip(row_.model->random, row_.pixels.number_of(x), unsolved_.draws[index]);
     pixels.noise_budget[x] = noise.left();
   }
 
@@ -426,7 +426,7 @@ class RowSolver {
     store(i);
   }
 
-  const RowToSolve& row_;
+  RowToSolve& row_;
   UnsolvedPixels& unsolved_;
   double duration_;
   bool has_bandwidth_;
@@ -434,8 +434,8 @@ class RowSolver {
   std::size_t count_ = 0;  ///< pixels in the columns
 };
 
-void solve(const RowToSolve& row, UnsolvedPixels& unsolved) {
-  RowSolver(row, unsolved).solve();
+void solve(RowToSolve& row) {
+  RowSolver(row).solve();
 }
 
 }  // namespace
@@ -447,8 +447,8 @@ namespace eventcamera {
 
 HWY_EXPORT(solve);
 
-void solve_row(const RowToSolve& row, UnsolvedPixels& unsolved) {
-  HWY_DYNAMIC_DISPATCH(solve)(row, unsolved);
+void solve_row(RowToSolve& row) {
+  HWY_DYNAMIC_DISPATCH(solve)(row);
 }
 
 }  // namespace eventcamera

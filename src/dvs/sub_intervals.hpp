@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -48,6 +51,26 @@ class ExposurePulse {
   double falls_in_ = 0;  ///< microseconds from the start of the next interval
 };
 
+/// Number of luma levels for bandwidth and noise, which depend on the light (v2e) but need not be
+/// exact.
+inline constexpr int shades = 256;
+
+/// Bandwidth and noise of pixels of each shade in a sub-interval.
+struct ShadeTables {
+  std::array<float, shades> exponent;           ///< k = bandwidth times duration
+  std::array<float, shades> decay_factor;       ///< exp(-k), decay of the lag behind the light
+  std::array<float, shades> mean_decay_factor;  ///< (1 - exp(-k)) / k, its mean over the duration
+  std::array<std::uint32_t, shades> noise;      ///< expected shot noise, 1/noise_unit
+
+  std::array<double, shades> bandwidth;  ///< 1/us
+  std::array<double, shades> expected_noise;
+
+  double duration;  ///< microseconds
+
+  /// Of a frame with `gain` times the exposure of the first one.
+  ShadeTables(const DvsSettings& settings, double microseconds, double gain);
+};
+
 /// Part of an interval in which the light of each pixel, and the pulses added to all signals,
 /// change linearly.
 struct SubInterval {
@@ -57,11 +80,63 @@ struct SubInterval {
   double share;          ///< fraction of the remaining change that is made
   double rise;           ///< rise of all signals, units of the response
   std::uint64_t number;  ///< counted from the first frame
+  double start;          ///< microseconds since the first frame
+  /// By how much more the start of the next interval is rounded down to microseconds than the start
+  /// of this one, if the sub-interval is the last; else 0.
+  double next_rounding;
+  const ShadeTables* tables;
 };
 
-/// Divides an interval into equal steps, and splits these where pulse edges begin and end.
-/// Sub-intervals are numbered from `number` on.
-void divide_interval(double duration, int steps, std::span<const PulseEdge> edges,
-                     std::uint64_t number, std::vector<SubInterval>& sub_intervals);
+/// Time since the first frame. Divides each interval into equal steps, and splits these where pulse
+/// edges begin and end. One plan per number of steps.
+class Timeline {
+ public:
+  using Plan = std::vector<SubInterval>;  ///< in order of time
+
+  /// Begins the interval of `duration` after `last_time`, in a frame with `gain` times the exposure
+  /// of the first one. `is_exposed` as in ExposurePulse. Makes the plan of a single step.
+  void begin(const DvsSettings& settings, double gain, Nanoseconds last_time, Nanoseconds duration,
+             bool is_exposed);
+
+  /// Duration of the interval, microseconds.
+  double duration() const { return duration_; }
+
+  /// Makes the plan of this many steps, if it is not made yet.
+  void make_plan(int steps);
+
+  /// A plan that was made.
+  const Plan& plan(int steps) const { return plans_[static_cast<std::size_t>(steps)]; }
+
+  /// Ends the interval: the sub-intervals of the next one have larger numbers.
+  void end();
+
+  /// Aborts the current pulse.
+  void end_pulse() { pulse_.reset(); }
+
+  /// The next frame is the first one.
+  void restart();
+
+  /// Writes the time to a StateWriter, or reads it from a StateReader.
+  template <class Archive>
+  void serialize(Archive& archive) {
+    archive.value(count_, is_anything);
+    archive.value(clock_, is_within(0.0, max_state_clock));
+    pulse_.serialize(archive);
+  }
+
+ private:
+  const ShadeTables* tables_of(double duration);
+
+  DvsSettings settings_;
+  double gain_ = 1;
+  ExposurePulse pulse_;
+  std::vector<PulseEdge> edges_;
+  double duration_ = 0;
+  double next_rounding_ = 0;
+  double clock_ = 0;                      ///< start of the interval
+  std::uint64_t count_ = 0;               ///< sub-intervals before the interval
+  std::map<double, ShadeTables> tables_;  ///< by duration, microseconds
+  std::vector<Plan> plans_;               ///< by number of steps
+};
 
 }  // namespace eventcamera

@@ -10,11 +10,10 @@
 
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/elementary.hpp"
-#include "src/dvs/line_solver.hpp"
+#include "src/dvs/light_response.hpp"
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/random.hpp"
-#include "src/dvs/row_solver.hpp"
 #include "src/dvs/trajectory.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/dvs/playback.hpp"
@@ -117,24 +116,34 @@ struct Solved {
 /// A row of pixels in light that changes at random, advanced through a sub-interval.
 template <class Solve>
 Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
-  const Random random(7);
-  const SubInterval sub_interval{0, 40'000, 1, 1, 0.01, 3};
-  const ShadeTables tables(settings, sub_interval.duration, 1);
+  const ShadeTables tables(settings, 40'000, 1);
+  const SubInterval sub_interval{0, 40'000, 1, 1, 0.01, 3, 0, 0.4, &tables};
   std::minstd_rand draw(5);
-  std::uniform_real_distribution<float> level(0, 1.5F);
+  std::uniform_real_distribution<float> level(-1.4F, 0.2F);
   PixelArray array(width, 1);
-  array.keep_causes(true);
-  const auto pixels = array.row(0);
-  std::generate_n(pixels.target, width, [&] { return level(draw); });
-  array.draw_traits(0, settings, random);
-  array.settle(0, settings, random);
-  Candidates candidates;
+  array.set_labels(true);
+  LightResponse response(16);
+  auto light = settings;
+  light.response = Response::log;
+  light.log_eps = 0.25;  // so that responses are within those levels
+  response.set(light);
+  ThreadPool threads;
+  array.start(settings, threads);
+  Image<std::uint16_t> frame(width, 1);
+  std::generate_n(frame.row(0), width, [&] { return static_cast<std::uint16_t>(draw()); });
+  array.settle(frame, response, threads);
+  RowToSolve row;
+  row.model = &array.model();
+  row.pixels = array.row(0);
+  row.sub_interval = &sub_interval;
+  const auto& pixels = row.pixels;
+  auto& candidates = row.candidates;
   candidates.resize(width);
   for (int x = 0; x < width; ++x) {
     const int shade = static_cast<int>(draw() % shades);
     const float from = pixels.target[x];
     const bool is_lagging = settings.cutoff_frequency > 0;
-    const float signal = is_lagging ? from + 0.1F * (level(draw) - 0.75F) : from;
+    const float signal = is_lagging ? from + 0.1F * (level(draw) + 0.6F) : from;
     const float to = x % 5 == 0 ? from : level(draw);
     pixels.target[x] = to;
     const double bandwidth = tables.bandwidth[static_cast<std::size_t>(shade)];
@@ -162,23 +171,20 @@ Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
     for (const auto& [column, value] : values) candidates.column(column)[i] = value;
   }
   EventBuckets buckets;
-  IntervalEvents interval;
-  interval.begin(sub_interval.duration, 1, buckets);
-  std::vector<Event> added;
-  const IntervalEvents::Band events(interval, 0, added);
-  const PixelDynamics dynamics(settings);
-  solve(RowToSolve{settings, dynamics, random, sub_interval, tables, pixels, candidates, events, 0,
-                   0.4});
-  events.end();
+  IntervalEvents events(width, 1);
+  events.begin(sub_interval.duration, 0, buckets);
+  row.events.begin(events, 0);
+  solve(row);
+  row.events.end();
   Solved result;
   for (const auto& event : scene::copy(buckets)) {
     const int x = without_cause(event).x;
     result.events[{x, 0}].push_back(
         {static_cast<double>(event.t), x, 0, event.polarity(), cause_of(event)});
   }
-  for (const float* row :
+  for (const float* values :
        {pixels.reference, pixels.positive, pixels.negative, pixels.refractory_left})
-    result.state.insert(result.state.end(), row, row + width);
+    result.state.insert(result.state.end(), values, values + width);
   result.noise_budgets.assign(pixels.noise_budget, pixels.noise_budget + width);
   return result;
 }
@@ -224,28 +230,17 @@ TEST(Solvers, AreEqualOnAllTargets) {
                        .dead_pixels = 0.05,
                        .refractory_period = 700'000};
   for (const int width : {1, 3, 17, 500}) {
-    ASSERT_EQ(solver_for(settings), Solver::lines);
-    expect_equal_on_all_targets(solved(settings, width, solve_pixels),
-                                [&] { return solved(settings, width, solve_lines); });
     for (const auto& [adaptation, jitter, noise_hz] :
-         {std::array{0.2, 0.0, 0.0}, std::array{2.0, 0.0, 30.0}, std::array{0.0, 0.1, 0.0},
-          std::array{0.3, 0.04, 30.0}}) {
+         {std::array{0.0, 0.0, 0.0}, std::array{0.0, 0.0, 30.0}, std::array{0.2, 0.0, 0.0},
+          std::array{2.0, 0.0, 30.0}, std::array{0.0, 0.1, 0.0}, std::array{0.3, 0.04, 30.0}}) {
       auto varying = settings;
       varying.adaptation = adaptation;
       varying.threshold_jitter = jitter;
       varying.shot_noise_rate = noise_hz;
       if (jitter > 0) varying.threshold_sigma = 0;
-      ASSERT_EQ(solver_for(varying), Solver::varying_thresholds);
-      expect_equal_on_all_targets(solved(varying, width, solve_pixels), [&] {
-        return solved(varying, width, [&](const RowToSolve& row) {
-          auto candidates = row.candidates;
-          const RowToSolve quiet{row.settings, row.dynamics,     row.random, row.sub_interval,
-                                 row.tables,   row.pixels,       candidates, row.events,
-                                 row.start,    row.next_rounding};
-          solve_noisy_pixels(quiet, candidates);
-          solve_varying_thresholds(quiet);
-        });
-      });
+      ASSERT_EQ(PixelModel(varying).solver, Solver::lines);
+      expect_equal_on_all_targets(solved(varying, width, solve_pixels),
+                                  [&] { return solved(varying, width, solve_lines); });
     }
     auto held = settings;
     held.refractory_reset = RefractoryReset::signal;
@@ -260,10 +255,8 @@ TEST(Solvers, AreEqualOnAllTargets) {
           auto others = base;
           others.cutoff_frequency = cutoff_frequency;
           others.shot_noise_rate = noise_hz;
-          expect_equal_on_all_targets(solved(others, width, solve_pixels), [&] {
-            UnsolvedPixels unsolved;
-            return solved(others, width, [&](const RowToSolve& row) { solve_row(row, unsolved); });
-          });
+          expect_equal_on_all_targets(solved(others, width, solve_pixels),
+                                      [&] { return solved(others, width, solve_row); });
         }
       }
     }

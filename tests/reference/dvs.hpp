@@ -12,7 +12,7 @@
 #include "src/core/image.hpp"
 #include "src/core/label.hpp"
 #include "src/dvs/dvs_settings.hpp"
-#include "src/dvs/pixel_array.hpp"
+#include "src/dvs/pixel_model.hpp"
 #include "src/flow/dense_flow.hpp"
 
 /// Reference equations of the physical pixel, implemented literally, in double precision and in
@@ -219,15 +219,14 @@ class DvsPixel {
  public:
   DvsPixel(const DvsSettings& settings, std::uint64_t number, double luma)
       : settings_(settings),
+        model_(settings),
         number_(number),
         random_(settings.seed),
-        traits_(Mismatch(settings, random_).of(number)),
-        leak_cause_(Mismatch(settings, random_).is_hot(number) ? Cause::hot_pixel : Cause::leak),
+        traits_(model_.traits_of(number)),
+        leak_cause_(model_.is_hot(number) ? Cause::hot_pixel : Cause::leak),
         input_(response(true_light(luma))),
         signal_(input_),
-        reference_(
-            input_ -
-            Mismatch(settings, random_).leaked(number, traits_, settings.shot_noise_rate / 1e6)),
+        reference_(input_ - model_.leaked(number, traits_)),
         noise_left_(random_.exponential(number, Random::Purpose::first_noise)) {}
 
   /// Events until the next frame, `microseconds` later.
@@ -270,12 +269,10 @@ class DvsPixel {
       const auto fire = [&](bool is_on, Cause cause) {
         last_cause_ = cause;
         growth_ += settings_.adaptation;
-        if (!std::isinf(traits_.positive_threshold)) {
+        if (!std::isinf(traits_.thresholds.positive)) {
           events.push_back({now_ + 1, 0, 0, is_on ? Polarity::on : Polarity::off, cause});
           if (settings_.threshold_jitter > 0) {
-            const auto drawn = Mismatch(settings_, random_).next_thresholds(number_, draw++);
-            traits_.positive_threshold = drawn.positive;
-            traits_.negative_threshold = drawn.negative;
+            traits_.thresholds = model_.next_thresholds(number_, draw++);
           }
         }
         ready_ = now_ + 1 + in_microseconds(settings_.refractory_period);
@@ -286,8 +283,8 @@ class DvsPixel {
         fire(random_.coin(number_, Random::Purpose::event, draw++), Cause::shot_noise);
         continue;
       }
-      const bool is_on = signal_ - reference_ >= (1 + growth_) * traits_.positive_threshold;
-      const double threshold = is_on ? traits_.positive_threshold : traits_.negative_threshold;
+      const bool is_on = signal_ - reference_ >= (1 + growth_) * traits_.thresholds.positive;
+      const double threshold = is_on ? traits_.thresholds.positive : traits_.thresholds.negative;
       if (!is_on && reference_ - signal_ < (1 + growth_) * threshold) continue;
       reference_ += (is_on ? 1 : -1) * (1 + growth_) * threshold;
       if (is_refractory) continue;
@@ -334,6 +331,7 @@ class DvsPixel {
   }
 
   DvsSettings settings_;
+  PixelModel model_;
   std::uint64_t number_;
   Random random_;
   PixelTraits traits_;
