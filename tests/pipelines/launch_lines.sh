@@ -99,7 +99,7 @@ grep -q '"shot-noise-events" : ' causes.json || fail "no causes: $(cat causes.js
 launch eventcompare name=compare location=classes.json ! fakesink  videotestsrc pattern=ball num-buffers=30 ! eventsim-dvs preset=davis346 label=true ! tee name=t  t. ! queue ! compare.reference  t. ! queue ! eventdenoise ! compare.candidate
 grep -q '"true-positives" : [1-9]' classes.json || fail "no true positives: $(cat classes.json)"
 launch videotestsrc pattern=ball num-buffers=30 ! eventsim-dvs preset=davis346 label=true ! eventnpzenc ! filesink location=labelled.npz
-launch eventsim-dvs name=dvs ! eventnpzenc ! filesink location=classes.npz  videotestsrc pattern=ball num-buffers=30 ! dvs.sink  videotestsrc pattern=ball num-buffers=30 ! video/x-raw,format=GRAY8 ! dvs.label_sink
+launch eventlabel name=label ! eventnpzenc ! filesink location=classes.npz  videotestsrc pattern=ball num-buffers=30 ! eventsim-dvs label=true ! label.event_sink  videotestsrc pattern=ball num-buffers=30 ! video/x-raw,format=GRAY8 ! label.video_sink
 /usr/bin/python3 - <<'PYTHON'
 import numpy as np
 events = np.load("labelled.npz")

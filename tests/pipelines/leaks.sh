@@ -67,6 +67,12 @@ check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! fakesink
 check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! aedatmux ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! identity error-after=4 ! eventsim-frame ! eventrender ! fakesink
+for after in "fakesink" "identity error-after=2 ! fakesink"; do
+  # shellcheck disable=SC2086
+  check eventlabel name=label ! $after  videotestsrc num-buffers=8 ! eventsim-frame ! label.event_sink  videotestsrc num-buffers=8 ! video/x-raw,format=GRAY8 ! label.video_sink
+  # shellcheck disable=SC2086
+  check flowjoin name=join ! $after  videotestsrc num-buffers=8 ! join.video_sink  videotestsrc num-buffers=8 ! video/x-raw,format=GRAY8,width=2560 ! capssetter join=false replace=true caps=other/tensors,format=static,num_tensors=1,types=float32,dimensions=2:320:240:1 ! join.flow_sink
+done
 check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! identity error-after=2 ! fakesink  t. ! queue ! eventsim-frame ! overlay.event_sink
 check videotestsrc num-buffers=8 ! eventsim-frame ! eventundistort location=/nowhere ! fakesink
 # Bags of events and images.

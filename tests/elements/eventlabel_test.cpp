@@ -1,0 +1,462 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// eventlabel: which event has which class, what it waits for, and classes in later elements.
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/elements/pipeline.hpp"
+
+namespace {
+
+using namespace harness;
+using eventcamera::Event;
+using eventcamera::Polarity;
+
+constexpr GstClockTime ms = GST_MSECOND;
+constexpr int width = 8;
+constexpr int height = 4;
+
+class EventLabel : public testing::Test {
+ protected:
+  void begin(const std::string& format = "GRAY8", const std::string& image_size = "8, height=4",
+             const std::string& sensor_size = "8, height=4") {
+    gst_harness_set_src_caps_str(
+        events.get(),
+        ("application/x-event-camera, format=XYTP, framerate=25/1, width=" + sensor_size).c_str());
+    gst_harness_set_src_caps_str(
+        images.get(),
+        ("video/x-raw, framerate=25/1, format=" + format + ", width=" + image_size).c_str());
+  }
+
+  /// An event of each of these microseconds after `pts`, of pixels 0, 1, 2 ...
+  GstFlowReturn push_events(GstClockTime pts, const std::vector<guint32>& times,
+                            GstClockTime duration = 40 * ms) {
+    std::vector<Event> list;
+    for (const auto t : times) {
+      const auto pixel = static_cast<int>(list.size());
+      list.push_back(Event::at(pixel % width, pixel / width, t, Polarity::on));
+    }
+    return gst_harness_push(events.get(), buffer_of(pts, list, duration));
+  }
+
+  /// An image whose classes are `first`, `first` + 1 ...
+  template <class Pixel = guint8>
+  GstFlowReturn push_image(GstClockTime pts, int first, int pixels = width * height) {
+    std::vector<Pixel> classes;
+    for (int i = 0; i < pixels; ++i) classes.push_back(static_cast<Pixel>(first + i));
+    GstBuffer* buffer = gst_buffer_new_memdup(classes.data(), classes.size() * sizeof(Pixel));
+    GST_BUFFER_PTS(buffer) = pts;
+    return gst_harness_push(images.get(), buffer);
+  }
+
+  /// Classes of the next buffer, less the number of the event; -1 for the class 0.
+  std::vector<int> classes() {
+    const Buffer buffer(gst_harness_pull(events.get()));
+    if (!buffer) return {};
+    last_pts = GST_BUFFER_PTS(buffer.get());
+    const auto* meta = gst_buffer_get_event_camera_label_meta(buffer.get());
+    EXPECT_NE(meta, nullptr);
+    std::vector<int> found;
+    for (gsize i = 0; meta != nullptr && i < meta->n_labels; ++i) {
+      const int object_class = meta->labels[i].object_class;
+      found.push_back(object_class == 0 ? -1 : object_class - static_cast<int>(i));
+    }
+    return found;
+  }
+
+  std::string text_of_next(GstMessageType type) {
+    const auto message = label.message(type);
+    return message ? text_of(message.get()) : "";
+  }
+
+  /// Waits for an error message, as the source pad has its own thread.
+  std::string error() {
+    const Owned<GstMessage> message(
+        gst_bus_timed_pop_filtered(label.bus.get(), 60 * GST_SECOND, GST_MESSAGE_ERROR));
+    return message ? text_of(message.get()) : "";
+  }
+
+  TwoInputs label{"eventlabel", "event_sink", "video_sink"};
+  Owned<GstHarness>& events = label.first;
+  Owned<GstHarness>& images = label.second;
+  GstClockTime last_pts = 0;
+};
+
+using Classes = std::vector<int>;
+
+TEST_F(EventLabel, GivesEventsTheClassOfTheirPixelInTheLastImage) {
+  begin();
+  push_image(0, 10);
+  push_events(0, {0, 39'999, 40'000});
+  push_image(40 * ms, 20);
+  EXPECT_EQ(classes(), (Classes{10, 10, 20}));
+  push_events(40 * ms, {0, 20'000});
+  push_image(80 * ms, 30);
+  EXPECT_EQ(classes(), (Classes{20, 20}));
+  EXPECT_EQ(last_pts, 40 * ms);
+}
+
+TEST_F(EventLabel, ReadsSeveralImagesOf16BitsPerInterval) {
+  begin("GRAY16_LE");
+  push_events(0, {0, 4'999, 5'000, 10'000, 19'999, 20'000, 40'000});
+  push_image<guint16>(5 * ms, 1000);
+  push_image<guint16>(10 * ms, 60'000);
+  push_image<guint16>(20 * ms, 300);
+  push_image<guint16>(90 * ms, 1);
+  EXPECT_EQ(classes(), (Classes{-1, -1, 1000, 60'000, 60'000, 300, 300}));
+}
+
+TEST_F(EventLabel, RoundsTheTimesOfImagesDown) {
+  begin();
+  push_image(0, 10);
+  push_events(500, {0, 4, 5, 6}, 10 * GST_USECOND);
+  push_image(5 * GST_USECOND + 499, 20);
+  push_image(40 * ms, 30);
+  EXPECT_EQ(classes(), (Classes{10, 10, 20, 20}));
+}
+
+TEST_F(EventLabel, UsesTheLastImageAfterTheEnd) {
+  begin();
+  push_events(0, {19'999, 20'000});
+  push_image(20 * ms, 7);
+  gst_harness_push_event(images.get(), gst_event_new_eos());
+  EXPECT_EQ(classes(), (Classes{-1, 7}));
+  push_events(40 * ms, {0});
+  EXPECT_EQ(classes(), Classes{7});
+  gst_harness_push_event(events.get(), gst_event_new_eos());
+  GstBuffer* rest = nullptr;
+  EXPECT_TRUE(gst_harness_pull_until_eos(events.get(), &rest));
+  EXPECT_EQ(rest, nullptr);
+}
+
+TEST_F(EventLabel, GoesOnThroughGaps) {
+  begin();
+  push_image(0, 3);
+  push_events(0, {0});
+  gst_harness_push_event(images.get(), gst_event_new_gap(40 * ms, 80 * ms));
+  EXPECT_EQ(classes(), Classes{3});
+  push_events(40 * ms, {5});
+  EXPECT_EQ(classes(), Classes{3});
+  gst_harness_push_event(events.get(), gst_event_new_gap(80 * ms, 40 * ms));
+  push_image(120 * ms, 9);
+  push_events(120 * ms, {5});
+  push_image(160 * ms, 11);
+  EXPECT_EQ(classes(), Classes{9});
+  const auto gap = next_event(events.get(), GST_EVENT_GAP);
+  ASSERT_TRUE(gap);
+  GstClockTime start = 0;
+  GstClockTime duration = 0;
+  gst_event_parse_gap(gap.get(), &start, &duration);
+  EXPECT_EQ(start, 80 * ms);
+  EXPECT_EQ(duration, 40 * ms);
+}
+
+TEST_F(EventLabel, MatchesByRunningTime) {
+  begin();
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = 1000 * ms;
+  gst_harness_push_event(images.get(), gst_event_new_segment(&segment));
+  push_image(990 * ms, 3);  // before the segment, but in force when it starts
+  push_events(0, {0, 20'000});
+  push_image(1020 * ms, 8);
+  push_image(1050 * ms, 9);
+  EXPECT_EQ(classes(), (Classes{3, 8}));
+}
+
+TEST_F(EventLabel, MatchesAtEveryRate) {
+  for (const double rate : {0.5, 2.}) {
+    flush({events.get(), images.get()});
+    begin();
+    for (auto* h : {events.get(), images.get()}) {
+      GstSegment segment;
+      gst_segment_init(&segment, GST_FORMAT_TIME);
+      segment.rate = rate;
+      gst_harness_push_event(h, gst_event_new_segment(&segment));
+    }
+    push_image(0, 3);
+    push_events(0, {0, 19'999, 20'000, 40'000});
+    push_image(20 * ms, 8);
+    push_image(40 * ms, 9);
+    EXPECT_EQ(classes(), (Classes{3, 3, 8, 9})) << rate;
+  }
+}
+
+TEST_F(EventLabel, KeepsCausesAndCompletesLabels) {
+  begin();
+  const auto labelled = [](const std::vector<GstEventCameraLabel>& labels) {
+    GstBuffer* buffer = buffer_of(
+        0, {Event::at(0, 0, 0, Polarity::on), Event::at(1, 0, 30'000, Polarity::off)}, 40 * ms);
+    gst_buffer_add_event_camera_label_meta(buffer, labels.data(), labels.size());
+    return buffer;
+  };
+  const auto expect = [&](const std::vector<GstEventCameraLabel>& expected) {
+    const Buffer out(gst_harness_pull(events.get()));
+    const auto* meta = gst_buffer_get_event_camera_label_meta(out.get());
+    ASSERT_NE(meta, nullptr);
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      EXPECT_EQ(meta->labels[i].object_class, expected[i].object_class);
+      EXPECT_EQ(meta->labels[i].cause, expected[i].cause);
+    }
+  };
+  constexpr guint8 leak = GST_EVENT_CAMERA_CAUSE_LEAK;
+  constexpr guint8 light = GST_EVENT_CAMERA_CAUSE_LIGHT;
+  gst_harness_push(events.get(), labelled({{5, leak, 0}, {6, light, 0}}));
+  push_image(20 * ms, 50);
+  gst_harness_push_event(images.get(), gst_event_new_eos());
+  expect({{5, leak, 0}, {51, light, 0}});
+  gst_harness_push(events.get(), labelled({{5, leak, 0}}));  // not one per event: not valid
+  expect({{50, GST_EVENT_CAMERA_CAUSE_UNKNOWN, 0}, {51, GST_EVENT_CAMERA_CAUSE_UNKNOWN, 0}});
+}
+
+TEST_F(EventLabel, ChangesNoEventAndNoBufferOfOthers) {
+  begin();
+  const Buffer in(buffer_of(0, {Event::at(1, 2, 3, Polarity::on)}, 40 * ms));
+  gst_harness_push_event(images.get(), gst_event_new_eos());
+  gst_harness_push(events.get(), gst_buffer_ref(in.get()));
+  const Buffer out(gst_harness_pull(events.get()));
+  EXPECT_EQ(bytes_of(out.get()), bytes_of(in.get()));
+  EXPECT_EQ(gst_buffer_get_event_camera_label_meta(in.get()), nullptr);
+  EXPECT_NE(gst_buffer_get_event_camera_label_meta(out.get()), nullptr);
+}
+
+TEST_F(EventLabel, NeedsImagesOfTheSizeOfTheSensor) {
+  begin("GRAY8", "4, height=8");
+  push_image(0, 1);
+  push_events(0, {0});
+  gst_harness_push_event(images.get(), gst_event_new_eos());
+  EXPECT_EQ(error(),
+            "The class images have 4x8 pixels, and the sensor 8x4. Scale the images with "
+            "videoscale method=nearest-neighbour.");
+}
+
+TEST_F(EventLabel, FollowsChangesOfTheSize) {
+  begin();
+  push_image(0, 1);
+  push_events(0, {0}, 20 * ms);
+  push_image(20 * ms, 2);
+  EXPECT_EQ(classes(), Classes{1});
+  push_events(20 * ms, {1}, 19 * ms);
+  begin("GRAY8", "16, height=2", "16, height=2");
+  push_image(40 * ms, 3);
+  EXPECT_EQ(classes(), Classes{2});
+  gst_harness_push(events.get(), buffer_of(40 * ms, {Event::at(15, 1, 0, Polarity::on)}, 20 * ms));
+  push_image(80 * ms, 4);
+  EXPECT_EQ(classes(), Classes{3 + 31});
+}
+
+TEST_F(EventLabel, ReportsImagesWithoutTheirPixels) {
+  begin();
+  push_image(0, 1, 20);
+  push_events(0, {0});
+  gst_harness_push_event(images.get(), gst_event_new_eos());
+  EXPECT_TRUE(error().starts_with("Cannot read a class image: "));
+}
+
+TEST_F(EventLabel, SkipsEventsOutsideTheSensor) {
+  begin();
+  push_image(0, 1);
+  gst_harness_push(events.get(),
+                   buffer_of(0,
+                             {Event::at(8, 0, 0, Polarity::on), Event::at(0, 4, 0, Polarity::on),
+                              Event::at(2, 0, 0, Polarity::on)},
+                             40 * ms));
+  gst_harness_push_event(images.get(), gst_event_new_eos());
+  EXPECT_EQ(classes(), (Classes{-1, -1, 1}));
+  EXPECT_NE(text_of_next(GST_MESSAGE_WARNING).find("outside the sensor"), std::string::npos);
+}
+
+TEST_F(EventLabel, SkipsImagesWithoutATime) {
+  begin();
+  push_image(10 * ms, 1);
+  push_events(0, {9'999, 10'000});
+  push_image(GST_CLOCK_TIME_NONE, 2);
+  push_image(5 * ms, 3);
+  gst_harness_push_event(images.get(), gst_event_new_eos());
+  EXPECT_EQ(classes(), (Classes{-1, 1}));
+  EXPECT_TRUE(text_of_next(GST_MESSAGE_WARNING)
+                  .starts_with("Cannot match all class images to events: one has no PTS"));
+  EXPECT_EQ(text_of_next(GST_MESSAGE_WARNING), "");
+}
+
+TEST_F(EventLabel, SkipsEventsWithoutATime) {
+  begin();
+  push_image(0, 1);
+  push_events(GST_CLOCK_TIME_NONE, {0});
+  push_events(0, {0});
+  push_image(40 * ms, 2);
+  EXPECT_EQ(classes(), Classes{1});
+  EXPECT_EQ(text_of_next(GST_MESSAGE_WARNING),
+            "Cannot label all events: a buffer has no PTS; skipping them.");
+}
+
+TEST_F(EventLabel, EndsASegmentOnceBothHave) {
+  begin();
+  for (int i = 0; i < 2; ++i) {
+    push_image(0, 1);
+    push_events(0, {0});
+    end_segment(images.get());
+    EXPECT_EQ(classes(), Classes{1});
+    push_events(40 * ms, {0});
+    EXPECT_EQ(classes(), Classes{1});
+    end_segment(events.get());
+    ASSERT_TRUE(next_event(events.get(), GST_EVENT_SEGMENT_DONE));
+    for (auto* h : {events.get(), images.get()}) play_on(h, 80 * ms * static_cast<guint>(i + 1));
+  }
+}
+
+TEST_F(EventLabel, StartsOverAfterAFlush) {
+  begin();
+  push_image(0, 1);
+  push_events(0, {0, 20'000});
+  push_image(10 * ms, 2);
+  flush({events.get(), images.get()});
+  for (auto* h : {events.get(), images.get()}) push_segment(h);
+  push_events(0, {0, 20'000});
+  push_image(10 * ms, 5);
+  push_image(80 * ms, 6);
+  EXPECT_EQ(classes(), (Classes{-1, 5}));
+}
+
+TEST_F(EventLabel, StartsOverWithEventsThatAreFlushedAlone) {
+  begin();
+  push_image(0, 1);
+  push_events(0, {0, 20'000}, 30 * ms);
+  push_image(10 * ms, 2);
+  flush({events.get()});
+  push_segment(events.get());
+  push_events(12 * ms, {0, 1, 2}, 30 * ms);
+  push_image(80 * ms, 6);
+  EXPECT_EQ(classes(), (Classes{2, 2, 2}));
+}
+
+/// A live source of events, and images that never come.
+TEST(LiveEventLabel, WaitsNoLongerThanTheLatency) {
+  Pipeline pipeline(
+      "videotestsrc is-live=true pattern=ball num-buffers=10 ! "
+      "video/x-raw,width=64,height=48,framerate=50/1 ! eventsim-diff ! eventlabel name=label ! "
+      "fakesink name=sink sync=true  appsrc is-live=true format=time caps=\"video/x-raw, "
+      "format=GRAY8, width=64, height=48, framerate=50/1\" ! queue ! label.video_sink");
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  EXPECT_EQ(pipeline.stat("sink", "rendered"), 9U);
+}
+
+TEST(LiveEventLabel, SaysThatImagesAreMissing) {
+  Pipeline pipeline(
+      "videotestsrc is-live=true pattern=ball num-buffers=3 ! "
+      "video/x-raw,width=64,height=48,framerate=50/1 ! eventsim-diff ! eventlabel ! fakesink");
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  ASSERT_EQ(pipeline.warnings.size(), 1U);
+  EXPECT_NE(pipeline.warnings[0].find("link a source of images"), std::string::npos);
+}
+
+const std::string moving_ball =
+    "videotestsrc pattern=ball num-buffers=20 ! video/x-raw,width=64,height=48 ! ";
+
+TEST(EventLabelInPipelines, LabelsTheEventsOfATee) {
+  Pipeline pipeline(
+      "eventlabel name=label ! fakesink name=sink sync=false  " + moving_ball +
+      "tee name=t  t. ! queue ! eventsim-dvs ! label.event_sink  t. ! queue ! videoconvert ! "
+      "video/x-raw,format=GRAY8 ! label.video_sink");
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  EXPECT_EQ(pipeline.stat("sink", "rendered"), 19U);
+}
+
+TEST(EventLabelInPipelines, SeeksBothInputs) {
+  Pipeline pipeline("eventlabel name=label ! eventcsvenc format=labels ! fakesink sync=false  " +
+                    moving_ball +
+                    "eventsim-dvs label=true ! label.event_sink  videotestsrc num-buffers=20 ! "
+                    "video/x-raw,format=GRAY8,width=64,height=48 ! label.video_sink");
+  ASSERT_TRUE(pipeline.reaches(GST_STATE_PAUSED));
+  EXPECT_TRUE(pipeline.seek(300 * ms));
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  EXPECT_TRUE(pipeline.warnings.empty());
+}
+
+/// Lines of a CSV file of labelled events: the numbers of each. `source` outputs events of a sensor
+/// of 64x48 pixels, labelled here with their place: 1 + x + 64 y.
+std::vector<std::vector<int>> rows_of(const std::string& source, const std::string& launch,
+                                      const std::string& branch = "") {
+  std::vector<guint16> places(std::size_t{64} * 48);
+  for (std::size_t i = 0; i < places.size(); ++i) places[i] = static_cast<guint16>(i + 1);
+  const TemporaryFile file;
+  Pipeline pipeline("eventlabel name=label ! " + launch + " ! eventcsvenc format=labels" +
+                    file.sink() + "  " + source +
+                    " ! label.event_sink  appsrc name=images format=time caps=\"video/x-raw, "
+                    "format=GRAY16_LE, width=64, height=48, framerate=30/1\" ! label.video_sink  " +
+                    branch);
+  GstBuffer* image = gst_buffer_new_memdup(places.data(), places.size() * sizeof(guint16));
+  GST_BUFFER_PTS(image) = 0;
+  GstFlowReturn flow = GST_FLOW_ERROR;
+  g_signal_emit_by_name(pipeline["images"], "push-buffer", image, &flow);
+  gst_buffer_unref(image);
+  g_signal_emit_by_name(pipeline["images"], "end-of-stream", &flow);
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  const auto bytes = file.bytes();
+  std::istringstream lines(std::string(bytes.begin(), bytes.end()));
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line, "t,x,y,p,cause,class");
+  std::vector<std::vector<int>> rows;
+  while (std::getline(lines, line)) {
+    rows.emplace_back();
+    std::istringstream numbers(line);
+    for (std::string number; std::getline(numbers, number, ',');)
+      rows.back().push_back(std::stoi(number));
+  }
+  EXPECT_GT(rows.size(), 100U) << launch;
+  return rows;
+}
+
+const std::string simulated =
+    moving_ball + "eventsim-dvs preset=davis346 shot-noise-rate=20 label=true";
+
+TEST(EventLabelInPipelines, KeepsTheCausesOfASimulator) {
+  int noise = 0;
+  for (const auto& row : rows_of(simulated, "identity")) {
+    ASSERT_EQ(row[5], 1 + row[1] + 64 * row[2]);
+    ASSERT_NE(row[4], 0);
+    noise += row[4] == GST_EVENT_CAMERA_CAUSE_SHOT_NOISE ? 1 : 0;
+  }
+  EXPECT_GT(noise, 0);
+}
+
+TEST(EventLabelInPipelines, LabelsRecordings) {
+  const TemporaryFile recording;
+  Pipeline writer(moving_ball + "eventsim-diff ! evtenc" + recording.sink());
+  ASSERT_TRUE(writer.play()) << writer.error;
+  for (const auto& row : rows_of(recording.source() + "evtdec", "identity")) {
+    ASSERT_EQ(row[5], 1 + row[1] + 64 * row[2]);
+    ASSERT_EQ(row[4], GST_EVENT_CAMERA_CAUSE_UNKNOWN);
+  }
+}
+
+TEST(EventLabelInPipelines, ClassesStayWithTheirEventsInFilters) {
+  for (const char* filter : {"eventantiflicker", "eventdenoise", "eventhotpixel", "eventrefractory",
+                             "eventtrail", "eventratecontrol max-rate=2000", "eventpolarity"})
+    for (const auto& row : rows_of(simulated, filter))
+      ASSERT_EQ(row[5], 1 + row[1] + 64 * row[2]) << filter;
+}
+
+TEST(EventLabelInPipelines, ClassesStayWithEventsThatMove) {
+  for (const auto& row :
+       rows_of(simulated, "eventflip video-direction=180 ! eventcrop left=8 top=4"))
+    ASSERT_EQ(row[5], 1 + (63 - row[1] - 8) + 64 * (47 - row[2] - 4));
+  for (const auto& row :
+       rows_of(simulated, "eventscale ! application/x-event-camera,width=32,height=24")) {
+    ASSERT_EQ((row[5] - 1) % 64 / 2, row[1]);
+    ASSERT_EQ((row[5] - 1) / 64 / 2, row[2]);
+  }
+}
+
+TEST(EventLabelInPipelines, ClassesStayWithTheirEventsInMergedStreams) {
+  int without = 0;
+  for (const auto& row :
+       rows_of(simulated, "eventmerge name=m", moving_ball + "eventsim-dvs label=true ! m.")) {
+    without += row[5] == 0 ? 1 : 0;
+    ASSERT_TRUE(row[5] == 0 || row[5] == 1 + row[1] + 64 * row[2]);
+  }
+  EXPECT_GT(without, 0);
+}
+
+}  // namespace

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// flowjoin: which frame gets which optical flow, and what it waits for.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/elements/pipeline.hpp"
+
+namespace {
+
+using namespace harness;
+
+constexpr GstClockTime ms = GST_MSECOND;
+
+class FlowJoin : public testing::Test {
+ protected:
+  void begin(const std::string& dimensions = "2:4:3:1", const std::string& framerate = "25/1",
+             const std::string& size = "4, height=3") {
+    gst_harness_set_src_caps_str(
+        video.get(),
+        ("video/x-raw, format=GRAY8, framerate=" + framerate + ", width=" + size).c_str());
+    gst_harness_set_src_caps_str(
+        flow.get(), ("other/tensors, format=static, num_tensors=1, types=float32, framerate=25/1, "
+                     "dimensions=" +
+                     dimensions)
+                        .c_str());
+  }
+
+  GstFlowReturn push_frame(GstClockTime pts, GstClockTime duration = 40 * ms) {
+    GstBuffer* buffer = gst_buffer_new_allocate(nullptr, 12, nullptr);
+    gst_buffer_memset(buffer, 0, 100, 12);
+    GST_BUFFER_PTS(buffer) = pts;
+    GST_BUFFER_DURATION(buffer) = duration;
+    return gst_harness_push(video.get(), buffer);
+  }
+
+  /// Flow that is the same for each pixel.
+  GstFlowReturn push_flow(GstClockTime pts, float motion, GstClockTime duration = 40 * ms,
+                          gsize pixels = 12) {
+    const std::vector<float> numbers(2 * pixels, motion);
+    GstBuffer* buffer = gst_buffer_new_memdup(numbers.data(), numbers.size() * sizeof numbers[0]);
+    GST_BUFFER_PTS(buffer) = pts;
+    GST_BUFFER_DURATION(buffer) = duration;
+    return gst_harness_push(flow.get(), buffer);
+  }
+
+  /// Flow of the next frame.
+  std::optional<float> joined() {
+    const Buffer frame(gst_harness_pull(video.get()));
+    if (!frame) {
+      ADD_FAILURE() << "no frame";
+      return std::nullopt;
+    }
+    EXPECT_EQ(bytes_of(frame.get()), std::string(12, 100));
+    last_pts = GST_BUFFER_PTS(frame.get());
+    const auto* meta = gst_buffer_get_event_camera_flow_meta(frame.get());
+    if (meta == nullptr) return std::nullopt;
+    EXPECT_EQ(meta->width * meta->height, 12U);
+    gsize size = 0;
+    const auto* numbers = static_cast<const float*>(
+        g_bytes_get_data(gst_event_camera_flow_meta_get_flow(meta), &size));
+    EXPECT_EQ(size, 12 * 2 * sizeof(float));
+    return numbers[23];
+  }
+
+  std::string text_of_next(GstMessageType type) {
+    const auto message = join.message(type);
+    return message ? text_of(message.get()) : "";
+  }
+
+  std::string error() {
+    const Owned<GstMessage> message(
+        gst_bus_timed_pop_filtered(join.bus.get(), 60 * GST_SECOND, GST_MESSAGE_ERROR));
+    return message ? text_of(message.get()) : "";
+  }
+
+  TwoInputs join{"flowjoin", "video_sink", "flow_sink"};
+  Owned<GstHarness>& video = join.first;
+  Owned<GstHarness>& flow = join.second;
+  GstClockTime last_pts = 0;
+};
+
+constexpr auto none = std::nullopt;
+
+TEST_F(FlowJoin, AddsTheFlowThatBeginsWithAFrame) {
+  begin();
+  push_frame(0);
+  push_flow(999, 1.5);  // as streams round times differently
+  EXPECT_EQ(joined(), 1.5F);
+  push_flow(40 * ms, 2);
+  push_frame(40 * ms);
+  EXPECT_EQ(joined(), 2.F);
+  EXPECT_EQ(last_pts, 40 * ms);
+  EXPECT_EQ(text_of_next(GST_MESSAGE_WARNING), "");
+}
+
+TEST_F(FlowJoin, PassesFramesWithoutFlow) {
+  begin();
+  push_frame(0);
+  push_flow(40 * ms, 1);
+  EXPECT_EQ(joined(), none);
+  EXPECT_TRUE(text_of_next(GST_MESSAGE_WARNING).starts_with("A frame has no optical flow;"));
+  push_frame(40 * ms);
+  EXPECT_EQ(joined(), 1.F);
+  push_flow(60 * ms, 2);  // of no frame
+  push_frame(80 * ms);
+  push_flow(80 * ms, 3);
+  EXPECT_EQ(joined(), 3.F);
+  gst_harness_push_event(flow.get(), gst_event_new_gap(120 * ms, 80 * ms));
+  push_frame(120 * ms);
+  EXPECT_EQ(joined(), none);
+  push_frame(160 * ms);
+  EXPECT_EQ(joined(), none);
+  push_frame(200 * ms);
+  push_flow(200 * ms, 4);
+  EXPECT_EQ(joined(), 4.F);
+  EXPECT_EQ(text_of_next(GST_MESSAGE_WARNING), "");
+}
+
+TEST_F(FlowJoin, SkipsFlowOfOtherDurations) {
+  for (const char* framerate : {"25/1", "0/1"}) {
+    const bool is_known = framerate[0] != '0';
+    flush({video.get(), flow.get()});
+    begin("2:4:3", framerate);
+    for (auto* h : {video.get(), flow.get()}) push_segment(h);
+    GstClockTime at = 0;
+    for (const auto& [duration, fits] : {std::pair{20 * ms, false},
+                                         {21 * ms, true},
+                                         {59 * ms, true},
+                                         {60 * ms, false},
+                                         {GST_CLOCK_TIME_NONE, true}}) {
+      push_frame(at, GST_CLOCK_TIME_NONE);
+      push_flow(at, 1, duration);
+      EXPECT_EQ(joined().has_value(), fits || !is_known) << duration;
+      at += 40 * ms;
+    }
+    push_frame(at, 80 * ms);
+    push_flow(at, 1, 40 * ms);
+    EXPECT_EQ(joined(), none);
+  }
+}
+
+TEST_F(FlowJoin, GoesOnAfterTheEndOfFlow) {
+  begin();
+  push_frame(0);
+  push_flow(0, 1);
+  EXPECT_EQ(joined(), 1.F);
+  gst_harness_push_event(flow.get(), gst_event_new_eos());
+  for (const auto pts : {40 * ms, 80 * ms}) {
+    push_frame(pts);
+    EXPECT_EQ(joined(), none);
+  }
+  EXPECT_EQ(text_of_next(GST_MESSAGE_WARNING), "") << "no flow begins with the last frame";
+  gst_harness_push_event(video.get(), gst_event_new_eos());
+  GstBuffer* rest = nullptr;
+  EXPECT_TRUE(gst_harness_pull_until_eos(video.get(), &rest));
+  EXPECT_EQ(rest, nullptr);
+}
+
+TEST_F(FlowJoin, MatchesByRunningTime) {
+  begin();
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = 1000 * ms;
+  gst_harness_push_event(flow.get(), gst_event_new_segment(&segment));
+  push_flow(960 * ms, 1);
+  push_frame(0);
+  push_flow(1000 * ms, 2);
+  EXPECT_EQ(joined(), 2.F);
+}
+
+TEST_F(FlowJoin, PassesFramesWithoutATime) {
+  begin();
+  push_frame(GST_CLOCK_TIME_NONE);
+  push_flow(0, 2);
+  EXPECT_EQ(joined(), none);
+  push_frame(0);
+  EXPECT_EQ(joined(), 2.F);
+}
+
+TEST_F(FlowJoin, NeedsFlowOfTheSizeOfTheVideo) {
+  begin("2:3:4");
+  push_frame(0);
+  push_flow(0, 1);
+  EXPECT_EQ(error(), "The optical flow has the dimensions 2:3:4, and the video needs 2:4:3:1.");
+}
+
+TEST_F(FlowJoin, FollowsChangesOfTheSize) {
+  begin();
+  push_frame(0);
+  push_flow(0, 1);
+  EXPECT_EQ(joined(), 1.F);
+  begin("2:6:2:1", "25/1", "6, height=2");
+  push_frame(40 * ms);
+  push_flow(40 * ms, 2);
+  EXPECT_EQ(joined(), 2.F);
+}
+
+TEST_F(FlowJoin, ReportsTensorsOfTheWrongSize) {
+  begin();
+  push_frame(0);
+  push_flow(0, 1, 40 * ms, 11);
+  EXPECT_EQ(error(),
+            "Cannot read a tensor of optical flow: it has 88 bytes instead of 96. Check the "
+            "element upstream.");
+}
+
+TEST_F(FlowJoin, PassesGapsOn) {
+  begin();
+  push_frame(0);
+  push_flow(0, 1);
+  EXPECT_EQ(joined(), 1.F);
+  gst_harness_push_event(video.get(), gst_event_new_gap(40 * ms, 40 * ms));
+  push_flow(40 * ms, 2);
+  push_flow(80 * ms, 3);
+  push_frame(80 * ms);
+  EXPECT_EQ(joined(), 3.F);
+  EXPECT_TRUE(next_event(video.get(), GST_EVENT_GAP));
+}
+
+TEST_F(FlowJoin, StartsOverAfterAFlush) {
+  begin();
+  push_flow(0, 1);
+  flush({video.get(), flow.get()});
+  for (auto* h : {video.get(), flow.get()}) push_segment(h);
+  push_frame(0);
+  push_flow(0, 2);
+  EXPECT_EQ(joined(), 2.F);
+}
+
+TEST_F(FlowJoin, EndsASegmentOnceBothHave) {
+  begin();
+  push_frame(0);
+  push_flow(0, 1);
+  EXPECT_EQ(joined(), 1.F);
+  end_segment(flow.get());
+  push_frame(40 * ms);
+  EXPECT_EQ(joined(), none);
+  end_segment(video.get());
+  EXPECT_TRUE(next_event(video.get(), GST_EVENT_SEGMENT_DONE));
+}
+
+/// Live video, and flow that never comes.
+TEST(LiveFlowJoin, WaitsNoLongerThanTheLatency) {
+  Pipeline pipeline(
+      "videotestsrc is-live=true num-buffers=10 ! video/x-raw,width=64,height=48,framerate=50/1 ! "
+      "flowjoin name=join ! fakesink name=sink sync=true  appsrc is-live=true format=time "
+      "caps=\"other/tensors, format=static, num_tensors=1, types=float32, dimensions=2:64:48:1, "
+      "framerate=50/1\" ! queue ! join.flow_sink");
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  EXPECT_EQ(pipeline.stat("sink", "rendered"), 10U);
+}
+
+TEST(LiveFlowJoin, SaysThatFlowIsMissing) {
+  Pipeline pipeline(
+      "videotestsrc is-live=true num-buffers=3 ! video/x-raw,width=64,height=48,framerate=50/1 ! "
+      "flowjoin ! fakesink");
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  ASSERT_FALSE(pipeline.warnings.empty());
+  EXPECT_NE(pipeline.warnings[0].find("link a source of tensors"), std::string::npos);
+}
+
+}  // namespace
