@@ -24,27 +24,26 @@ bool RtpSenderTracker::is_of_second_sender(const RtpPacket& packet) const {
          packet.arrival < heard_ + max_silence;
 }
 
-bool RtpSenderTracker::is_late(const RtpPacket& packet) {
-  if (!is_current(packet) || is_next(packet)) return false;
-  const auto number = packet.sequence_number;
-  late_in_a_row_ = number == next_late_ ? late_in_a_row_ + 1 : 1;
-  next_late_ = static_cast<std::uint16_t>(number + 1);
-  if (late_in_a_row_ < max_late_in_a_row) return true;
-  position_.reset();
-  return false;
+bool RtpSenderTracker::is_late(const RtpPacket& packet) const {
+  return is_current(packet) && !is_next(packet) && late_in_a_row(packet) < max_late_in_a_row;
+}
+
+void RtpSenderTracker::drop_late(const RtpPacket& packet) {
+  late_in_a_row_ = late_in_a_row(packet);
+  next_late_ = static_cast<std::uint16_t>(packet.sequence_number + 1);
 }
 
 RtpSenderTracker::Loss RtpSenderTracker::follow(const RtpPacket& packet,
                                                 const RtpPayloadHeader& header) {
   Loss loss;
-  if (is_current(packet)) {
+  if (is_next(packet)) {
     loss.packets =
         static_cast<std::uint16_t>(packet.sequence_number - position_->next_sequence_number);
     const auto events = static_cast<std::int32_t>(header.first_event - position_->next_event);
     // Negative if the sender has restarted.
     loss.events = static_cast<std::uint32_t>(std::max(events, 0));
     loss.is_discontinuous = loss.packets != 0 || events != 0;
-  } else if (position_) {
+  } else if (position_ && !is_current(packet)) {
     change_sender(packet);
   }
   late_in_a_row_ = 0;

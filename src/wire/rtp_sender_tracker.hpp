@@ -34,9 +34,12 @@ class RtpSenderTracker {
   /// Whether a second sender sent the packet, and the first one is not silent.
   bool is_of_second_sender(const RtpPacket& packet) const;
 
-  /// Whether the current sender sent the packet before those that were followed. If so many of
-  /// them come in a row that it must have restarted, they are not late.
-  bool is_late(const RtpPacket& packet);
+  /// Whether the current sender sent the packet before those that were followed. After many of
+  /// them in a row, the sender must have restarted: they are no longer late.
+  bool is_late(const RtpPacket& packet) const;
+
+  /// Counts a late packet.
+  void drop_late(const RtpPacket& packet);
 
   /// Makes the sender of the packet, which is not late, the current one.
   Loss follow(const RtpPacket& packet, const RtpPayloadHeader& header);
@@ -54,6 +57,10 @@ class RtpSenderTracker {
     }
   };
 
+  /// Number of consecutive late packets, with this one.
+  int late_in_a_row(const RtpPacket& packet) const {
+    return packet.sequence_number == next_late_ ? late_in_a_row_ + 1 : 1;
+  }
   void change_sender(const RtpPacket& packet);
 
   std::optional<Position> position_;

@@ -1,7 +1,49 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/wire/rtp_unpacker.hpp"
 
+#include "src/core/byte_order.hpp"
+#include "src/formats/evt/words.hpp"
+
 namespace eventcamera {
+namespace {
+
+/// Appends the events of a packet.
+class Appender {
+ public:
+  Appender(const RtpPayloadHeader& header, std::vector<Event>& events)
+      : events_(events),
+        base_(header.base),
+        latest_(static_cast<std::uint64_t>((header.start + header.duration) / 1000 -
+                                           header.start / 1000)) {}
+
+  /// Appends an event at `t`, relative to the header's base. False if it is earlier than the one
+  /// before, or outside the interval.
+  bool append(std::uint64_t t, std::uint16_t x, std::uint16_t y_p) {
+    t += base_;
+    if (t > latest_ || t < earliest_) return false;
+    earliest_ = t;
+    events_.push_back({static_cast<std::uint32_t>(t), x, y_p});
+    return true;
+  }
+
+ private:
+  std::vector<Event>& events_;
+  std::uint64_t base_;
+  std::uint64_t latest_;
+  std::uint64_t earliest_ = 0;
+};
+
+}  // namespace
+
+RtpUnpacker::RtpUnpacker(SensorSize sensor, RtpEventFormat format) {
+  change(sensor, format);
+}
+
+void RtpUnpacker::change(SensorSize sensor, RtpEventFormat format) {
+  sensor_ = sensor;
+  format_ = format;
+  evt3_ = make_evt3_unit_decoder(sensor);
+}
 
 void RtpUnpacker::reset() {
   sender_ = {};
@@ -12,38 +54,69 @@ void RtpUnpacker::reset() {
 void RtpUnpacker::close_interval() {
   if (interval_) end_ = interval_->start + interval_->duration;
   interval_.reset();
-  events_.clear();
+  events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(event_count_));
+  event_count_ = 0;
   is_discontinuous_ = false;
 }
 
-bool RtpUnpacker::decode(const RtpPacket& packet) {
-  bool is_valid = decoder_.decode(packet.payload);
-  // A late packet precedes the events of its interval.
-  if (is_valid && is_of_interval(packet) && sender_.is_next(packet))
-    is_valid = continues_interval();
-  if (is_valid && sender_.is_of_second_sender(packet)) {
+std::optional<RtpPayloadHeader> RtpUnpacker::decode(const RtpPacket& packet) {
+  events_.resize(event_count_);
+  const auto header = RtpPayloadHeader::read(packet.payload);
+  if (!header || header->format != format_) return std::nullopt;
+  const auto body = packet.payload.subspan(RtpPayloadHeader::size);
+  const bool is_valid =
+      format_ == RtpEventFormat::evt3 ? decode_evt3(*header, body) : decode_xytp(*header, body);
+  if (!is_valid || (is_of_interval(packet, *header) && !continues_interval())) return std::nullopt;
+  if (sender_.is_of_second_sender(packet)) {
     ++statistics_.second_sender_packets;
-    is_valid = false;
+    return std::nullopt;
   }
-  if (!is_valid) count_rejected();
-  return is_valid;
+  return header;
 }
 
-bool RtpUnpacker::continues_interval() const {
-  const auto events = decoder_.events();
-  return events.empty() || events_.empty() ||
-         (events.front().t >= events_.back().t &&
-          events_.size() + events.size() <= max_rtp_interval_events);
+bool RtpUnpacker::decode_evt3(const RtpPayloadHeader& header, std::span<const std::uint8_t> words) {
+  evt3_->restore({});
+  corruption_ = {};
+  words_.events.clear();
+  words_.triggers.clear();
+  Appender appender(header, events_);
+  Batch batch(corruption_);
+  batch.start = words.data();
+  const auto* from = words.data();
+  const auto* const to = from + words.size();
+  while (from != to) {
+    batch.open(words_, static_cast<std::size_t>(to - from));
+    from = evt3_->read(from, to, batch);
+    for (const auto& event : batch.close())
+      if (!appender.append(static_cast<std::uint64_t>(event.t), event.x, event.y_p)) return false;
+  }
+  return corruption_.places == 0 && corruption_.outside == 0 &&
+         events_.size() - event_count_ == header.event_count;
 }
 
-bool RtpUnpacker::is_of_interval(const RtpPacket& packet) const {
-  const auto& header = decoder_.header();
-  return interval_ && sender_.is_current(packet) && header.start == interval_->start &&
+bool RtpUnpacker::decode_xytp(const RtpPayloadHeader& header, std::span<const std::uint8_t> bytes) {
+  Appender appender(header, events_);
+  for (std::size_t i = 0; i < bytes.size(); i += sizeof(Event)) {
+    const auto event = little_endian<Event>(bytes.data() + i);
+    if (event.x >= sensor_.width || event.y() >= sensor_.height ||
+        !appender.append(event.t, event.x, event.y_p))
+      return false;
+  }
+  return true;
+}
+
+bool RtpUnpacker::is_of_interval(const RtpPacket& packet, const RtpPayloadHeader& header) const {
+  return interval_ && sender_.is_next(packet) && header.start == interval_->start &&
          header.duration == interval_->duration;
 }
 
-void RtpUnpacker::add(const RtpPacket& packet) {
-  const auto& header = decoder_.header();
+bool RtpUnpacker::continues_interval() const {
+  return event_count_ == 0 || events_.size() == event_count_ ||
+         (events_[event_count_].t >= events_[event_count_ - 1].t &&
+          events_.size() <= max_rtp_interval_events);
+}
+
+void RtpUnpacker::add(const RtpPacket& packet, const RtpPayloadHeader& header) {
   const auto loss = sender_.follow(packet, header);
   is_discontinuous_ |= loss.is_discontinuous;
   if (!interval_) {
@@ -51,7 +124,7 @@ void RtpUnpacker::add(const RtpPacket& packet) {
     interval_ = header;
     arrival_ = packet.arrival;
   }
-  events_.insert(events_.end(), decoder_.events().begin(), decoder_.events().end());
+  event_count_ = events_.size();
   ++statistics_.packets;
   statistics_.bytes += packet.payload.size();
   statistics_.events += header.event_count;

@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "src/core/event.hpp"
 #include "src/core/sensor_size.hpp"
+#include "src/formats/corruption.hpp"
+#include "src/formats/unit_decoder.hpp"
 #include "src/wire/rtp_packet.hpp"
 #include "src/wire/rtp_payload.hpp"
-#include "src/wire/rtp_payload_decoder.hpp"
 #include "src/wire/rtp_sender_tracker.hpp"
 
 namespace eventcamera {
 
-/// An interval, with those of its events that arrived.
+/// An interval, with the events that arrived.
 struct RtpInterval {
   Nanoseconds start;
   Nanoseconds duration;
@@ -37,73 +40,70 @@ struct RtpStatistics {
   std::uint64_t second_sender_packets = 0;  ///< of these, only the sender is wrong
 };
 
-/// Joins the packets of each interval. Drops packets that are not valid in every detail, those of a
-/// second sender, and those that are late, so that every interval and event is in the sender's
-/// order.
+/// Joins the packets of each interval. Drops packets that are invalid, late, or of a second sender,
+/// so every interval and event is in the sender's order.
 class RtpUnpacker {
  public:
-  RtpUnpacker(SensorSize sensor, RtpEventFormat format) : decoder_(sensor, format) {}
+  RtpUnpacker(SensorSize sensor, RtpEventFormat format);
 
   /// Changes the sensor or format; call flush() first.
-  void change(SensorSize sensor, RtpEventFormat format) {
-    decoder_ = RtpPayloadDecoder(sensor, format);
-  }
+  void change(SensorSize sensor, RtpEventFormat format);
 
-  /// Decodes a packet, and appends it if it is valid.
+  /// Appends a packet, unless it is invalid or late. Calls take(RtpInterval) for each interval that
+  /// ends with this packet or ended before it. The events are valid during the call only.
   template <class Take>
   void push(const RtpPacket& packet, const Take& take) {
-    if (decode(packet)) append(packet, take);
-  }
-
-  /// Decodes the events of a packet. False if it is not valid in every detail: it is counted as
-  /// rejected, and changes nothing else.
-  bool decode(const RtpPacket& packet);
-
-  /// Appends the packet that was decoded last, unless it is late. Calls take(RtpInterval) for each
-  /// interval that ends with this packet or ended before it. The events are valid during the call
-  /// only.
-  template <class Take>
-  void append(const RtpPacket& packet, const Take& take) {
-    if (sender_.is_late(packet)) {
-      count_late();
-      return;
+    const auto header = decode(packet);
+    if (!header) {
+      ++statistics_.rejected_packets;
+    } else if (sender_.is_late(packet)) {
+      sender_.drop_late(packet);
+      ++statistics_.late_packets;
+    } else {
+      if (!is_of_interval(packet, *header)) flush(take);
+      add(packet, *header);
+      if (packet.marker) flush(take);
     }
-    if (!is_of_interval(packet)) flush(take);
-    add(packet);
-    if (packet.marker) flush(take);
   }
 
   /// Ends the current interval, if any.
   template <class Take>
   void flush(const Take& take) {
     if (!interval_) return;
-    take(RtpInterval{interval_->start, interval_->duration, events_, arrival_, is_discontinuous_});
+    take(RtpInterval{interval_->start, interval_->duration, std::span(events_).first(event_count_),
+                     arrival_, is_discontinuous_});
     close_interval();
   }
 
   /// Forgets the stream; the next packet starts a new one. Statistics continue.
   void reset();
 
-  /// Counts a packet that was dropped before decode(): not RTP.
-  void count_rejected() { ++statistics_.rejected_packets; }
-  /// Counts a packet that was dropped before append(): late.
-  void count_late() { ++statistics_.late_packets; }
-
   const RtpStatistics& statistics() const { return statistics_; }
 
  private:
-  /// Whether the decoded packet belongs to the current interval.
-  bool is_of_interval(const RtpPacket& packet) const;
-  /// Whether the decoded events may follow those of the current interval.
+  /// Decodes the events of a packet past the end of the current interval's. Nothing, and no other
+  /// change, if the packet is not valid in every detail.
+  std::optional<RtpPayloadHeader> decode(const RtpPacket& packet);
+  bool decode_evt3(const RtpPayloadHeader& header, std::span<const std::uint8_t> words);
+  bool decode_xytp(const RtpPayloadHeader& header, std::span<const std::uint8_t> bytes);
+  /// Whether a packet is the next one of the current interval.
+  bool is_of_interval(const RtpPacket& packet, const RtpPayloadHeader& header) const;
+  /// Whether the decoded events may follow the current interval's.
   bool continues_interval() const;
   /// Adds the decoded events to the interval.
-  void add(const RtpPacket& packet);
+  void add(const RtpPacket& packet, const RtpPayloadHeader& header);
   void close_interval();
 
-  RtpPayloadDecoder decoder_;
+  SensorSize sensor_;
+  RtpEventFormat format_;
+  std::unique_ptr<UnitDecoder> evt3_;
+  Corruption corruption_;
+  Decoded words_;  ///< events of EVT3 words, with their times
+
   RtpSenderTracker sender_;
   std::optional<RtpPayloadHeader> interval_;  ///< header of the current interval's first packet
-  std::vector<Event> events_;                 ///< of the current interval
+  std::vector<Event> events_;                 ///< of the current interval and the last packet
+  std::size_t event_count_ = 0;               ///< events of the current interval
   std::uint64_t arrival_ = 0;                 ///< of the current interval
   Nanoseconds end_ = 0;                       ///< of the last interval
   bool is_discontinuous_ = true;

@@ -266,22 +266,6 @@ TEST_P(EveryFormat, AFloodOfRandomPacketsDisturbsNothing) {
   EXPECT_EQ(statistics.lost_events, 0U);
 }
 
-TEST_P(EveryFormat, DecodingAloneChangesNothing) {
-  const auto intervals = random_intervals(davis, 20, 10);
-  RtpPacker packer(davis, GetParam());
-  const auto packets = packets_of(intervals, packer, 536, 7);
-  Receiver receiver(davis, GetParam());
-  for (const auto& packet : packets) {
-    // Dropped: a duplicate that its receiver finds late, and one of another sender.
-    EXPECT_TRUE(receiver.unpacker.decode(packets.front().view()));
-    EXPECT_TRUE(receiver.unpacker.decode(packets.back().view(2)));
-    receiver.push(packet);
-  }
-  EXPECT_EQ(receiver.intervals, intervals);
-  EXPECT_EQ(receiver.discontinuities, 1);
-  EXPECT_EQ(receiver.unpacker.statistics().packets, packets.size());
-}
-
 TEST_P(EveryFormat, RejectsTruncatedPacketsUnlessTheyAreWhole) {
   const auto intervals = random_intervals(davis, 4, 9);
   RtpPacker packer(davis, GetParam());

@@ -14,8 +14,9 @@
  * mapping drifts by more than 5 ms, and when the sender restarts. Event times never change, so
  * recordings of several receivers agree.
  *
- * After a loss, the buffer with the remaining events, or else the next one, is flagged DISCONT. An
- * invalid packet is dropped as a whole.
+ * After a loss, the buffer with the remaining events, or else the next one, is flagged DISCONT; so
+ * is the one after a dropped packet whose number or SSRC was unexpected. An invalid packet is
+ * dropped as a whole. `max-reorder` is 0, so that this element counts late packets.
  *
  * A new SSRC is followed at once: the sender restarted. If packets of the SSRC before it still
  * arrive, there are two senders: the new one is rejected, with a warning, until the other has been
@@ -41,7 +42,6 @@
 #include <gst/rtp/gstrtpbasedepayload.h>
 #include <gst/rtp/gstrtpbuffer.h>
 
-#include <array>
 #include <charconv>
 #include <exception>
 #include <optional>
@@ -102,8 +102,6 @@ struct Private {
   // Accessed by the streaming thread only, or while there is none.
   std::optional<State> state;
   guint32 segment_seqnum = gst_util_seqnum_next();  ///< of upstream
-  GstPadChainFunction chain = nullptr;              ///< of the base class
-  bool was_processed = false;                       ///< the base class passed on the last packet
   WarnOnce warn_of_second_sender{GST_CAT_DEFAULT};
   WarnOnce warn_of_rejected{GST_CAT_DEFAULT};
   RepeatLevel late_level;
@@ -219,40 +217,6 @@ static RtpPacket packet_of(GstRTPBuffer* rtp) {
   };
 }
 
-/// Sequence number of an RTP packet.
-static guint number_of(GstBuffer* packet) {
-  std::array<guint8, 2> bytes = {};
-  gst_buffer_extract(packet, 2, bytes.data(), bytes.size());
-  return GST_READ_UINT16_BE(bytes.data());
-}
-
-/// Decodes a packet. Those that are not valid must not reach the base class, which would follow
-/// their sequence numbers.
-static bool decode(GstRtpEventDepay* self, GstBuffer* buffer) {
-  auto& unpacker = self->priv->state->unpacker;
-  bool is_valid = false;
-  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
-  if (gst_rtp_buffer_map(buffer, GST_MAP_READ, &rtp)) {
-    is_valid = catch_exceptions(self, no_memory, [&] { return unpacker.decode(packet_of(&rtp)); });
-    gst_rtp_buffer_unmap(&rtp);
-  } else {
-    unpacker.count_rejected();
-  }
-  return is_valid;
-}
-
-/// Appends the decoded packet, which the base class found not to be late.
-static GstBuffer* process(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
-  auto* self = GST_RTP_EVENT_DEPAY(depayload);
-  auto& priv = *self->priv;
-  priv.was_processed = true;
-  catch_exceptions(self, no_memory, [&] {
-    priv.state->unpacker.append(packet_of(rtp),
-                                [&](const RtpInterval& interval) { push(self, interval); });
-  });
-  return nullptr;
-}
-
 /// Publishes the statistics after packet `number`, and logs how it changed them.
 static void update_statistics(GstRtpEventDepay* self, guint number) {
   auto& priv = *self->priv;
@@ -268,35 +232,15 @@ static void update_statistics(GstRtpEventDepay* self, guint number) {
   if (counted.late_packets > before.late_packets) log_late(self, number);
 }
 
-/// Gives a valid packet to the base class, which drops it if it is late. Those are counted here.
-static GstFlowReturn chain(GstPad* pad, GstObject* parent, GstBuffer* buffer) {
-  auto* self = GST_RTP_EVENT_DEPAY(parent);
-  auto& priv = *self->priv;
-  if (!priv.state) return priv.chain(pad, parent, buffer);  // which refuses it
-  // In GStreamer 1.22 and 1.24, GstRTPBaseDepayload marks a packet after a gap as DISCONT
-  // by gst_buffer_make_writable(), which replaces a packet that has other owners, and then unmaps
-  // the packet that it no longer owns. When those owners release it meanwhile, it unmaps what was
-  // freed ("gst_buffer_unmap: assertion 'GST_IS_BUFFER (buffer)' failed"), and leaks its memory.
-  // So this is one more owner.
-  const OwnedBuffer packet(buffer);
-  const guint number = number_of(buffer);
-  GstFlowReturn flow = GST_FLOW_OK;
-  if (decode(self, buffer)) {
-    priv.was_processed = false;
-    flow = priv.chain(pad, parent, gst_buffer_ref(buffer));
-    if (flow == GST_FLOW_OK && !priv.was_processed) priv.state->unpacker.count_late();
-  }
-  update_statistics(self, number);
-  return flow;
-}
-
-/// Gives packets one by one, to know which of them are late.
-static GstFlowReturn chain_list(GstPad* pad, GstObject* parent, GstBufferList* list) {
-  GstFlowReturn flow = GST_FLOW_OK;
-  for (guint i = 0; i < gst_buffer_list_length(list) && flow == GST_FLOW_OK; ++i)
-    flow = chain(pad, parent, gst_buffer_ref(gst_buffer_list_get(list, i)));
-  gst_buffer_list_unref(list);
-  return flow;
+static GstBuffer* process_packet(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
+  auto* self = GST_RTP_EVENT_DEPAY(depayload);
+  const auto packet = packet_of(rtp);
+  auto& unpacker = self->priv->state->unpacker;
+  catch_exceptions(self, no_memory, [&] {
+    unpacker.push(packet, [&](const RtpInterval& interval) { push(self, interval); });
+  });
+  update_statistics(self, packet.sequence_number);
+  return nullptr;
 }
 
 static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
@@ -433,10 +377,8 @@ static void finalize(GObject* object) {
 
 static void gst_rtp_event_depay_init(GstRtpEventDepay* self) {
   self->priv = new Private;
-  GstPad* sink = GST_RTP_BASE_DEPAYLOAD_SINKPAD(self);
-  self->priv->chain = GST_PAD_CHAINFUNC(sink);
-  gst_pad_set_chain_function(sink, chain);
-  gst_pad_set_chain_list_function(sink, chain_list);
+  // The base class would drop late packets uncounted, and those after an invalid number ahead.
+  g_object_set(self, "max-reorder", 0, nullptr);
 }
 
 static void gst_rtp_event_depay_class_init(GstRtpEventDepayClass* klass) {
@@ -453,7 +395,7 @@ static void gst_rtp_event_depay_class_init(GstRtpEventDepayClass* klass) {
 
   GstRTPBaseDepayloadClass* depayload_class = GST_RTP_BASE_DEPAYLOAD_CLASS(klass);
   depayload_class->set_caps = set_caps;
-  depayload_class->process_rtp_packet = process;
+  depayload_class->process_rtp_packet = process_packet;
   depayload_class->handle_event = handle_event;
   depayload_class->packet_lost = packet_lost;
 }
