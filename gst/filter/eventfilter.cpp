@@ -2,16 +2,17 @@
 #include "gst/filter/eventfilter.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 #include <string>
 
+#include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/event_faults.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
-#include "gst/filter/buffer_events.hpp"
 #include "src/filter/valid_events.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_filter_debug);
@@ -117,6 +118,19 @@ static Microseconds continued(gpointer self, LabelledEvents events, Microseconds
   return start + delay;
 }
 
+/// Copies the memory of a writable buffer if its address is not aligned for events. Throws
+/// std::bad_alloc.
+static void align_events(GstBuffer* buffer) {
+  OwnedBuffer copy;
+  {
+    const WritableBytes mapped(buffer, GST_MAP_READWRITE);
+    const auto address = reinterpret_cast<std::uintptr_t>(mapped.get().data());
+    if (address % alignof(eventcamera::Event) == 0) return;
+    copy.reset(copied_buffer(mapped.get()));
+  }
+  gst_buffer_replace_all_memory(buffer, gst_buffer_get_memory(copy.get(), 0));
+}
+
 static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer) {
   auto& priv = priv_of(transform);
   if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
@@ -126,8 +140,9 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
     return reject(transform, EventFault::partial_event, buffer);
 
   return reported(transform, [&] {
-    BufferEvents mapped(buffer);
-    const auto all = mapped.events();
+    align_events(buffer);
+    std::optional<WritableBytes> mapped(std::in_place, buffer, GST_MAP_READWRITE);
+    const LabelledEvents all{mapped->events(), labels_of(buffer)};
     const auto max_t = GST_BUFFER_DURATION_IS_VALID(buffer)
                            ? (interval->end - interval->start) / GST_USECOND
                            : GstClockTime{G_MAXUINT32};
@@ -137,7 +152,8 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
         invalid);
     const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
     const auto kept = priv.impl->filter(valid, continued(transform, valid, start));
-    mapped.keep(kept.events.size());
+    mapped.reset();
+    truncate_events(buffer, kept.events.size());
 
     const auto received = all.events.size();
     const auto passed = kept.events.size();

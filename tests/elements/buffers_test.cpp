@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Origin and memory of the buffers of intervals.
+#include <new>
 #include <set>
 #include <tuple>
 
+#include "gst/base/buffer_bytes.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -63,6 +65,27 @@ gsize room_of(const Buffer& buffer) {
 
 constexpr const char* large_video =
     "video/x-raw, format=GRAY8, width=1000, height=1000, framerate=25/1";
+
+/// A buffer that returns to its pool must not be mapped.
+TEST(WritableBytes, AreUnmappedByAnException) {
+  gst_init(nullptr, nullptr);
+  const Buffer buffer(gst_buffer_new_allocate(nullptr, 16, nullptr));
+  // Unlike gst_buffer_map(), this does not map a copy instead.
+  const auto can_be_read = [memory = gst_buffer_peek_memory(buffer.get(), 0)] {
+    GstMapInfo map;
+    if (!gst_memory_map(memory, &map, GST_MAP_READ)) return false;
+    gst_memory_unmap(memory, &map);
+    return true;
+  };
+  try {
+    const WritableBytes mapped(buffer.get());
+    EXPECT_EQ(mapped.events().size(), 2U);
+    EXPECT_FALSE(can_be_read());
+    throw std::bad_alloc();
+  } catch (const std::bad_alloc&) {
+    EXPECT_TRUE(can_be_read());
+  }
+}
 
 TEST(EventBuffers, AreAsLongAsTheirEvents) {
   Harness h("eventsim-frame");

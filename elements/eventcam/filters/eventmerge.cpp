@@ -46,6 +46,7 @@
 #include "elements/eventcam/filters/merged_timeline.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/authors.hpp"
+#include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
@@ -296,13 +297,12 @@ GstFlowReturn EventMerge::push_interval(const MergedInterval& interval,
   OwnedBuffer buffer;
   const GstFlowReturn result = buffers_.acquire(size, buffer);
   if (result != GST_FLOW_OK) return result;
-  LabelledEvents events;
-  if (interval.labelled) events.labels = add_labels(buffer.get(), interval.events);
-  GstMapInfo map;
-  if (!gst_buffer_map(buffer.get(), &map, GST_MAP_WRITE)) throw std::bad_alloc();
-  events.events = {reinterpret_cast<eventcamera::Event*>(map.data), interval.events};
-  EventMerger::merge(inputs, interval, events);
-  gst_buffer_unmap(buffer.get(), &map);
+  {
+    const WritableBytes mapped(buffer.get());
+    LabelledEvents events{.events = mapped.events(), .labels = {}};
+    if (interval.labelled) events.labels = add_labels(buffer.get(), interval.events);
+    EventMerger::merge(inputs, interval, events);
+  }
   GST_BUFFER_PTS(buffer.get()) = start;
   GST_BUFFER_DURATION(buffer.get()) = duration;
   if (std::exchange(discontinuous_, false))

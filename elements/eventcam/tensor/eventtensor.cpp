@@ -64,6 +64,7 @@
 #include "elements/eventcam/tensor/tensor_meta.hpp"
 #include "elements/eventcam/tensor/tensor_properties.hpp"
 #include "gst/base/authors.hpp"
+#include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
@@ -155,11 +156,8 @@ static GstFlowReturn push_tensor(GstEventTensor* self, const WindowQueue::Window
   const GstFlowReturn result = priv.buffers.acquire(tensor.bytes(), buffer);
   if (result != GST_FLOW_OK) return result;
   GstBuffer* const acquired = buffer.get();
-  GstMapInfo map;
-  if (gst_buffer_map(acquired, &map, GST_MAP_WRITE) == FALSE) throw std::bad_alloc();
   tensor.write(window.events, window.end / static_cast<Nanoseconds>(GST_USECOND),
-               reinterpret_cast<std::byte*>(map.data));
-  gst_buffer_unmap(acquired, &map);
+               WritableBytes(acquired).get().data());
   GST_BUFFER_PTS(acquired) = static_cast<GstClockTime>(window.start);
   GST_BUFFER_DTS(acquired) = GST_CLOCK_TIME_NONE;
   GST_BUFFER_DURATION(acquired) = static_cast<GstClockTime>(window.end - window.start);
