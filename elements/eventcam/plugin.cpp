@@ -45,10 +45,9 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
   X(eventlabel) X(eventrefractory) X(eventtensor) X(eventtrail) X(flowjoin)                \
   X(eventdatagramdepay) X(eventdatagrampay)                                                \
   X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc) X(evtparse) X(rtpeventdepay) X(rtpeventpay)
-#define TYPE_FINDERS(X)                                                                    \
-  X(aedat) X(atisbin) X(eventcsv) X(eventstream) X(hdf5) X(mcap) X(npy) X(npz) X(propheseedat)        \
-  X(propheseeraw) X(rosbag) X(rosbag2)
 // clang-format on
+
+#define TYPE_FINDERS(X) X(event_files)
 
 EVENTSIM_PLUGIN(eventcam,
                 "Event streams: read, write, filter, merge, draw, measure and send events",

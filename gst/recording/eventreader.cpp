@@ -5,6 +5,7 @@
 #include "gst/base/pads.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
+#include "gst/recording/file_extensions.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/reader/event_reader.hpp"
 
@@ -101,6 +102,7 @@ static void format_class_init(gpointer klass, gpointer data) {
                      GST_PAD_SOMETIMES);
   gst_element_class_set_static_metadata(element_class, format.long_name, "Codec/Demuxer",
                                         format.description, EVENTSIM_AUTHORS);
+  set_input_extensions(element_class, format.caps);
   if (format.add_properties != nullptr) {
     FormatProperties properties(G_OBJECT_CLASS(klass));
     format.add_properties(properties);

@@ -18,6 +18,7 @@
 #include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
+#include "gst/recording/file_extensions.hpp"
 #include "gst/recording/sensor_events.hpp"
 #include "gst/recording/stream_header.hpp"
 #include "gst/recording/writable_events.hpp"
@@ -585,6 +586,7 @@ static void format_class_init(gpointer klass, gpointer data) {
   add_pad_template(element_class, "src", GST_PAD_SRC, format.caps);
   gst_element_class_set_static_metadata(element_class, format.long_name, "Codec/Encoder",
                                         format.description, EVENTSIM_AUTHORS);
+  set_output_extensions(element_class, format.caps);
 }
 
 GType event_writer_type(const EventWriterFormat& format) {

@@ -16,7 +16,7 @@
 
 // Guide to this folder: from the bytes of a file to intervals of events, and back.
 //
-// recognition.cpp               which format a file has, from its first bytes
+// file_formats.cpp              the table of formats, and which one a file has
 // decoder.hpp                   bytes of one event format -> events and triggers (Decoded)
 //   unit_stream_decoder.cpp       a header and units of a few bytes, which a UnitDecoder reads:
 //                                 evt/, dat/, es/; time_base.hpp unwraps their times

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "src/formats/recognition.hpp"
+#include "tests/formats/recognise.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {
@@ -82,21 +82,21 @@ Bytes some_file() {
 
 TEST(AtisBin, IsRecognisedByTheOrderOfItsTimes) {
   const auto file = some_file();
-  EXPECT_EQ(recognise(file), (Recognised{FileKind::atis_bin, 0, false}));
-  EXPECT_FALSE(recognise(std::span(file).first(500))) << "too few events";
+  EXPECT_EQ(recognise(file), (Recognised{"application/x-atis-bin", Likelihood::high}));
+  EXPECT_EQ(recognise(std::span(file).first(500)), Recognised{}) << "too few events";
 
   auto shifted = file;
   shifted.erase(shifted.begin());
-  EXPECT_FALSE(recognise(shifted));
-  EXPECT_FALSE(recognise(Bytes(5000)));
+  EXPECT_EQ(recognise(shifted), Recognised{});
+  EXPECT_EQ(recognise(Bytes(5000)), Recognised{});
   recordings::Random random(1);
   for (int i = 0; i < 200; ++i) {
     Bytes noise(5000);
     for (auto& byte : noise) byte = static_cast<std::uint8_t>(random());
-    EXPECT_FALSE(recognise(noise));
+    EXPECT_EQ(recognise(noise), Recognised{});
     for (std::size_t at = 0; at < noise.size(); ++at)
       noise[at] = static_cast<std::uint8_t>(at / static_cast<std::size_t>(1 + i % 7));
-    EXPECT_FALSE(recognise(noise));
+    EXPECT_EQ(recognise(noise), Recognised{});
   }
 }
 

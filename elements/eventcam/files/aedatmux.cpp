@@ -51,6 +51,7 @@
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
+#include "gst/recording/file_extensions.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/stream_header.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
@@ -535,6 +536,7 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
   gst_element_class_set_static_metadata(element_class, "AEDAT 4 muxer", "Codec/Muxer",
                                         "Writes events and frames into AEDAT 4 files",
                                         EVENTSIM_AUTHORS);
+  set_output_extensions(element_class, "application/x-aedat");
 
   GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
   aggregator_class->aggregate = aggregate;

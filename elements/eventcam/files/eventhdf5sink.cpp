@@ -35,6 +35,7 @@
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
+#include "gst/recording/file_extensions.hpp"
 #include "gst/recording/sensor_events.hpp"
 #include "gst/recording/writable_events.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
@@ -303,6 +304,7 @@ static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
   gst_element_class_set_static_metadata(element_class, "HDF5 file sink", "Sink/File",
                                         "Writes events as HDF5: DSEC or Metavision",
                                         EVENTSIM_AUTHORS);
+  set_output_extensions(element_class, "application/x-hdf5");
   element_class->change_state = change_state;
 
   GstBaseSinkClass* sink_class = GST_BASE_SINK_CLASS(klass);

@@ -2,12 +2,15 @@
 #include <gst/gst.h>
 
 #include <algorithm>
+#include <span>
 
-#include "src/formats/recognition.hpp"
+#include "gst/base/owned.hpp"
+#include "src/formats/file_formats.hpp"
 
-using eventcamera::FileKind;
+using eventcamera::FileFormat;
+using eventcamera::Likelihood;
 
-/// Peeks at the part at the start of the file that recognise() examines.
+/// Peeks at the part at the start of the file that likelihood() examines.
 static std::span<const guint8> first_bytes(GstTypeFind* find) {
   constexpr guint64 max_bytes = eventcamera::max_recognised_bytes;
   const guint64 length = gst_type_find_get_length(find);
@@ -21,35 +24,43 @@ static std::span<const guint8> first_bytes(GstTypeFind* find) {
   return bytes;
 }
 
-template <FileKind kind>
-static void find_kind(GstTypeFind* find, gpointer media_type) {
-  const auto found = eventcamera::recognise(first_bytes(find), kind);
-  if (!found || found->kind != kind) return;
-  const auto probability = found->certain ? GST_TYPE_FIND_MAXIMUM : GST_TYPE_FIND_NEARLY_CERTAIN;
-  const auto* const name = static_cast<const char*>(media_type);
-  if (kind == FileKind::aedat)
-    gst_type_find_suggest_simple(find, probability, name, "version", G_TYPE_INT, found->version,
-                                 nullptr);
-  else
-    gst_type_find_suggest_empty_simple(find, probability, name);
+static guint probability(Likelihood likelihood) {
+  switch (likelihood) {
+    case Likelihood::none:
+      return GST_TYPE_FIND_NONE;
+    case Likelihood::possible:
+      return GST_TYPE_FIND_NEARLY_CERTAIN - 1;
+    case Likelihood::high:
+      return GST_TYPE_FIND_NEARLY_CERTAIN;
+    case Likelihood::certain:
+      return GST_TYPE_FIND_MAXIMUM;
+  }
+  return GST_TYPE_FIND_NONE;
 }
 
-/// Registers a typefinder that suggests caps of `media_type`.
-#define REGISTER(name, kind, media_type, extensions, rank)                                     \
-  GST_TYPE_FIND_REGISTER_DEFINE(name, media_type, rank, find_kind<FileKind::kind>, extensions, \
-                                nullptr, const_cast<char*>(media_type), nullptr)
+static void find_format(GstTypeFind* find, gpointer data) {
+  const auto& format = *static_cast<const FileFormat*>(data);
+  const auto bytes = first_bytes(find);
+  const auto found = probability(likelihood(format, bytes));
+  if (found == GST_TYPE_FIND_NONE) return;
+  if (format.version != nullptr)
+    gst_type_find_suggest_simple(find, found, format.media_type, "version", G_TYPE_INT,
+                                 format.version(bytes), nullptr);
+  else
+    gst_type_find_suggest_empty_simple(find, found, format.media_type);
+}
 
-REGISTER(aedat, aedat, "application/x-aedat", "aedat,aedat4", GST_RANK_PRIMARY)
-// Without the extension .bin: it would do where the content does not.
-REGISTER(atisbin, atis_bin, "application/x-atis-bin", nullptr, GST_RANK_SECONDARY)
-REGISTER(eventcsv, csv, "application/x-event-csv", "csv,txt",
-         GST_RANK_SECONDARY)  // after formats with a signature
-REGISTER(eventstream, event_stream, "application/x-es", "es", GST_RANK_PRIMARY)
-REGISTER(hdf5, hdf5, "application/x-hdf5", "h5,hdf5", GST_RANK_PRIMARY)
-REGISTER(mcap, mcap, "application/x-mcap", "mcap", GST_RANK_PRIMARY)
-REGISTER(npy, npy, "application/x-npy", "npy", GST_RANK_PRIMARY)
-REGISTER(npz, npz, "application/x-npz", "npz", GST_RANK_PRIMARY)
-REGISTER(propheseedat, prophesee_dat, "application/x-prophesee-dat", "dat", GST_RANK_PRIMARY)
-REGISTER(propheseeraw, prophesee_raw, "application/x-prophesee-raw", "raw", GST_RANK_PRIMARY)
-REGISTER(rosbag, rosbag, "application/x-rosbag", "bag", GST_RANK_PRIMARY)
-REGISTER(rosbag2, rosbag2_db3, "application/x-rosbag2-db3", "db3", GST_RANK_PRIMARY)
+/// Registers a typefinder for each format, named after its media type.
+static gboolean register_typefinders(GstPlugin* plugin) {
+  gboolean registered = FALSE;
+  for (const auto& format : eventcamera::file_formats()) {
+    const OwnedCaps caps(gst_caps_new_empty_simple(format.media_type));
+    registered |= gst_type_find_register(
+        plugin, format.media_type, format.has_signature ? GST_RANK_PRIMARY : GST_RANK_SECONDARY,
+        find_format, format.has_signature ? format.extensions : nullptr, caps.get(),
+        const_cast<FileFormat*>(&format), nullptr);
+  }
+  return registered;
+}
+
+GST_TYPE_FIND_REGISTER_DEFINE_CUSTOM(event_files, register_typefinders)
