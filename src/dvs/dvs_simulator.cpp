@@ -2,11 +2,8 @@
 #include "src/dvs/dvs_simulator.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -23,7 +20,6 @@
 #include "src/dvs/readout.hpp"
 #include "src/dvs/row_filter.hpp"
 #include "src/dvs/row_solver.hpp"
-#include "src/dvs/state_bytes.hpp"
 #include "src/simulate/difference.hpp"
 #include "src/simulate/frame_flow.hpp"
 
@@ -42,28 +38,6 @@ bool have_same_response(const DvsSettings& a, const DvsSettings& b) {
   return a.linear_light == b.linear_light && a.exposure_compensation == b.exposure_compensation &&
          a.response == b.response && a.log_eps == b.log_eps &&
          a.overexposed_light == b.overexposed_light;
-}
-
-/// A state begins with this; the last character is the version of its format.
-constexpr std::array<char, 8> state_magic{'D', 'V', 'S', 'S', 'T', 'A', 'T', '3'};
-
-/// Hash of all settings. Does not compile unless it lists each of them.
-std::uint64_t hash_of(const DvsSettings& settings) {
-  const auto& [denoise, linear_light, exposure_compensation, response, log_eps, overexposed_light,
-               upsampling, max_interpolated_frames, cutoff_frequency, dark_light,
-               positive_threshold, negative_threshold, threshold_sigma, threshold_jitter, leak_rate,
-               leak_spread, shot_noise_rate, hot_pixels, dead_pixels, adaptation, adaptation_time,
-               refractory_period, refractory_reset, exposure_pulse, exposure_lead, pixel_latency,
-               pixel_latency_jitter, max_rate, seed] = settings;
-  StateWriter writer;
-  const auto add = [&](const auto&... values) { (writer.value(values, is_anything), ...); };
-  add(denoise, linear_light, exposure_compensation, response, log_eps, overexposed_light,
-      upsampling, max_interpolated_frames, cutoff_frequency, dark_light, positive_threshold,
-      negative_threshold, threshold_sigma, threshold_jitter, leak_rate, leak_spread,
-      shot_noise_rate, hot_pixels, dead_pixels, adaptation, adaptation_time, refractory_period,
-      refractory_reset, exposure_pulse, exposure_lead, pixel_latency, pixel_latency_jitter,
-      max_rate, seed);
-  return checksum_of(writer.finish());
 }
 
 /// Limit of the gain since the first frame, in case many estimates err in the same direction.
@@ -92,66 +66,7 @@ class PixelSimulator final : public DvsSimulator {
  public:
   explicit PixelSimulator(const LumaFormat& format) : DvsSimulator(format) {}
 
-  std::vector<std::uint8_t> state() override {
-    StateWriter writer;
-    serialize_origin(writer, current_);
-    serialize(writer);
-    return writer.finish();
-  }
-
-  void restore(std::span<const std::uint8_t> state) override {
-    last_time_.reset();
-    StateReader reader(state);
-    serialize_origin(reader, settings_);
-    adopt(settings_, true);
-    serialize(reader);
-    reader.finish();
-    responses_ = responses_to_luma(current_);
-    frame_flow_.forget();
-  }
-
  private:
-  /// Writes what a state belongs to, or reads it and throws if it is something else.
-  template <class Archive>
-  void serialize_origin(Archive& archive, const DvsSettings& settings) const {
-    const auto expect = [&](auto expected, const char* fault) {
-      auto value = expected;
-      archive.value(value, is_anything);
-      if (value != expected) throw std::runtime_error(fault);
-    };
-    expect(state_magic, "it is not a state that this version writes");
-    expect(format().width, "its frames have another width");
-    expect(format().height, "its frames have another height");
-    expect(format().bits, "its frames have another bit depth");
-    expect(hash_of(settings), "it is of other properties");
-  }
-
-  /// Writes or reads everything else. What is derived from settings, gain and frames is not in a
-  /// state.
-  template <class Archive>
-  void serialize(Archive& archive) {
-    Nanoseconds time = last_time_.value_or(0);
-    archive.value(time, is_within<Nanoseconds>(0, std::numeric_limits<Nanoseconds>::max()));
-    plans_.serialize(archive);
-    archive.value(clock_, is_within(0.0, max_state_clock));
-    archive.value(gain_, is_within(1 / max_total_gain, max_total_gain));
-    std::uint8_t is_narrow = is_narrow_ ? 1 : 0;
-    archive.value(is_narrow, is_within<std::uint8_t>(0, 1));
-    if constexpr (Archive::is_reading) is_narrow_ = is_narrow == 1;
-    archive.image(last_, is_anything);
-    pulse_.serialize(archive);
-    pixels_.serialize(archive);
-    fired_.serialize(archive, format().width, format().height);
-    std::uint8_t has_readout = readout_ ? 1 : 0;
-    archive.value(has_readout, is_within<std::uint8_t>(0, 1));
-    if constexpr (Archive::is_reading) {
-      readout_.reset();
-      if (has_readout == 1) readout_.emplace(format().width, format().height);
-      last_time_ = time;
-    }
-    if (readout_) readout_->serialize(archive);
-  }
-
   bool needs_flow() const override { return settings_.upsampling == Upsampling::motion; }
 
   void start(const LumaView& frame) override {

@@ -8,7 +8,6 @@
 #include "src/core/event_buckets.hpp"
 #include "src/core/label.hpp"
 #include "src/core/thread_pool.hpp"
-#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -38,22 +37,6 @@ class IntervalEvents {
 
   /// Drops the deferred events.
   void reset() { deferred_.clear(); }
-
-  /// Writes the deferred events of a sensor of this size to a StateWriter, or reads them from a
-  /// StateReader.
-  template <class Archive>
-  void serialize(Archive& archive, int width, int height) {
-    deferred_.resize(static_cast<std::size_t>(band_count(height)));
-    for (int band = 0; band < band_count(height); ++band) {
-      const BandRows rows(band, height);
-      auto& deferred = deferred_[static_cast<std::size_t>(band)];
-      deferred.resize(archive.count(deferred.size(), sizeof(double) + sizeof(Event)));
-      for (auto& [t, event] : deferred) {
-        archive.value(t, is_within(0.0, max_state_time));
-        archive.value(event, is_event_within({0, rows.first, width, rows.last}));
-      }
-    }
-  }
 
   /// One band of rows. Different bands may be added to from different threads.
   class Band {

@@ -9,7 +9,6 @@
 
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/shade_tables.hpp"
-#include "src/dvs/state_bytes.hpp"
 #include "src/dvs/sub_intervals.hpp"
 
 namespace eventcamera {
@@ -52,12 +51,6 @@ class IntervalPlans {
 
   /// Numbers sub-intervals from 0 again.
   void restart() { sub_interval_count_ = 0; }
-
-  /// Writes the number of sub-intervals so far to a StateWriter, or reads it from a StateReader.
-  template <class Archive>
-  void serialize(Archive& archive) {
-    archive.value(sub_interval_count_, is_anything);
-  }
 
  private:
   const ShadeTables* tables_of(double duration);

@@ -11,7 +11,6 @@
 #include "src/core/label.hpp"
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/random.hpp"
-#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -103,11 +102,6 @@ class PixelArray {
   /// budgets. Refractory periods go on.
   void settle(int y, const DvsSettings& settings, const Random& random);
 
-  /// Writes all pixels to a StateWriter, or reads them from a StateReader; without the leak, which
-  /// is drawn again.
-  template <class Archive>
-  void serialize(Archive& archive);
-
  private:
   Image<float> target_;
   Image<float> signal_;
@@ -120,26 +114,5 @@ class PixelArray {
   Image<double> growth_end_;
   std::optional<Image<Cause>> last_cause_;
 };
-
-template <class Archive>
-void PixelArray::serialize(Archive& archive) {
-  constexpr auto max_level = static_cast<float>(max_state_level);
-  constexpr auto is_level = is_within(-max_level, max_level);
-  constexpr auto is_threshold = [](float threshold) {
-    return std::isinf(threshold) ? threshold > 0 : is_within(1e-4F, max_level)(threshold);
-  };
-  std::uint8_t has_causes = keeps_causes() ? 1 : 0;
-  archive.value(has_causes, is_within<std::uint8_t>(0, 1));
-  if constexpr (Archive::is_reading) keep_causes(has_causes == 1);
-  archive.image(target_, is_level);
-  archive.image(signal_, is_level);
-  archive.image(reference_, is_level);
-  archive.image(positive_, is_threshold);
-  archive.image(negative_, is_threshold);
-  archive.image(refractory_left_, is_within(0.0F, static_cast<float>(max_state_time)));
-  archive.image(noise_budget_, is_anything);
-  archive.image(growth_end_, is_within(0.0, max_state_clock));
-  if (last_cause_) archive.image(*last_cause_, is_within(Cause::unknown, Cause::exposure_pulse));
-}
 
 }  // namespace eventcamera

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "src/dvs/dvs_settings.hpp"
-#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -34,13 +33,6 @@ class ExposurePulse {
 
   /// Aborts the current pulse.
   void reset() { height_ = 0; }
-
-  /// Writes the current pulse to a StateWriter, or reads it from a StateReader.
-  template <class Archive>
-  void serialize(Archive& archive) {
-    archive.value(height_, is_within(0.0, max_state_level));
-    archive.value(falls_in_, is_within(0.0, max_state_time));
-  }
 
  private:
   std::vector<PulseEdge> edges_;
