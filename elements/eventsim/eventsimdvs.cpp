@@ -35,12 +35,6 @@
  * in pixels. A tensor has the timestamp of its frame. Where one is missing, or has another duration
  * than the interval because frames were skipped, the flow is found as without the pad.
  *
- * A long video can be simulated clip by clip, with the same events as in one piece, even on
- * different machines: #GstEventSimDvs:final-state writes the state of all pixels to a file at the
- * end of a clip, and #GstEventSimDvs:initial-state continues from it. Frames keep the timestamps
- * that they have in the whole video; those up to the time of the state are skipped, so the next
- * clip may begin earlier than needed.
- *
  * ## Example launch lines
  * |[
  * gst-launch-1.0 v4l2src ! eventsim-dvs preset=davis346 ! videoconvert ! autovideosink
@@ -315,8 +309,6 @@ struct Settings {
   Overrides of_profile;       ///< override the preset
   std::string profile_error;  ///< why the profile could not be read, if so
   Overrides of_properties;    ///< override both
-  std::string initial_state;
-  std::string final_state;
 
   DvsSettings dvs_settings() const {
     auto settings = eventcamera::settings_of(preset);
@@ -381,19 +373,6 @@ static void install_properties(GObjectClass* klass) {
           "those of the preset, but not those that are set explicitly, before or "
           "after",
           "", mutable_ready_flags));
-  properties.add(
-      &Settings::initial_state,
-      g_param_spec_string("initial-state", "Initial state",
-                          "File of the state to continue from, which final-state wrote: frames up "
-                          "to its time are skipped, and the next events are those of a video "
-                          "without a cut. Read when a stream begins, as after a seek; all other "
-                          "properties and the size of the frames must be the same",
-                          "", mutable_playing_flags));
-  properties.add(&Settings::final_state,
-                 g_param_spec_string("final-state", "Final state",
-                                     "File that the state of all pixels is written to at the end "
-                                     "of the stream; one that exists is replaced",
-                                     "", mutable_playing_flags));
   for (std::size_t i = 0; i < std::size(pixel_properties); ++i) {
     const auto add = [&](auto member) {
       properties.add(
@@ -409,37 +388,6 @@ static void install_properties(GObjectClass* klass) {
 
 static void configure(eventcamera::IntervalSimulator& simulator, GObject* object) {
   static_cast<DvsSimulator&>(simulator).set(settings_of(object).copy().dvs_settings());
-}
-
-static void restore(eventcamera::IntervalSimulator& simulator, GObject* object) {
-  const auto location = settings_of(object).copy().initial_state;
-  if (location.empty()) return;
-  auto& dvs_simulator = static_cast<DvsSimulator&>(simulator);
-  try {
-    const auto bytes = read_bytes(location, dvs_simulator.max_state_size());
-    dvs_simulator.restore({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
-  } catch (const std::runtime_error& error) {
-    throw VideoSimulatorError(
-        {GST_RESOURCE_ERROR_READ,
-         "Cannot continue from the state \"" + location + "\": " + error.what() +
-             ". Write one with final-state, with the same properties and size of frames."},
-        "initial-state");
-  }
-}
-
-static void save(eventcamera::IntervalSimulator& simulator, GObject* object) {
-  const auto location = settings_of(object).copy().final_state;
-  if (location.empty()) return;
-  const auto bytes = static_cast<DvsSimulator&>(simulator).state();
-  try {
-    write_bytes(location, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-  } catch (const std::runtime_error& error) {
-    throw VideoSimulatorError(
-        {GST_RESOURCE_ERROR_WRITE, "Cannot write the state to \"" + location +
-                                       "\". Give final-state a file in a folder that can be "
-                                       "written, with enough space."},
-        error.what());
-  }
 }
 
 static std::string fault_of(GObject* object) {
@@ -461,8 +409,6 @@ static const EventSimulatorMethod dvs = {
     },
     .install_properties = install_properties,
     .configure = configure,
-    .restore = restore,
-    .save = save,
     .fault = fault_of,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventsim_dvs, "eventsim-dvs", GST_RANK_NONE, event_simulator_type(dvs))

@@ -45,10 +45,6 @@ struct EventSimulatorMethod {
   std::shared_ptr<void> (*make_settings)() = nullptr;
   void (*install_properties)(GObjectClass* klass) = nullptr;
   void (*configure)(eventcamera::IntervalSimulator& simulator, GObject* object) = nullptr;
-  /// If set, restores the state that a stream continues from before its first frame, if the element
-  /// has one, and saves the state at its end. May throw VideoSimulatorError.
-  void (*restore)(eventcamera::IntervalSimulator& simulator, GObject* object) = nullptr;
-  void (*save)(eventcamera::IntervalSimulator& simulator, GObject* object) = nullptr;
   /// If set, returns why an element cannot start with its properties; empty if it can.
   std::string (*fault)(GObject* object) = nullptr;
 };

@@ -106,33 +106,6 @@ SimulatorSettings StreamSimulation::begin_interval() {
   return current;
 }
 
-/// Restores the state that a timeline continues from, if any, before its first frame or GAP. May
-/// throw.
-void StreamSimulation::restore_at_start() {
-  if (!stream_.continuation.begins() || method().restore == nullptr) return;
-  auto& simulator = state_->simulator();
-  configure();
-  method().restore(simulator, G_OBJECT(element_));
-  stream_.continuation.restored(simulator.last_time());
-  if (const auto time = simulator.last_time()) extend_segment(static_cast<GstClockTime>(*time));
-}
-
-/// Lets the segment begin at `start`, if that is earlier; times in it stay what they are. Sinks
-/// drop what begins before, as the first interval after a state does in a clip of its own.
-void StreamSimulation::extend_segment(GstClockTime start) {
-  GstSegment& segment = element_->segment;
-  if (segment.format != GST_FORMAT_TIME || start >= segment.start) return;
-  const guint64 earlier = segment.start - start;
-  segment.start = start;
-  segment.offset += earlier;
-  if (GST_CLOCK_TIME_IS_VALID(segment.time)) segment.time -= std::min(segment.time, earlier);
-  GstPad* const src = GST_BASE_TRANSFORM_SRC_PAD(element_);
-  const OwnedEvent last(gst_pad_get_sticky_event(src, GST_EVENT_SEGMENT, 0));
-  GstEvent* const extended = gst_event_new_segment(&segment);
-  if (last) gst_event_set_seqnum(extended, gst_event_get_seqnum(last.get()));
-  gst_pad_push_event(src, extended);
-}
-
 /// Updates controlled properties to their values at `time`, a timestamp of the segment.
 void StreamSimulation::sync_controlled_properties(GstClockTime time) {
   const GstSegment& segment = element_->segment;
@@ -177,7 +150,6 @@ void StreamSimulation::start_timeline() {
   if (state_) state_->frames->drop();
   stream_.flow = GST_FLOW_OK;
   reported([&] { start_over(); });
-  stream_.continuation = {};
   for (auto* companion : companions()) companion->begin();
   stream_.clock.start_over();
   timing.qos().lock()->start_over();
@@ -196,8 +168,7 @@ void StreamSimulation::warn_of_times(const char* what) {
 /// be skipped. May throw.
 bool StreamSimulation::accept_time(GstBuffer* frame) {
   const GstClockTime pts = GST_BUFFER_PTS(frame);
-  const bool continues = stream_.continuation.continues();
-  if (GST_BUFFER_IS_DISCONT(frame) && !continues) {
+  if (GST_BUFFER_IS_DISCONT(frame)) {
     start_over();
     stream_.discontinuous = true;
   }
@@ -247,13 +218,7 @@ void StreamSimulation::simulate(OwnedBuffer frame) {
   const GstClockTime pts = GST_BUFFER_PTS(frame.get());
   sync_controlled_properties(pts);
   stream_.warnings.check_interlacing(element_, state_->video, frame.get());
-  restore_at_start();
   advance_companions(pts);
-  if (stream_.continuation.is_after(pts)) {
-    GST_LOG_OBJECT(element_, "skipping the frame at %" GST_TIME_FORMAT ": the state is later",
-                   GST_TIME_ARGS(pts));
-    return;
-  }
   if (!accept_time(frame.get())) return;
   auto& simulator = state_->simulator();
   const auto start = simulator.last_time();
@@ -300,8 +265,6 @@ bool StreamSimulation::take_gap(GstEvent* event) {
   GstClockTime duration = GST_CLOCK_TIME_NONE;
   gst_event_parse_gap(event, &pts, &duration);
   if (!state_) return true;
-  reported([&] { restore_at_start(); });
-  if (!state_) return false;  // after an error
   const bool has_end = GST_CLOCK_TIME_IS_VALID(duration) && pts <= G_MAXINT64;
   advance_companions(pts + (has_end ? std::min(duration, G_MAXINT64 - pts) : 0));
   const auto start = state_->simulator().last_time();
@@ -417,25 +380,6 @@ GstFlowReturn StreamSimulation::push_buffer(OwnedBuffer out, GstClockTime pts,
 
 void StreamSimulation::end() {
   for (auto* companion : companions()) companion->end();
-  if (!state_) return;
-  warn_of_no_progress();
-  reported([&] { restore_at_start(); });  // a clip without frames passes the state on
-  if (!state_) return;
-  const auto save = method().save;
-  auto& simulator = state_->simulator();
-  if (save != nullptr && simulator.last_time())
-    reported([&] { save(simulator, G_OBJECT(element_)); });
-}
-
-/// Warns if a stream that continues from a state ended before it.
-void StreamSimulation::warn_of_no_progress() {
-  const auto from = stream_.continuation.time();
-  if (!from || state_->simulator().last_time() != from) return;
-  stream_.warn_of_times(element_,
-                        {GST_STREAM_ERROR_FORMAT,
-                         "No events: all frames are before the state that initial-state names. "
-                         "Give them the timestamps that they have in the whole video."},
-                        "the state is that at " + std::to_string(*from) + " ns");
 }
 
 void StreamSimulation::reset() {

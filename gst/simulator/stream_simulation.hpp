@@ -12,7 +12,6 @@
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/simulator/class_images.hpp"
-#include "gst/simulator/continuation.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 #include "gst/simulator/flow_tensor.hpp"
 #include "gst/simulator/frame_clock.hpp"
@@ -53,7 +52,7 @@ class StreamSimulation {
 
   /// Starts a new timeline, discontinuous with the previous one.
   void start_timeline();
-  /// No frames follow: saves the state at the end of the stream, if the element has to.
+  /// No frames follow.
   void end();
   /// Drops the simulator and all state, on stop.
   void reset();
@@ -79,9 +78,8 @@ class StreamSimulation {
   /// State from start to stop, independent of caps.
   struct Stream {
     std::optional<eventcamera::Nanoseconds>
-        handed_out_until;        ///< end of the segment's last interval
-    bool discontinuous = false;  ///< the next buffer is discontinuous
-    Continuation continuation;
+        handed_out_until;              ///< end of the segment's last interval
+    bool discontinuous = false;        ///< the next buffer is discontinuous
     GstFlowReturn flow = GST_FLOW_OK;  ///< result of the last push
     FrameClock clock{event_simulator_debug};
     InputWarnings warnings{event_simulator_debug};
@@ -98,13 +96,10 @@ class StreamSimulation {
 
   void configure();
   SimulatorSettings begin_interval();
-  void restore_at_start();
-  void extend_segment(GstClockTime start);
   void sync_controlled_properties(GstClockTime time);
   void advance_companions(GstClockTime time);
   bool accept_time(GstBuffer* frame);
   void warn_of_times(const char* what);
-  void warn_of_no_progress();
   void forget_frames();
   void start_over();
   void simulate(OwnedBuffer frame);

@@ -2,11 +2,7 @@
 #include "src/dvs/dvs_simulator.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
-#include <optional>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -20,35 +16,12 @@
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/row_filter.hpp"
-#include "src/dvs/state_bytes.hpp"
 #include "src/dvs/sub_intervals.hpp"
 #include "src/simulate/difference.hpp"
 #include "src/simulate/frame_flow.hpp"
 
 namespace eventcamera {
 namespace {
-
-/// A state begins with this; the last character is the version of its format.
-constexpr std::array<char, 8> state_magic{'D', 'V', 'S', 'S', 'T', 'A', 'T', '3'};
-
-/// Hash of all settings. Does not compile unless it lists each of them.
-std::uint64_t hash_of(const DvsSettings& settings) {
-  const auto& [denoise, linear_light, exposure_compensation, response, log_eps, overexposed_light,
-               upsampling, max_interpolated_frames, cutoff_frequency, dark_light,
-               positive_threshold, negative_threshold, threshold_sigma, threshold_jitter, leak_rate,
-               leak_spread, shot_noise_rate, hot_pixels, dead_pixels, adaptation, adaptation_time,
-               refractory_period, refractory_reset, exposure_pulse, exposure_lead, pixel_latency,
-               pixel_latency_jitter, max_rate, seed] = settings;
-  StateWriter writer;
-  const auto add = [&](const auto&... values) { (writer.value(values, is_anything), ...); };
-  add(denoise, linear_light, exposure_compensation, response, log_eps, overexposed_light,
-      upsampling, max_interpolated_frames, cutoff_frequency, dark_light, positive_threshold,
-      negative_threshold, threshold_sigma, threshold_jitter, leak_rate, leak_spread,
-      shot_noise_rate, hot_pixels, dead_pixels, adaptation, adaptation_time, refractory_period,
-      refractory_reset, exposure_pulse, exposure_lead, pixel_latency, pixel_latency_jitter,
-      max_rate, seed);
-  return checksum_of(writer.finish());
-}
 
 /// Memory of a thread.
 struct alignas(64) Scratch {
@@ -68,54 +41,7 @@ class PixelSimulator final : public DvsSimulator {
  public:
   explicit PixelSimulator(const LumaFormat& format) : DvsSimulator(format) {}
 
-  std::vector<std::uint8_t> state() override {
-    StateWriter writer;
-    serialize_origin(writer, pixels_.model().settings);
-    serialize(writer);
-    return writer.finish();
-  }
-
-  void restore(std::span<const std::uint8_t> state) override {
-    last_time_.reset();
-    StateReader reader(state);
-    serialize_origin(reader, settings_);
-    response_.set(settings_);
-    pixels_.start(settings_, threads());
-    serialize(reader);
-    reader.finish();
-    frame_flow_.forget();
-  }
-
  private:
-  /// Writes what a state belongs to, or reads it and throws if it is something else.
-  template <class Archive>
-  void serialize_origin(Archive& archive, const DvsSettings& settings) const {
-    const auto expect = [&](auto expected, const char* fault) {
-      auto value = expected;
-      archive.value(value, is_anything);
-      if (value != expected) throw std::runtime_error(fault);
-    };
-    expect(state_magic, "it is not a state that this version writes");
-    expect(format().width, "its frames have another width");
-    expect(format().height, "its frames have another height");
-    expect(format().bits, "its frames have another bit depth");
-    expect(hash_of(settings), "it is of other properties");
-  }
-
-  /// Writes or reads everything else. What is derived from settings, gain and frames is not in a
-  /// state.
-  template <class Archive>
-  void serialize(Archive& archive) {
-    Nanoseconds time = last_time_.value_or(0);
-    archive.value(time, is_within<Nanoseconds>(0, std::numeric_limits<Nanoseconds>::max()));
-    timeline_.serialize(archive);
-    response_.serialize(archive);
-    archive.image(last_, is_anything);
-    pixels_.serialize(archive);
-    fired_.serialize(archive);
-    if constexpr (Archive::is_reading) last_time_ = time;
-  }
-
   bool needs_flow() const override { return settings_.upsampling == Upsampling::motion; }
 
   void start(const LumaView& frame) override {

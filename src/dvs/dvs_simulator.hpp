@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <cstdint>
 #include <memory>
-#include <span>
-#include <vector>
 
 #include "src/dvs/dvs_settings.hpp"
 #include "src/simulate/simulator.hpp"
@@ -38,21 +35,6 @@ class DvsSimulator : public Simulator {
  public:
   /// Applies to the next frames.
   void set(const DvsSettings& settings) { settings_ = settings; }
-
-  /// Returns all that the next events depend on, besides frames and settings: after restore() they
-  /// are the same. There must have been a frame.
-  virtual std::vector<std::uint8_t> state() = 0;
-
-  /// Limit of the size of a state, bytes: a pixel has about 40, and 16 for each event that is late.
-  std::size_t max_state_size() const {
-    return (std::size_t{1} << 20) + std::size_t{1024} * static_cast<std::size_t>(format().width) *
-                                        static_cast<std::size_t>(format().height);
-  }
-
-  /// Continues after the last frame of a simulator whose state() this is. Throws std::runtime_error
-  /// with the reason if that had frames of another format or other settings, or if these bytes are
-  /// not a state; then only reset(), restore() and the destructor may be called.
-  virtual void restore(std::span<const std::uint8_t> state) = 0;
 
  protected:
   using Simulator::Simulator;

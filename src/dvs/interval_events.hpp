@@ -10,7 +10,6 @@
 #include "src/core/label.hpp"
 #include "src/core/thread_pool.hpp"
 #include "src/dvs/readout.hpp"
-#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -58,28 +57,6 @@ class IntervalEvents {
   void restart() {
     for (auto& band : deferred_) band.clear();
     if (readout_) readout_->reset();
-  }
-
-  /// Writes the deferred events of a sensor of this size to a StateWriter, or reads them from a
-  /// StateReader.
-  template <class Archive>
-  void serialize(Archive& archive) {
-    for (int band = 0; band < band_count(height_); ++band) {
-      const BandRows rows(band, height_);
-      auto& deferred = deferred_[static_cast<std::size_t>(band)];
-      deferred.resize(archive.count(deferred.size(), sizeof(double) + sizeof(Event)));
-      for (auto& [t, event] : deferred) {
-        archive.value(t, is_within(0.0, max_state_time));
-        archive.value(event, is_event_within({0, rows.first, width_, rows.last}));
-      }
-    }
-    std::uint8_t has_readout = readout_ ? 1 : 0;
-    archive.value(has_readout, is_within<std::uint8_t>(0, 1));
-    if constexpr (Archive::is_reading) {
-      readout_.reset();
-      if (has_readout == 1) readout_.emplace(width_, height_);
-    }
-    if (readout_) readout_->serialize(archive);
   }
 
   /// Adds the events of one band of rows at a time. Several may add to the same interval, from

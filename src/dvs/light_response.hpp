@@ -11,7 +11,6 @@
 #include "src/core/thread_pool.hpp"
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/exposure_gain.hpp"
-#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -63,18 +62,6 @@ class LightResponse {
   float operator()(int luma) const {
     const int seen = is_widened() ? 257 * luma : luma;
     return table_[static_cast<std::size_t>(std::min(seen, white()))];
-  }
-
-  /// Writes gain and range to a StateWriter, or reads them from a StateReader.
-  template <class Archive>
-  void serialize(Archive& archive) {
-    archive.value(gain_, is_within(1.0 / 64, 64.0));
-    std::uint8_t is_narrow = is_narrow_ ? 1 : 0;
-    archive.value(is_narrow, is_within<std::uint8_t>(0, 1));
-    if constexpr (Archive::is_reading) {
-      is_narrow_ = is_narrow == 1;
-      make_table();
-    }
   }
 
  private:

@@ -13,7 +13,6 @@
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/light_response.hpp"
 #include "src/dvs/pixel_model.hpp"
-#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -77,11 +76,6 @@ class PixelArray {
     });
   }
 
-  /// Writes all pixels to a StateWriter, or reads them from a StateReader; without the leak, which
-  /// is drawn again.
-  template <class Archive>
-  void serialize(Archive& archive);
-
  private:
   void draw_traits(const PixelRow& pixels);
   void move_traits(const PixelRow& pixels, const PixelModel& last);
@@ -100,26 +94,5 @@ class PixelArray {
   Image<double> growth_end_;
   std::optional<Image<Cause>> last_cause_;
 };
-
-template <class Archive>
-void PixelArray::serialize(Archive& archive) {
-  constexpr auto max_level = static_cast<float>(max_state_level);
-  constexpr auto is_level = is_within(-max_level, max_level);
-  constexpr auto is_threshold = [](float threshold) {
-    return std::isinf(threshold) ? threshold > 0 : is_within(1e-4F, max_level)(threshold);
-  };
-  std::uint8_t has_causes = last_cause_ ? 1 : 0;
-  archive.value(has_causes, is_within<std::uint8_t>(0, 1));
-  if constexpr (Archive::is_reading) set_labels(has_causes == 1);
-  archive.image(target_, is_level);
-  archive.image(signal_, is_level);
-  archive.image(reference_, is_level);
-  archive.image(positive_, is_threshold);
-  archive.image(negative_, is_threshold);
-  archive.image(refractory_left_, is_within(0.0F, static_cast<float>(max_state_time)));
-  archive.image(noise_budget_, is_anything);
-  archive.image(growth_end_, is_within(0.0, max_state_clock));
-  if (last_cause_) archive.image(*last_cause_, is_within(Cause::unknown, Cause::exposure_pulse));
-}
 
 }  // namespace eventcamera

@@ -7,7 +7,6 @@
 
 #include "src/core/event_buckets.hpp"
 #include "src/core/label.hpp"
-#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -30,10 +29,6 @@ class Readout {
   /// `out` with those read out within it; the others wait for the next interval.
   void read(std::span<const Event> in, double duration, double events_per_second,
             EventBuckets& out);
-
-  /// Writes the waiting events to a StateWriter, or reads them from a StateReader.
-  template <class Archive>
-  void serialize(Archive& archive);
 
  private:
   /// Event of a pixel that waits; 0 if none. The time is that of the readout, and not kept.
@@ -69,22 +64,5 @@ class Readout {
   std::size_t queue_count_ = 0;
   double unfinished_ = 0;  ///< events of the row being read out, which is not in rows_
 };
-
-template <class Archive>
-void Readout::serialize(Archive& archive) {
-  if constexpr (Archive::is_reading) reset();
-  archive.value(unfinished_, is_within(0.0, static_cast<double>(width_)));
-  // In the order in which they are read, which admits them again.
-  std::vector<Event> events;
-  for (std::size_t i = 0; i < queue_count_; ++i) {
-    const int row = row_queue_[(queue_first_ + i) % row_queue_.size()];
-    append(row, 0, events);
-  }
-  events.resize(archive.count(events.size(), sizeof(Event)));
-  for (auto& event : events)
-    archive.value(event, is_event_within({0, 0, width_, static_cast<int>(rows_.size())}));
-  if constexpr (Archive::is_reading)
-    for (const auto& event : events) admit(event);
-}
 
 }  // namespace eventcamera

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "src/dvs/dvs_settings.hpp"
-#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -37,13 +36,6 @@ class ExposurePulse {
 
   /// Aborts the current pulse.
   void reset() { height_ = 0; }
-
-  /// Writes the current pulse to a StateWriter, or reads it from a StateReader.
-  template <class Archive>
-  void serialize(Archive& archive) {
-    archive.value(height_, is_within(0.0, max_state_level));
-    archive.value(falls_in_, is_within(0.0, max_state_time));
-  }
 
  private:
   std::vector<PulseEdge> edges_;
@@ -115,14 +107,6 @@ class Timeline {
 
   /// The next frame is the first one.
   void restart();
-
-  /// Writes the time to a StateWriter, or reads it from a StateReader.
-  template <class Archive>
-  void serialize(Archive& archive) {
-    archive.value(count_, is_anything);
-    archive.value(clock_, is_within(0.0, max_state_clock));
-    pulse_.serialize(archive);
-  }
 
  private:
   const ShadeTables* tables_of(double duration);

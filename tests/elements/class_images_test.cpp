@@ -306,23 +306,6 @@ TEST(ClassImagesInPipelines, DoNotKeepAPipelineFromStopping) {
   pipeline.set(GST_STATE_NULL);
 }
 
-/// Both come from one tee, so images that wait for skipped frames would keep the video from coming.
-TEST(ClassImagesInPipelines, DoNotWaitForFramesThatAreSkipped) {
-  const auto state = recording_files::Folder::path("state");
-  const std::string tee =
-      "video/x-raw,width=64,height=48 ! tee name=t  t. ! queue ! dvs.sink  t. ! queue ! "
-      "dvs.label_sink";
-  Pipeline first("eventsim-dvs name=dvs final-state=" + in_quotes(state) + " ! fakesink  " +
-                 "videotestsrc pattern=ball num-buffers=100 ! " + tee);
-  first.set(GST_STATE_PLAYING);
-  ASSERT_TRUE(first.wait()) << first.error;
-  // All but the last frames lie before the state.
-  Pipeline second("eventsim-dvs name=dvs initial-state=" + in_quotes(state) + " ! fakesink  " +
-                  "videotestsrc pattern=ball num-buffers=110 ! " + tee);
-  second.set(GST_STATE_PLAYING);
-  EXPECT_TRUE(second.wait()) << second.error;
-}
-
 TEST(ClassImagesInPipelines, PadCanBeReleasedWhilePlaying) {
   Pipeline pipeline("eventsim-dvs name=dvs ! fakesink name=sink sync=false  " + moving_ball +
                     "dvs.sink  appsrc format=time caps=\"video/x-raw, format=GRAY8, width=64, "

@@ -78,8 +78,6 @@ void randomize(GParamSpec* spec, Random& random, GValue* value) {
                                   random() % 2 == 0 ? "" : "/event_camera/events,/dvs/events");
       else if (spec->name == std::string_view("profile"))
         g_value_take_string(value, g_strdup(random() % 2 == 0 ? "" : profile().c_str()));
-      else if (spec->name == std::string_view("initial-state"))
-        g_value_set_static_string(value, "");  // one of these properties does not exist
       else if (spec->owner_type == g_type_from_name("GstEventHotPixel"))
         g_value_take_string(value, g_strdup(hot_pixels().c_str()));
       else  // files to write

@@ -172,14 +172,6 @@ std::vector<Seed> mask_seeds() {
   return seeds;
 }
 
-/// A whole state of each kind, one that is cut, and one with a corrupt pixel.
-std::vector<Seed> dvs_state_seeds() {
-  std::vector<Seed> seeds{{"cut", {1, 9}}, {"corrupt", {2, 0, 90, 1, 0xff}}};
-  for (std::uint8_t kind = 0; kind < 4; ++kind)
-    seeds.push_back({"kind-" + std::to_string(kind), {kind, 0}});
-  return seeds;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -199,7 +191,6 @@ int main(int argc, char** argv) {
       append(seeds_of(format), files[format.name.starts_with("raw_") ? "raw" : format.name]);
   }
   write(corpus / "atis", atis_seeds());
-  write(corpus / "dvs_state", dvs_state_seeds());
   write(corpus / "calibration", calibration_seeds());
   write(corpus / "camera_profile", camera_profile_seeds());
   write(corpus / "mask", mask_seeds());
