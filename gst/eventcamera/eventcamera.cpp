@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/eventcamera/eventcamera.h"
 
+#include <gst/video/video.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
@@ -184,6 +186,94 @@ void gst_event_camera_label_meta_truncate(GstEventCameraLabelMeta* meta, gsize n
 GBytes* gst_event_camera_label_meta_get_bytes(const GstEventCameraLabelMeta* meta) {
   g_return_val_if_fail(meta != nullptr, nullptr);
   return g_bytes_new(meta->labels, meta->n_labels * sizeof(GstEventCameraLabel));
+}
+
+GType gst_event_camera_flow_meta_api_get_type() {
+  static const GType type = [] {
+    static const gchar* tags[] = {GST_META_TAG_VIDEO_STR, GST_META_TAG_VIDEO_SIZE_STR,
+                                  GST_META_TAG_VIDEO_ORIENTATION_STR, nullptr};
+    return gst_meta_api_type_register("GstEventCameraFlowMetaAPI", tags);
+  }();
+  return type;
+}
+
+static gboolean init_flow(GstMeta* meta, gpointer, GstBuffer*) {
+  auto* flow = reinterpret_cast<GstEventCameraFlowMeta*>(meta);
+  flow->width = 0;
+  flow->height = 0;
+  flow->flow = nullptr;
+  return TRUE;
+}
+
+static void free_flow(GstMeta* meta, GstBuffer*) {
+  g_bytes_unref(reinterpret_cast<GstEventCameraFlowMeta*>(meta)->flow);
+}
+
+/// True if a transformation of a frame leaves each pixel in its place.
+static bool keeps_pixels(GQuark type, gpointer data) {
+  if (GST_META_TRANSFORM_IS_COPY(type))
+    return static_cast<const GstMetaTransformCopy*>(data)->region == FALSE;
+  if (!GST_VIDEO_META_TRANSFORM_IS_SCALE(type)) return false;
+  // Converters of formats report themselves as scaling to the same size.
+  const auto* scale = static_cast<const GstVideoMetaTransform*>(data);
+  return GST_VIDEO_INFO_WIDTH(scale->in_info) == GST_VIDEO_INFO_WIDTH(scale->out_info) &&
+         GST_VIDEO_INFO_HEIGHT(scale->in_info) == GST_VIDEO_INFO_HEIGHT(scale->out_info);
+}
+
+static gboolean copy_flow(GstBuffer* copy, GstMeta* meta, GstBuffer*, GQuark type, gpointer data) {
+  if (!keeps_pixels(type, data)) return FALSE;
+  const auto* flow = reinterpret_cast<const GstEventCameraFlowMeta*>(meta);
+  return gst_buffer_add_event_camera_flow_meta(copy, flow->width, flow->height, flow->flow) !=
+         nullptr;
+}
+
+const GstMetaInfo* gst_event_camera_flow_meta_get_info() {
+  static const GstMetaInfo* const info =
+      gst_meta_register(GST_EVENT_CAMERA_FLOW_META_API_TYPE, "GstEventCameraFlowMeta",
+                        sizeof(GstEventCameraFlowMeta), init_flow, free_flow, copy_flow);
+  return info;
+}
+
+/// Bytes whose address is aligned for floats: `bytes` themselves if they are.
+static GBytes* aligned(GBytes* bytes) {
+  gsize size = 0;
+  gconstpointer const data = g_bytes_get_data(bytes, &size);
+  return GPOINTER_TO_SIZE(data) % alignof(gfloat) == 0 ? g_bytes_ref(bytes)
+                                                       : g_bytes_new(data, size);
+}
+
+GstEventCameraFlowMeta* gst_buffer_add_event_camera_flow_meta(GstBuffer* buffer, guint width,
+                                                              guint height, GBytes* flow) {
+  g_return_val_if_fail(GST_IS_BUFFER(buffer), nullptr);
+  g_return_val_if_fail(gst_buffer_is_writable(buffer), nullptr);
+  g_return_val_if_fail(width > 0 && width <= GST_EVENT_CAMERA_MAX_SIDE, nullptr);
+  g_return_val_if_fail(height > 0 && height <= GST_EVENT_CAMERA_MAX_SIDE, nullptr);
+  g_return_val_if_fail(flow != nullptr, nullptr);
+  g_return_val_if_fail(g_bytes_get_size(flow) == gsize{width} * height * 2 * sizeof(gfloat),
+                       nullptr);
+
+  auto* meta = gst_buffer_get_event_camera_flow_meta(buffer);
+  GBytes* const added = aligned(flow);
+  if (meta != nullptr)
+    g_bytes_unref(meta->flow);
+  else
+    meta = reinterpret_cast<GstEventCameraFlowMeta*>(
+        gst_buffer_add_meta(buffer, GST_EVENT_CAMERA_FLOW_META_INFO, nullptr));
+  meta->width = width;
+  meta->height = height;
+  meta->flow = added;
+  return meta;
+}
+
+GstEventCameraFlowMeta* gst_buffer_get_event_camera_flow_meta(GstBuffer* buffer) {
+  g_return_val_if_fail(GST_IS_BUFFER(buffer), nullptr);
+  return reinterpret_cast<GstEventCameraFlowMeta*>(
+      gst_buffer_get_meta(buffer, GST_EVENT_CAMERA_FLOW_META_API_TYPE));
+}
+
+GBytes* gst_event_camera_flow_meta_get_flow(const GstEventCameraFlowMeta* meta) {
+  g_return_val_if_fail(meta != nullptr, nullptr);
+  return meta->flow;
 }
 
 /// Writes an event as two words of 8 bytes: bits 32 to 62 of an event are x and y, bit 63 is the

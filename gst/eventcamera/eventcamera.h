@@ -360,6 +360,98 @@ void gst_event_camera_label_meta_truncate(GstEventCameraLabelMeta* meta, gsize n
 GST_EVENT_CAMERA_API
 GBytes* gst_event_camera_label_meta_get_bytes(const GstEventCameraLabelMeta* meta);
 
+/**
+ * GstEventCameraFlowMeta:
+ * @meta: parent #GstMeta
+ * @width: of the frame, in pixels
+ * @height: of the frame, in pixels
+ *
+ * Optical flow of a video frame: the motion of each of its pixels until the next frame. The
+ * simulators use it instead of estimating the motion.
+ *
+ * A copy of a frame shares its flow; a copy of a part has none. Elements that scale or crop frames
+ * drop it, elements that convert their format keep it. Flip frames, and change their framerate,
+ * before flow is added: GStreamer's `videoflip` and `videorate` keep it unchanged.
+ *
+ * Since: 0.1
+ */
+typedef struct _GstEventCameraFlowMeta {
+  GstMeta meta;
+
+  guint width;
+  guint height;
+
+  /*< private >*/
+  GBytes* flow;
+} GstEventCameraFlowMeta;
+
+#define GST_EVENT_CAMERA_FLOW_META_API_TYPE (gst_event_camera_flow_meta_api_get_type())
+
+/**
+ * gst_event_camera_flow_meta_api_get_type:
+ *
+ * Returns: the type of the API of #GstEventCameraFlowMeta
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GType gst_event_camera_flow_meta_api_get_type(void);
+
+#define GST_EVENT_CAMERA_FLOW_META_INFO (gst_event_camera_flow_meta_get_info())
+
+/**
+ * gst_event_camera_flow_meta_get_info:
+ *
+ * Returns: (transfer none): the description of #GstEventCameraFlowMeta for gst_buffer_add_meta()
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+const GstMetaInfo* gst_event_camera_flow_meta_get_info(void);
+
+/**
+ * gst_buffer_add_event_camera_flow_meta:
+ * @buffer: a writable video frame
+ * @width: of the frame, in pixels
+ * @height: of the frame, in pixels
+ * @flow: two 32-bit floating-point numbers per pixel, row by row: the motion to the right and down
+ *     until the next frame, in pixels
+ *
+ * Adds optical flow to a video frame, in place of the flow that it had. Nothing is copied.
+ *
+ * Returns: (transfer none) (nullable): the flow, which belongs to @buffer; %NULL unless @flow has
+ *     @width x @height x 8 bytes and both sides are from 1 to %GST_EVENT_CAMERA_MAX_SIDE
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GstEventCameraFlowMeta* gst_buffer_add_event_camera_flow_meta(GstBuffer* buffer, guint width,
+                                                              guint height, GBytes* flow);
+
+/**
+ * gst_buffer_get_event_camera_flow_meta:
+ * @buffer: a video frame
+ *
+ * Returns: (transfer none) (nullable): the optical flow of the frame, which belongs to @buffer;
+ *     %NULL if it has none
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GstEventCameraFlowMeta* gst_buffer_get_event_camera_flow_meta(GstBuffer* buffer);
+
+/**
+ * gst_event_camera_flow_meta_get_flow:
+ * @meta: optical flow
+ *
+ * Returns: (transfer none): @width x @height x 2 32-bit floating-point numbers, in the layout of
+ *     gst_buffer_add_event_camera_flow_meta(), at an address that is a multiple of 4
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GBytes* gst_event_camera_flow_meta_get_flow(const GstEventCameraFlowMeta* meta);
+
 typedef struct _GstEventCameraAbsoluteEvent GstEventCameraAbsoluteEvent;
 
 /**

@@ -61,24 +61,8 @@ done
 "$SOURCE/pipelines/examples/train_on_events.py" "$work/first.raw" "$work/second.raw" | tee "$work/training"
 awk '$1 == "epoch" { if (NR > 1 && ($6 + 0 >= last || $3 < 60)) exit 1; last = $6 } END { exit NR != 3 }' "$work/training"
 
-# Labels are written and read from Python.
-/usr/bin/python3 - <<'PYTHON'
-import struct
-import gi
-gi.require_version("Gst", "1.0")
-gi.require_version("GstEventCamera", "1.0")
-from gi.repository import Gst, GstEventCamera
-
-Gst.init(None)
-buffer = Gst.Buffer.new_wrapped(bytes(2 * 8))
-assert GstEventCamera.buffer_get_event_camera_label_meta(buffer) is None
-labels = [GstEventCamera.Label(), GstEventCamera.Label()]
-labels[1].object_class, labels[1].cause = 300, GstEventCamera.Cause.LEAK
-assert GstEventCamera.buffer_add_event_camera_label_meta(buffer, labels).n_labels == 2
-part = buffer.copy_region(Gst.BufferCopyFlags.META | Gst.BufferCopyFlags.MEMORY, 8, 8)
-read = GstEventCamera.buffer_get_event_camera_label_meta(part).get_bytes().get_data()
-assert list(struct.iter_unpack("<HBB", read)) == [(300, 2, 0)], read
-PYTHON
+# The C API in JavaScript.
+gjs -m "$SOURCE/tests/pipelines/bindings.js"
 
 # The same example in three languages.
 "$BUILD/pipelines/on_and_off" | tee "$work/expected"
