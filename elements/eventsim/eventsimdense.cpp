@@ -11,11 +11,12 @@
  *
  * For scenes in which everything moves, such as those of a moving camera.
  *
- * The pad `flow_sink` takes optical flow that is known, such as a renderer's, instead of finding
- * it: a tensor of NNStreamer for each frame, of the dimensions 2:width:height:1 and type float32,
- * which holds x and y of each pixel's motion to the next frame, in pixels. A tensor has the
- * timestamp of its frame. Where one is missing, or has another duration than the interval because
- * frames were skipped, the flow is found as without the pad.
+ * Where a frame has a #GstEventCameraFlowMeta, its optical flow up to the next frame is used
+ * instead of estimating it, unless frames were skipped in between.
+ * gst_buffer_add_event_camera_flow_meta() adds it, and `flowjoin` joins video and a stream of flow,
+ * such as a renderer's. Flow that is not finite counts as 0. With #GstEventSimDense:write-flow,
+ * each buffer of events has the flow that was used, from its timestamp to its end; estimated flow
+ * is 0 far from changed pixels.
  *
  * ## Example launch line
  * |[
@@ -66,7 +67,7 @@ static const EventSimulatorMethod dense = {
     .description = "Turns video into events: interpolates frames with dense optical flow",
     .threshold = 2,
     .interpolates = true,
-    .takes_flow = true,
+    .has_flow = true,
     .create = in_system_memory<eventcamera::make_dense_simulator>,
     .make_settings = Settings::make,
     .install_properties = install_properties,

@@ -21,19 +21,15 @@
  *
  * The same video, settings and seed give the same events for any number of threads.
  *
- * With #GstEventSimDvs:label, events carry their cause. The pad `label_sink` takes images of
- * classes, such as a renderer's segmentation, in the size of the video: events then carry cause and
- * class, which is that of their pixel in the most recent image at that time. Images and frames are
- * matched by their timestamps. The video waits for the image of each frame, so if one source feeds
- * both pads, put a queue before each. Where images are missing, as in a GAP or after their end, the
- * last one is used; before the first one, the class is 0. Images without a timestamp are skipped
- * with a warning; a different size is an error.
+ * With #GstEventSimDvs:label, events carry their cause. `eventlabel` adds the class of the object
+ * that a pixel saw.
  *
- * The pad `flow_sink` takes optical flow that is known, such as a renderer's, instead of finding
- * it, with upsampling=motion: a tensor of NNStreamer for each frame, of the dimensions
- * 2:width:height:1 and type float32, which holds x and y of each pixel's motion to the next frame,
- * in pixels. A tensor has the timestamp of its frame. Where one is missing, or has another duration
- * than the interval because frames were skipped, the flow is found as without the pad.
+ * With upsampling=motion, where a frame has a #GstEventCameraFlowMeta, its optical flow up to the
+ * next frame is used instead of estimating it, unless frames were skipped in between.
+ * gst_buffer_add_event_camera_flow_meta() adds it, and `flowjoin` joins video and a stream of
+ * flow, such as a renderer's. Flow that is not finite counts as 0. With #GstEventSimDvs:write-flow,
+ * each buffer of events has the flow that was used, from its timestamp to its end; estimated flow
+ * is 0 far from changed pixels.
  *
  * ## Example launch lines
  * |[
@@ -42,11 +38,6 @@
  * |[
  * gst-launch-1.0 videotestsrc pattern=ball num-buffers=100 ! eventsim-dvs preset=v2e-noisy
  * threshold-sigma=0.03 seed=7 ! evtenc format=EVT3 ! filesink location=ball.raw
- * ]|
- * |[
- * gst-launch-1.0 eventsim-dvs name=dvs ! eventnpzenc ! filesink location=classes.npz  videotestsrc
- * pattern=ball num-buffers=100 ! dvs.sink  videotestsrc pattern=ball num-buffers=100 !
- * video/x-raw,format=GRAY8 ! dvs.label_sink
  * ]|
  */
 #include <algorithm>
@@ -402,7 +393,7 @@ static const EventSimulatorMethod dvs = {
         "noise",
     .threshold = std::nullopt,
     .labels = true,
-    .takes_flow = true,
+    .has_flow = true,
     .create = in_system_memory<eventcamera::make_dvs_simulator>,
     .make_settings = []() -> std::shared_ptr<void> {
       return std::make_shared<Guarded<Settings>>();

@@ -4,6 +4,7 @@
 #include <gst/gst.h>
 
 #include <string>
+#include <tuple>
 
 #include "gst/base/errors.hpp"
 #include "gst/base/event_caps.hpp"
@@ -15,10 +16,19 @@ inline const GstSegment& segment_of(GstEvent* event) {
   return *segment;
 }
 
-/// True if times of `next` go on from those of `current`.
+/// True if both segments give a timestamp the same running time and the same stream time.
 inline bool continues(const GstSegment& current, const GstSegment& next) {
-  return next.format == current.format && next.rate == current.rate && next.base == current.base &&
-         next.start == current.start && next.time == current.time;
+  const guint64 position = current.start > next.start ? current.start : next.start;
+  const auto times = [&](const GstSegment& segment) {
+    guint64 running = 0;
+    guint64 stream = 0;
+    const gint running_sign =
+        gst_segment_to_running_time_full(&segment, segment.format, position, &running);
+    const gint stream_sign =
+        gst_segment_to_stream_time_full(&segment, segment.format, position, &stream);
+    return std::tuple(segment.format, segment.rate, running_sign, running, stream_sign, stream);
+  };
+  return times(current) == times(next);
 }
 
 /// Posts an error message about a SEGMENT event, which it unrefs. Returns false.

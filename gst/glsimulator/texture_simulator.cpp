@@ -13,7 +13,6 @@
 
 #include "gst/base/owned.hpp"
 #include "gst/base/video_frame.hpp"
-#include "gst/glsimulator/finish_poll.hpp"
 #include "gst/glsimulator/mapped_texture.hpp"
 #include "gst/simulator/frame_luma.hpp"
 
@@ -62,9 +61,10 @@ void find_weights(const GstVideoInfo& video, int (&weights)[4]) {
   }
 }
 
-/// A simulator on the GPU. The events of an interval are read while the GPU works on the next one,
-/// or as soon as they are ready, so at most one interval is awaited. Every frame, including first
-/// and drawn ones, is held until the GPU has read it.
+/// A simulator on the GPU. The events of an interval are read once the next frame has been queued,
+/// so that the GPU has work while they are read and pushed; finish() reads them before. Both wait
+/// at a fence, in the thread of the context. Every frame, including first and drawn ones, is held
+/// until its fence has been reached.
 class TextureVideoSimulator final : public VideoSimulator {
  public:
   /// `context` is that of `shared`, which must outlive this object.
@@ -72,7 +72,6 @@ class TextureVideoSimulator final : public VideoSimulator {
                         const GstVideoInfo& video, MakeGlSimulator make)
       : element_(element),
         shared_(shared),
-        finish_poll_(element),
         context_(static_cast<GstGLContext*>(gst_object_ref(context))),
         frame_{FrameLuma::format_of(video), 0, {}} {
     set_video(video);
@@ -102,7 +101,8 @@ class TextureVideoSimulator final : public VideoSimulator {
 
   void set_drawn_video(const GstVideoInfo& drawn) override { drawn_ = drawn; }
 
-  void push(Interval interval, const eventcamera::Settings& settings) override {
+  std::optional<Interval> push(Interval interval, const eventcamera::Settings& settings,
+                               const KnownFlow&) override {
     {
       const OwnedBuffer uploaded = in_texture(interval.frame.get());
       const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
@@ -110,11 +110,11 @@ class TextureVideoSimulator final : public VideoSimulator {
       frame_.texture = texture.name();
       run([&] { simulator_->queue(frame_, interval.end, settings); });
     }
-    await({std::move(interval), false});
+    return finish_before({std::move(interval), false});
   }
 
   void draw(OwnedBuffer frame, Nanoseconds time, const eventcamera::Settings& settings,
-            const eventcamera::Palette& palette, GstBuffer* picture) override {
+            const KnownFlow&, const eventcamera::Palette& palette, GstBuffer* picture) override {
     {
       const OwnedBuffer uploaded = in_texture(frame.get());
       const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
@@ -130,47 +130,36 @@ class TextureVideoSimulator final : public VideoSimulator {
     auto* sync = gst_buffer_get_gl_sync_meta(picture);
     if (sync == nullptr) sync = gst_buffer_add_gl_sync_meta(context_, picture);
     gst_gl_sync_meta_set_sync_point(sync, context_);
-    await({{.frame = std::move(frame)}, true});
+    finish_before({{std::move(frame), time, time}, true});
   }
 
-  void push_finished() override {
-    if (!awaited_) return;
-    bool is_ready = false;
-    run([&] { is_ready = simulator_->is_ready(); });
-    if (is_ready)
-      finish();
-    else
-      finish_poll_.schedule();
-  }
-
-  void finish() override {
-    if (!awaited_) return;
-    finish_poll_.cancel();
-    auto [interval, is_drawn] = *std::exchange(awaited_, std::nullopt);
-    const EventBuckets* events = nullptr;
-    run([&] { events = simulator_->read(); });
-    if (!is_drawn) event_simulator_push_interval(G_OBJECT(element_), std::move(interval), events);
+  std::optional<Interval> finish() override {
+    if (!queued_) return std::nullopt;
+    auto [interval, is_drawn] = *std::exchange(queued_, std::nullopt);
+    run([&] { interval.events = simulator_->read(); });
+    if (is_drawn || interval.events == nullptr) return std::nullopt;
+    return std::move(interval);
   }
 
   void drop() override {
-    finish_poll_.cancel();
-    awaited_.reset();
+    queued_.reset();
     simulator_->drop();
   }
 
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
 
  private:
-  struct Awaited {
+  /// A frame that the GPU may still read.
+  struct Queued {
     Interval interval;
     bool is_drawn;
   };
 
-  /// Awaits the frame queued last, after pushing the previous interval.
-  void await(Awaited awaited) {
-    finish();
-    awaited_ = std::move(awaited);
-    push_finished();
+  /// Finishes the interval before the frame that was queued last, if any, and returns it.
+  std::optional<Interval> finish_before(Queued queued) {
+    auto finished = finish();
+    queued_ = std::move(queued);
+    return finished;
   }
 
   /// A frame that GstGLUpload can upload: it trusts that frames can be mapped, and takes textures
@@ -261,8 +250,7 @@ class TextureVideoSimulator final : public VideoSimulator {
 
   GstElement* element_;
   SharedContext& shared_;
-  FinishPoll finish_poll_;
-  std::optional<Awaited> awaited_;
+  std::optional<Queued> queued_;
   GstGLContext* context_;
   GstVideoInfo video_;
   GstVideoInfo drawn_{};

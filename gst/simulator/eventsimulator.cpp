@@ -2,22 +2,23 @@
 #include "gst/simulator/eventsimulator.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <utility>
 
 #include "gst/base/authors.hpp"
+#include "gst/base/event_pool.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/base/seek_request.hpp"
 #include "gst/base/types.hpp"
 #include "gst/drawing/drawn_video.hpp"
-#include "gst/simulator/buffers.hpp"
 #include "gst/simulator/caps.hpp"
-#include "gst/simulator/properties.hpp"
-#include "gst/simulator/stream_simulation.hpp"
+#include "gst/simulator/simulation.hpp"
 
 GST_DEBUG_CATEGORY(event_simulator_debug);
 #define GST_CAT_DEFAULT event_simulator_debug
@@ -25,7 +26,8 @@ GST_DEBUG_CATEGORY(event_simulator_debug);
 struct GstEventSimulatorPrivate {
   explicit GstEventSimulatorPrivate(GstEventSimulator* self) : simulation(self) {}
 
-  StreamSimulation simulation;
+  Simulation simulation;
+  std::atomic<bool> is_qos_set = false;  ///< by the application
   std::shared_ptr<void> method_settings;
 };
 
@@ -37,7 +39,7 @@ static GstEventSimulatorPrivate& priv_of(gpointer self) {
   return *static_cast<GstEventSimulatorPrivate*>(G_STRUCT_MEMBER_P(self, private_offset));
 }
 
-static StreamSimulation& simulation_of(gpointer self) {
+static Simulation& simulation_of(gpointer self) {
   return priv_of(self).simulation;
 }
 
@@ -47,26 +49,6 @@ static const EventSimulatorMethod& method_of(gpointer self) {
 
 void* event_simulator_settings(GObject* object) {
   return priv_of(object).method_settings.get();
-}
-
-Guarded<SimulatorSettings>& simulator_settings_of(GObject* object) {
-  return simulation_of(object).settings;
-}
-
-Guarded<SimulatorQos>& simulator_qos_of(GObject* object) {
-  return simulation_of(object).timing.qos();
-}
-
-void event_simulator_push_interval(GObject* element, Interval interval,
-                                   const eventcamera::EventBuckets* events) {
-  simulation_of(element).push_interval(std::move(interval), events);
-}
-
-void event_simulator_push_finished(GstElement* element) {
-  GstPad* pad = GST_BASE_TRANSFORM_SINK_PAD(element);
-  GST_PAD_STREAM_LOCK(pad);
-  simulation_of(element).push_finished();
-  GST_PAD_STREAM_UNLOCK(pad);
 }
 
 /* negotiation */
@@ -87,23 +69,90 @@ static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection direction, GstCap
   return event_simulator_fixate_output(other);
 }
 
-/// True if the events are drawn here.
-static bool draws(GstBaseTransform* transform) {
-  const OwnedCaps caps(gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(transform)));
-  return caps && event_simulator_draws(caps.get());
+static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
+  if (!simulation_of(transform).set_caps(in, out)) return FALSE;
+  // Skipped frames make the view of events recent, and a recording of events worse.
+  if (!priv_of(transform).is_qos_set)
+    gst_base_transform_set_qos_enabled(transform, event_simulator_draws(out));
+  return TRUE;
 }
 
-static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
-  return simulation_of(transform).set_caps(in, out);
+/* buffers */
+
+static gboolean propose_allocation(GstBaseTransform* transform, GstQuery* decide, GstQuery* query) {
+  gst_query_add_allocation_meta(query, GST_VIDEO_META_API_TYPE,
+                                nullptr);  // any stride is supported
+  GstAllocationParams params;
+  gst_allocation_params_init(&params);
+  params.align = 63;  // vectors of pixels do not straddle cache lines
+  gst_query_add_allocation_param(query, nullptr, &params);
+  return PARENT_TRANSFORM_CLASS->propose_allocation(transform, decide, query);
+}
+
+/// Always uses a GstEventPool, because downstream's pools have buffers of a fixed size.
+static void decide_on_event_pool(GstQuery* query) {
+  while (gst_query_get_n_allocation_pools(query) > 0)
+    gst_query_remove_nth_allocation_pool(query, 0);
+  auto* pool = event_pool_new();
+  gst_query_add_allocation_pool(query, pool, 0, 0, 0);
+  gst_object_unref(pool);
+}
+
+static gboolean decide_allocation(GstBaseTransform* transform, GstQuery* query) {
+  GstCaps* caps = nullptr;
+  gst_query_parse_allocation(query, &caps, nullptr);
+  if (!event_simulator_draws(caps))
+    decide_on_event_pool(query);
+  else if (!decide_on_drawn_pool(query, caps))
+    return FALSE;
+  return PARENT_TRANSFORM_CLASS->decide_allocation(transform, query);
+}
+
+static gboolean transform_size(GstBaseTransform*, GstPadDirection direction, GstCaps*, gsize,
+                               GstCaps* other, gsize* other_size) {
+  GstVideoInfo drawn;
+  if (direction != GST_PAD_SINK || !event_simulator_draws(other) ||
+      !gst_video_info_from_caps(&drawn, other))
+    return FALSE;
+  *other_size = GST_VIDEO_INFO_SIZE(&drawn);
+  return TRUE;
+}
+
+/// Copies nothing: intervals inherit no metadata from the frame that ends them.
+static gboolean copy_no_metadata(GstBaseTransform*, GstBuffer*, GstBuffer*) {
+  return TRUE;
+}
+
+/// Never called, because generate_output() is overridden. GstBaseTransform allocates output buffers
+/// only for classes that have a transform().
+static GstFlowReturn transform_not_in_place(GstBaseTransform*, GstBuffer*, GstBuffer*) {
+  return GST_FLOW_NOT_SUPPORTED;
+}
+
+GstFlowReturn event_simulator_prepare_buffer(GstBaseTransform* element, GstBuffer* in,
+                                             GstBuffer** out) {
+  return PARENT_TRANSFORM_CLASS->prepare_output_buffer(element, in, out);
 }
 
 /* data, events, queries */
 
-/// Passes on a frame. Output is pushed by the simulator, possibly later.
+/// Takes a frame, unless GstBaseTransform skips it for QoS: then the next interval is longer.
+static GstFlowReturn submit_input_buffer(GstBaseTransform* transform, gboolean is_discont,
+                                         GstBuffer* frame) {
+  auto& simulation = simulation_of(transform);
+  if (GST_BUFFER_IS_DISCONT(frame)) simulation.interrupt();
+  const GstFlowReturn result =
+      PARENT_TRANSFORM_CLASS->submit_input_buffer(transform, is_discont, frame);
+  if (result == GST_BASE_TRANSFORM_FLOW_DROPPED) simulation.skip_frame();
+  return result;
+}
+
+/// Simulates the frame that was submitted. The simulation pushes its output, which can be a buffer,
+/// a GAP, or several of both.
 static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** out) {
   *out = nullptr;
-  return simulation_of(transform).take_frame(
-      OwnedBuffer(std::exchange(transform->queued_buf, nullptr)));
+  OwnedBuffer frame(std::exchange(transform->queued_buf, nullptr));
+  return frame ? simulation_of(transform).push_frame(std::move(frame)) : GST_FLOW_OK;
 }
 
 /// Replaces a segment in another format than TIME, as from byte sources, by a TIME segment for the
@@ -125,29 +174,24 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
     case GST_EVENT_SEGMENT:
       event = segment_of_times(event);
       if (!plays_events(transform, event, "simulate")) return FALSE;
-      if (!continues(transform->segment, segment_of(event))) simulation.start_timeline();
+      if (!continues(transform->segment, segment_of(event))) {
+        simulation.end();
+        simulation.start_timeline();
+      }
       break;
     case GST_EVENT_GAP:
-      if (!simulation.take_gap(event)) {
+      if (simulation.hold_through(event)) {
         gst_event_unref(event);
         return TRUE;
       }
       break;
     case GST_EVENT_STREAM_START:
-      simulation.start_timeline();
-      break;
-    case GST_EVENT_FLUSH_START:
-      for (auto* companion : simulation.companions()) companion->set_flushing(true);
-      break;
     case GST_EVENT_FLUSH_STOP:
-      for (auto* companion : simulation.companions()) companion->set_flushing(false);
       simulation.start_timeline();
       break;
     case GST_EVENT_EOS:
-      simulation.end();
-      break;
     case GST_EVENT_SEGMENT_DONE:
-      for (auto* companion : simulation.companions()) companion->end_segment();
+      simulation.end();
       break;
     default:
       break;
@@ -155,72 +199,45 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
 }
 
-/// True if a condition holds for the pads of class images and flow that are linked.
-template <class Condition>
-static bool all_companions(GstBaseTransform* transform, const Condition& condition) {
-  return std::ranges::all_of(simulation_of(transform).companions(), [&](auto* companion) {
-    const OwnedPad pad = companion->pad();
-    return !pad || !gst_pad_is_linked(pad.get()) || condition(pad.get());
-  });
-}
-
-/// True if a seek can be forwarded. Class images and flow must stay with the video, so none of
-/// their upstreams may refuse.
-static bool can_seek(GstBaseTransform* transform, const SeekRequest& request) {
-  const auto would = [&](GstPad* pad) { return would_seek(pad, request); };
-  return all_companions(transform, [](GstPad*) { return false; }) ||
-         (would(GST_BASE_TRANSFORM_SINK_PAD(transform)) && all_companions(transform, would));
-}
-
-/// Range of the video, if class images and flow can stay with it.
-static gboolean answer_seeking(GstBaseTransform* transform, GstQuery* query) {
-  if (!PARENT_TRANSFORM_CLASS->query(transform, GST_PAD_SRC, query)) return FALSE;
-  GstFormat format = GST_FORMAT_UNDEFINED;
-  gboolean seekable = FALSE;
-  gint64 start = -1;
-  gint64 end = -1;
-  gst_query_parse_seeking(query, &format, &seekable, &start, &end);
-  const bool all_can = all_companions(transform, [&](GstPad* pad) {
-    return format == GST_FORMAT_TIME && peer_can_seek(pad, format);
-  });
-  gst_query_set_seeking(query, format, all_can ? seekable : FALSE, start, end);
-  return TRUE;
-}
-
-static gboolean seek(GstBaseTransform* transform, OwnedEvent event) {
-  const bool is_alone = all_companions(transform, [](GstPad*) { return false; });
-  if (!is_alone && !count_from_start(event, GST_BASE_TRANSFORM_SINK_PAD(transform))) return FALSE;
-  const SeekRequest request(event.get());
-  if (request.rate() < 0) {
-    GST_WARNING_OBJECT(transform,
-                       "refused to seek at rate %g: events cannot be simulated backwards",
-                       request.rate());
-    return FALSE;
+/// Skips the frames that would be late as well. As GstVideoDecoder does: after a late picture, also
+/// the frames that came in during the time lost, so that the next one has time to spare; but no
+/// frame that has not come yet, because that has not waited. The event is not forwarded: only this
+/// element skips frames.
+static void handle_qos(GstBaseTransform* transform, GstEvent* event) {
+  GstQOSType type = GST_QOS_TYPE_UNDERFLOW;
+  gdouble proportion = 1;
+  GstClockTimeDiff late = 0;
+  GstClockTime time = GST_CLOCK_TIME_NONE;
+  gst_event_parse_qos(event, &type, &proportion, &late, &time);
+  gst_event_unref(event);
+  const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(transform));
+  if (time > G_MAXINT64 || late > G_MAXINT64 / 4) return;
+  if (late > 0 && type != GST_QOS_TYPE_THROTTLE) {
+    const auto interval = static_cast<GstClockTimeDiff>(simulation_of(transform).interval());
+    const auto waited = now > time && now < G_MAXINT64 ? GST_CLOCK_DIFF(time, now) : G_MAXINT64;
+    late = std::max(late, std::min(2 * late + interval, waited));
   }
-  if (!can_seek(transform, request)) {
-    GST_WARNING_OBJECT(transform, "an upstream would refuse: refused %" GST_PTR_FORMAT,
-                       event.get());
-    return FALSE;
-  }
-  const auto companions = simulation_of(transform).companions();
-  for (auto* companion : companions) companion->set_seeking(true);
-  for (auto* companion : companions)
-    if (const OwnedPad pad = companion->pad())
-      gst_pad_push_event(pad.get(), gst_event_ref(event.get()));
-  const gboolean done = PARENT_TRANSFORM_CLASS->src_event(transform, event.release());
-  for (auto* companion : companions) companion->set_seeking(false);
-  return done;
+  gst_base_transform_update_qos(transform, proportion, late, time);
 }
 
 static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_QOS) {
-    // Not forwarded: only this element skips frames.
-    simulation_of(transform).timing.qos().lock()->take_event(transform, event);
-    gst_event_unref(event);
+    handle_qos(transform, event);
     return TRUE;
   }
-  if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) return seek(transform, OwnedEvent(event));
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK && SeekRequest(event).rate() < 0) {
+    GST_WARNING_OBJECT(transform,
+                       "refused %" GST_PTR_FORMAT ": events cannot be simulated backwards", event);
+    gst_event_unref(event);
+    return FALSE;
+  }
   return PARENT_TRANSFORM_CLASS->src_event(transform, event);
+}
+
+/// True if the events are drawn here.
+static bool draws(GstBaseTransform* transform) {
+  const OwnedCaps caps(gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(transform)));
+  return caps && event_simulator_draws(caps.get());
 }
 
 static gboolean query(GstBaseTransform* transform, GstPadDirection direction, GstQuery* query) {
@@ -228,36 +245,10 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
   const bool is_serialized =
       (gst_query_type_get_flags(GST_QUERY_TYPE(query)) & GST_QUERY_TYPE_SERIALIZED) != 0;
   if (direction == GST_PAD_SINK && is_serialized) simulation_of(transform).finish();
-  if (direction == GST_PAD_SRC && GST_QUERY_TYPE(query) == GST_QUERY_SEEKING)
-    return answer_seeking(transform, query);
-  if (direction != GST_PAD_SRC || GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
-    return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
-
-  const GstClockTime latency = simulation_of(transform).timing.latency();
-  return answer_latency(GST_CAT_DEFAULT, GST_BASE_TRANSFORM_SINK_PAD(transform), query, latency);
-}
-
-static GstPad* request_new_pad(GstElement* element, GstPadTemplate* pad_template, const gchar*,
-                               const GstCaps*) {
-  auto& simulation = simulation_of(element);
-  const bool is_of_labels =
-      g_strcmp0(GST_PAD_TEMPLATE_NAME_TEMPLATE(pad_template), "label_sink") == 0;
-  if (is_of_labels) return simulation.class_images.add_to(element, pad_template);
-  return simulation.flow_tensors.add_to(element, pad_template);
-}
-
-static void release_pad(GstElement* element, GstPad* pad) {
-  for (auto* companion : simulation_of(element).companions())
-    if (companion->pad().get() == pad) companion->remove_from(element, pad);
-}
-
-/// Ends the waiting of threads before their pads are deactivated.
-static GstStateChangeReturn change_state(GstElement* element, GstStateChange change) {
-  for (auto* companion : simulation_of(element).companions()) {
-    if (change == GST_STATE_CHANGE_READY_TO_PAUSED) companion->start();
-    if (change == GST_STATE_CHANGE_PAUSED_TO_READY) companion->stop();
-  }
-  return GST_ELEMENT_CLASS(parent_class)->change_state(element, change);
+  if (direction == GST_PAD_SRC && GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
+    return answer_latency(GST_CAT_DEFAULT, GST_BASE_TRANSFORM_SINK_PAD(transform), query,
+                          simulation_of(transform).latency());
+  return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 }
 
 static gboolean start(GstBaseTransform* transform) {
@@ -267,19 +258,120 @@ static gboolean start(GstBaseTransform* transform) {
       return FALSE;
     }
   }
-  const auto qos = simulation_of(transform).timing.qos().lock();
-  qos->start_over();
-  qos->reset_stats();
+  *simulation_of(transform).stats.lock() = {};
   return TRUE;
 }
 
 static gboolean stop(GstBaseTransform* transform) {
-  GstPad* pad = GST_BASE_TRANSFORM_SINK_PAD(transform);
-  GST_PAD_STREAM_LOCK(pad);  // see event_simulator_push_finished()
   simulation_of(transform).reset();
-  GST_PAD_STREAM_UNLOCK(pad);
-  simulation_of(transform).timing.reset();
   return TRUE;
+}
+
+/* properties */
+
+static Guarded<SimulatorSettings>& settings_of(GObject* object) {
+  return simulation_of(object).settings;
+}
+
+static constexpr guint max_interpolated_frames = 255;
+
+static constexpr auto controllable_flags =
+    static_cast<GParamFlags>(mutable_playing_flags | GST_PARAM_CONTROLLABLE);
+
+/// `grey_levels` is the default of both thresholds.
+static void install_thresholds(GObjectClass* klass, double grey_levels) {
+  Properties<settings_of> properties(klass);
+  properties.add(
+      [](SimulatorSettings& settings) -> double& { return settings.simulation.positive_threshold; },
+      g_param_spec_double("positive-threshold", "Positive threshold",
+                          "Contrast threshold of ON events: brightness must rise by more than "
+                          "this (8-bit grey levels at any bit depth)",
+                          0, 255, grey_levels, controllable_flags));
+  properties.add(
+      [](SimulatorSettings& settings) -> double& { return settings.simulation.negative_threshold; },
+      g_param_spec_double("negative-threshold", "Negative threshold",
+                          "Contrast threshold of OFF events: brightness must fall by more than "
+                          "this (8-bit grey levels at any bit depth, a magnitude)",
+                          0, 255, grey_levels, controllable_flags));
+}
+
+static void install_interpolated_frames(GObjectClass* klass) {
+  Properties<settings_of>(klass).add(
+      [](SimulatorSettings& settings) -> int& { return settings.simulation.interpolated_frames; },
+      g_param_spec_uint("interpolated-frames", "Interpolated frames",
+                        "Number of frames to interpolate between two frames of the video; "
+                        "events take those frames' timestamps (at most one frame per microsecond)",
+                        0, max_interpolated_frames,
+                        static_cast<guint>(eventcamera::Settings().interpolated_frames),
+                        mutable_playing_flags));
+}
+
+static void install_label(GObjectClass* klass) {
+  Properties<settings_of>(klass).add(
+      [](SimulatorSettings& settings) -> bool& { return settings.simulation.labels; },
+      g_param_spec_boolean("label", "Label",
+                           "Label each event with its cause: light, leak, shot noise, hot pixel or "
+                           "exposure pulse. Events drawn as video have no labels",
+                           FALSE, mutable_playing_flags));
+}
+
+static void install_settings(GObjectClass* klass) {
+  Properties<settings_of> properties(klass);
+  properties.add([](SimulatorSettings& settings) -> int& { return settings.simulation.threads; },
+                 g_param_spec_uint("n-threads", "Threads",
+                                   "Maximum number of threads (0 = one per processor); the events "
+                                   "do not depend on it",
+                                   0, G_MAXINT, 0, mutable_playing_flags));
+  properties.add(
+      &SimulatorSettings::palette,
+      g_param_spec_enum("palette", "Palette", "Colours of event frames (accumulated-event video)",
+                        palette_type(), static_cast<int>(SimulatorSettings().palette),
+                        mutable_playing_flags));
+}
+
+static void install_write_flow(GObjectClass* klass) {
+  Properties<settings_of>(klass).add(
+      &SimulatorSettings::write_flow,
+      g_param_spec_boolean("write-flow", "Write flow",
+                           "Add the optical flow of each interval to its buffer of events, as a "
+                           "GstEventCameraFlowMeta: the motion of each pixel from the start of the "
+                           "buffer to its end. Events drawn as video have none",
+                           FALSE, mutable_playing_flags));
+}
+
+static void set_qos(GObject* object, const GValue* value) {
+  priv_of(object).is_qos_set = true;
+  gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(object), g_value_get_boolean(value));
+}
+
+static void get_qos(GObject* object, GValue* value) {
+  g_value_set_boolean(value, gst_base_transform_is_qos_enabled(GST_BASE_TRANSFORM(object)));
+}
+
+static GstStructure* stats_of(GObject* object) {
+  const auto stats = simulation_of(object).stats.copy();
+  return gst_structure_new("application/x-event-simulator-stats", "frames", G_TYPE_UINT64,
+                           stats.frames, "skipped-frames", G_TYPE_UINT64, stats.skipped_frames,
+                           "processing-time", G_TYPE_UINT64, stats.processing_time, nullptr);
+}
+
+/// Overrides the property `qos` of GstBaseTransform, which is off by default.
+static void install_qos_properties(GObjectClass* klass) {
+  install_property(
+      klass, {set_qos, get_qos},
+      g_param_spec_boolean("qos", "QoS",
+                           "Skip whole frames, without processing them, if downstream is late; the "
+                           "next interval is longer. By default on for events drawn as video, off "
+                           "for events",
+                           TRUE, mutable_playing_flags));
+  install_stats(klass, stats_of,
+                "Counters since start: frames (processed), skipped-frames (due to qos), "
+                "processing-time (of all processed frames, ns)");
+}
+
+static void install_base_properties(GObjectClass* klass) {
+  install_settings(klass);
+  install_qos_properties(klass);
 }
 
 /* type */
@@ -303,8 +395,7 @@ static void finalize(GObject* object) {
 
 static void gst_event_simulator_init(GstEventSimulator* self) {
   std::construct_at(&priv_of(self), self);
-  // SimulatorQos decides which frames are skipped.
-  gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
+  gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), TRUE);
 }
 
 static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
@@ -315,16 +406,16 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   object_class->finalize = finalize;
   install_base_properties(object_class);
 
-  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
-  element_class->request_new_pad = request_new_pad;
-  element_class->release_pad = release_pad;
-  element_class->change_state = change_state;
-
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
   transform_class->transform_caps = transform_caps;
   transform_class->fixate_caps = fixate_caps;
   transform_class->set_caps = set_caps;
-  event_simulator_class_install_buffers(transform_class);
+  transform_class->propose_allocation = propose_allocation;
+  transform_class->decide_allocation = decide_allocation;
+  transform_class->transform_size = transform_size;
+  transform_class->copy_metadata = copy_no_metadata;
+  transform_class->transform = transform_not_in_place;
+  transform_class->submit_input_buffer = submit_input_buffer;
   transform_class->generate_output = generate_output;
   transform_class->sink_event = sink_event;
   transform_class->src_event = src_event;
@@ -353,14 +444,8 @@ static void method_class_init(gpointer klass, gpointer row) {
   method.video.install_pads(GST_ELEMENT_CLASS(klass));
   if (method.threshold) install_thresholds(object_class, *method.threshold);
   if (method.interpolates) install_interpolated_frames(object_class);
-  if (method.labels) {
-    install_label(object_class);
-    add_pad_template(GST_ELEMENT_CLASS(klass), "label_sink", GST_PAD_SINK, CLASS_IMAGE_CAPS,
-                     GST_PAD_REQUEST);
-  }
-  if (method.takes_flow)
-    add_pad_template(GST_ELEMENT_CLASS(klass), "flow_sink", GST_PAD_SINK, FLOW_TENSOR_CAPS,
-                     GST_PAD_REQUEST);
+  if (method.labels) install_label(object_class);
+  if (method.has_flow) install_write_flow(object_class);
   if (method.install_properties != nullptr) method.install_properties(object_class);
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), method.long_name,
                                         "Filter/Effect/Converter/Video", method.description,

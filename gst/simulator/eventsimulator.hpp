@@ -17,12 +17,12 @@
 ///
 /// N frames give N - 1 intervals; the first frame after start, flush or a discontinuity only serves
 /// as reference for the next one. An interval has the PTS of its first frame and is pushed when its
-/// last frame arrives, so the latency is one frame plus the processing time; at the latest, before
-/// any serialized event or query is handled. In an event stream, an interval without events is a
-/// GAP. In drawn video, an interval is a picture that replaces its last frame, with that frame's
-/// timestamps and those of its metas that remain valid, so the latency is the processing time. If
-/// frames are skipped, the picture lasts until the next expected picture. A first frame gives an
-/// empty picture.
+/// last frame arrives, so the latency is one frame plus the processing time. A GPU may still work
+/// on the last interval of a stream that is not live; then it is pushed with the next frame, or
+/// before any serialized event or query is handled. In an event stream, an interval without events
+/// is a GAP. In drawn video, an interval is a picture that replaces its last frame, with that
+/// frame's timestamps and those of its metas that remain valid, so the latency is the processing
+/// time. A first frame gives an empty picture.
 struct EventSimulatorMethod {
   const char* type_name;
   const char* long_name;
@@ -31,8 +31,8 @@ struct EventSimulatorMethod {
   /// does not have these properties.
   std::optional<double> threshold;
   bool interpolates = false;  ///< has the property interpolated-frames
-  bool labels = false;        ///< has the property label and the pad label_sink
-  bool takes_flow = false;    ///< has the pad flow_sink
+  bool labels = false;        ///< has the property label
+  bool has_flow = false;      ///< reads the flow of frames, and has the property write-flow
 
   /// Creates the simulator of an element for frames of this format. May throw.
   std::unique_ptr<VideoSimulator> (*create)(GObject* element, const GstVideoInfo& video);
@@ -67,6 +67,10 @@ struct _GstEventSimulatorClass {
 /// `parent`.
 GType event_simulator_type(const EventSimulatorMethod& method,
                            GType parent = GST_TYPE_EVENT_SIMULATOR);
+
+/// Acquires an output buffer from the pool of the element. `in` is the frame that it is made of.
+GstFlowReturn event_simulator_prepare_buffer(GstBaseTransform* element, GstBuffer* in,
+                                             GstBuffer** out);
 
 /// Returns the result of make_settings() for an element.
 void* event_simulator_settings(GObject* object);

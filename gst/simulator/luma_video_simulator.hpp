@@ -13,9 +13,8 @@
 /// Simulator of frames in system memory.
 class LumaVideoSimulator final : public VideoSimulator {
  public:
-  LumaVideoSimulator(GObject* element, const GstVideoInfo& video,
-                     std::unique_ptr<eventcamera::Simulator> simulator)
-      : element_(element), video_(video), luma_(video), simulator_(std::move(simulator)) {}
+  LumaVideoSimulator(const GstVideoInfo& video, std::unique_ptr<eventcamera::Simulator> simulator)
+      : video_(video), luma_(video), simulator_(std::move(simulator)) {}
 
   void set_video(const GstVideoInfo& video) override {
     video_ = video;
@@ -26,14 +25,17 @@ class LumaVideoSimulator final : public VideoSimulator {
     drawing_ = Drawing{drawn, {GST_VIDEO_INFO_WIDTH(&drawn), GST_VIDEO_INFO_HEIGHT(&drawn)}};
   }
 
-  void push(Interval interval, const eventcamera::Settings& settings) override {
-    const auto* events = simulate(interval.frame.get(), interval.end, settings);
-    event_simulator_push_interval(element_, std::move(interval), events);
+  std::optional<Interval> push(Interval interval, const eventcamera::Settings& settings,
+                               const KnownFlow& flow) override {
+    interval.events = simulate(interval.frame.get(), interval.end, settings, flow);
+    if (interval.events == nullptr) return std::nullopt;  // after a first frame
+    return interval;
   }
 
   void draw(OwnedBuffer frame, eventcamera::Nanoseconds time, const eventcamera::Settings& settings,
-            const eventcamera::Palette& palette, GstBuffer* picture) override {
-    const auto* events = simulate(frame.get(), time, settings);
+            const KnownFlow& flow, const eventcamera::Palette& palette,
+            GstBuffer* picture) override {
+    const auto* events = simulate(frame.get(), time, settings, flow);
     const VideoFrame mapped(drawing_->video, picture, GST_MAP_WRITE);
     if (!mapped) throw cannot_draw(mapped.fault());
     if (events != nullptr) drawing_->accumulator.add(*events, simulator_->threads());
@@ -50,13 +52,13 @@ class LumaVideoSimulator final : public VideoSimulator {
   };
 
   const eventcamera::EventBuckets* simulate(GstBuffer* frame, eventcamera::Nanoseconds time,
-                                            const eventcamera::Settings& settings) {
+                                            const eventcamera::Settings& settings,
+                                            const KnownFlow& flow) {
     const VideoFrame mapped(video_, frame, GST_MAP_READ);
     if (!mapped) throw cannot_read(mapped.fault());
-    return simulator_->push(luma_.of(mapped, simulator_->threads()), time, settings);
+    return simulator_->push(luma_.of(mapped, simulator_->threads()), time, settings, flow);
   }
 
-  GObject* element_;
   GstVideoInfo video_;
   FrameLuma luma_;
   std::optional<Drawing> drawing_;
@@ -65,6 +67,6 @@ class LumaVideoSimulator final : public VideoSimulator {
 
 /// For EventSimulatorMethod::create: a simulator made by `make` from the format of the luma.
 template <auto make>
-std::unique_ptr<VideoSimulator> in_system_memory(GObject* element, const GstVideoInfo& video) {
-  return std::make_unique<LumaVideoSimulator>(element, video, make(FrameLuma::format_of(video)));
+std::unique_ptr<VideoSimulator> in_system_memory(GObject*, const GstVideoInfo& video) {
+  return std::make_unique<LumaVideoSimulator>(video, make(FrameLuma::format_of(video)));
 }

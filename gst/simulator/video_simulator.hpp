@@ -10,28 +10,24 @@
 
 #include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
+#include "src/flow/dense_flow.hpp"
 #include "src/render/palette.hpp"
 #include "src/simulate/simulator.hpp"
 
 /// An interval between two frames.
 struct Interval {
   OwnedBuffer frame;  ///< frame that ends it
-  eventcamera::Nanoseconds start = 0;
-  eventcamera::Nanoseconds end = 0;
-  std::optional<eventcamera::Nanoseconds> work_began{};  ///< on the frame
+  eventcamera::Nanoseconds start;
+  eventcamera::Nanoseconds end;
+  /// Null until it is finished. Valid until the next call of the simulator.
+  const eventcamera::EventBuckets* events = nullptr;
 };
 
-/// Ends the work on the frame of an interval, releases it, and pushes the events of the interval: a
-/// GAP if there are none; nothing if `events` is null, after a first frame. Called by the element's
-/// VideoSimulator, with the stream lock. May throw.
-void event_simulator_push_interval(GObject* element, Interval interval,
-                                   const eventcamera::EventBuckets* events);
+/// Motion from the last frame to this one, if it is known.
+using KnownFlow = std::optional<eventcamera::ImageView<eventcamera::Flow>>;
 
-/// Calls push_finished() of the simulator of this element, if it has one, with the stream lock.
-/// Failures are reported, and drop the simulator.
-void event_simulator_push_finished(GstElement* element);
-
-/// Simulator of frames in buffers of any kind of memory. Called with the stream lock.
+/// Simulator of frames in buffers of any kind of memory. push(), draw() and finish() throw
+/// VideoSimulatorError as well as what the simulator throws.
 class VideoSimulator {
  public:
   virtual ~VideoSimulator() = default;
@@ -42,23 +38,20 @@ class VideoSimulator {
   /// Sets the format of the next pictures.
   virtual void set_drawn_video(const GstVideoInfo& drawn) = 0;
 
-  /// Simulates the interval, and calls event_simulator_push_interval() before it returns or, if the
-  /// events are ready later, from a later call, in order. Throws VideoSimulatorError as well.
-  virtual void push(Interval interval, const eventcamera::Settings& settings) = 0;
+  /// Simulates an interval; for a first frame, it is empty. Returns the interval that is finished,
+  /// if any: this one or, if another processor is still working on it, the one before.
+  virtual std::optional<Interval> push(Interval interval, const eventcamera::Settings& settings,
+                                       const KnownFlow& flow) = 0;
 
-  /// Draws the events until `frame` in the buffer `picture` (none for a first frame). Throws
-  /// VideoSimulatorError as well.
+  /// Draws the events until `frame` in the buffer `picture` (none for a first frame).
   virtual void draw(OwnedBuffer frame, eventcamera::Nanoseconds time,
-                    const eventcamera::Settings& settings, const eventcamera::Palette& palette,
-                    GstBuffer* picture) = 0;
+                    const eventcamera::Settings& settings, const KnownFlow& flow,
+                    const eventcamera::Palette& palette, GstBuffer* picture) = 0;
 
-  /// Pushes the finished intervals, and releases frames that have been read.
-  virtual void push_finished() {}
+  /// Waits for the last interval, and returns it unless push() did.
+  virtual std::optional<Interval> finish() { return std::nullopt; }
 
-  /// Waits for the pending intervals, and pushes them.
-  virtual void finish() {}
-
-  /// Forgets the pending intervals.
+  /// Forgets the last interval.
   virtual void drop() {}
 
   virtual eventcamera::IntervalSimulator& simulator() = 0;

@@ -205,12 +205,13 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   ImageView<Flow> find_flow() {
-    if (given_flow_) {
+    if (flow_) {
       frame_flow_.forget();
-      return *given_flow_;
+      return *flow_;
     }
     const Box changed = changed_box(last_.view(), now_.view(), 0);
-    return frame_flow_.find(FlowMethod::dis_mq, format().bits, last_, now_, changed, threads());
+    flow_ = frame_flow_.find(FlowMethod::dis_mq, format().bits, last_, now_, changed, threads());
+    return *flow_;
   }
 
   /// Calls advance_row(y, scratch) for each row, band by band in parallel.

@@ -12,10 +12,6 @@ void Fence::set() {
   gl_.Flush();
 }
 
-bool Fence::is_reached() const {
-  return gl_.ClientWaitSync(sync_, 0, 0) != GL_TIMEOUT_EXPIRED;
-}
-
 void Fence::wait() const {
   const GLenum state = gl_.ClientWaitSync(sync_, 0, patience);
   gl_.check();

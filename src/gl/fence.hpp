@@ -16,9 +16,6 @@ class Fence {
   /// Moves it to the end of the queue.
   void set();
 
-  /// True if the GPU has reached it.
-  bool is_reached() const;
-
   /// Waits until the GPU has reached it. Throws Error.
   void wait() const;
 

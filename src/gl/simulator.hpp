@@ -35,9 +35,6 @@ class Simulator : public IntervalSimulator {
   void draw(const TextureFrame& frame, Nanoseconds time, const Settings& settings,
             const Picture& picture);
 
-  /// True if the GPU has finished the first queued frame.
-  bool is_ready() const { return queue_[first_].done.is_reached(); }
-
   /// Waits until the GPU has finished the first queued frame. Returns the sorted events of the
   /// interval that it ends, valid until the next call; nullptr if it ends none.
   const EventBuckets* read();

@@ -32,7 +32,7 @@ class InterpolatingSimulator final : public DenseSimulator {
     now_.assign(frame.as<Pixel>());
     const auto thresholds = Thresholds::of(settings, format().bits);
     const InterpolatedInterval<Pixel> interval{{last_.view(), now_.view(), steps.count()},
-                                               find_flow(thresholds),
+                                               flow_of_interval(thresholds),
                                                interpolation_,
                                                steps,
                                                thresholds};
@@ -42,14 +42,15 @@ class InterpolatingSimulator final : public DenseSimulator {
 
   /// Only pixels that changed by more than a threshold can fire, so flow is needed only around
   /// them.
-  ImageView<Flow> find_flow(const Thresholds& thresholds) {
-    if (given_flow_) {
+  ImageView<Flow> flow_of_interval(const Thresholds& thresholds) {
+    if (flow_) {
       frame_flow_.forget();
-      return *given_flow_;
+      return *flow_;
     }
     const Box changed =
         changed_box(last_.view(), now_.view(), std::min(thresholds.positive, thresholds.negative));
-    return frame_flow_.find(flow_, format().bits, last_, now_, changed, threads());
+    flow_ = frame_flow_.find(method_, format().bits, last_, now_, changed, threads());
+    return *flow_;
   }
 
   Image<Pixel> last_;

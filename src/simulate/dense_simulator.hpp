@@ -14,12 +14,12 @@ namespace eventcamera {
 /// Differences of successive frames are thresholded; events take the time of the later frame.
 class DenseSimulator : public Simulator {
  public:
-  void set_flow(FlowMethod flow) { flow_ = flow; }
+  void set_flow(FlowMethod method) { method_ = method; }
   void set_interpolation(Interpolation interpolation) { interpolation_ = interpolation; }
 
  protected:
   using Simulator::Simulator;
-  FlowMethod flow_ = FlowMethod::dis_lq;
+  FlowMethod method_ = FlowMethod::dis_lq;
   Interpolation interpolation_ = Interpolation::forward;
 };
 

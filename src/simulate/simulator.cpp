@@ -18,6 +18,7 @@ const EventBuckets* IntervalSimulator::hold_until(Nanoseconds time, const Settin
   if (!last_time_) return nullptr;
   threads_.set_threads(settings.threads);
   labels_ = settings.labels;
+  flow_.reset();
   const Nanoseconds duration = time - *last_time_;
   const bool has_noise =
       duration > 0 && duration <= max_interval && hold(StepTimes(duration, 1), settings, events_);
@@ -30,14 +31,15 @@ void IntervalSimulator::reset() {
 }
 
 const EventBuckets* Simulator::push(const LumaView& frame, Nanoseconds time,
-                                    const Settings& settings) {
+                                    const Settings& settings,
+                                    const std::optional<ImageView<Flow>>& known_flow) {
   assert(frame.format == format());
   const auto steps = steps_to(time, settings);
+  flow_ = steps ? known_flow : std::nullopt;
   if (steps)
     simulate(frame, *steps, settings, events_);
   else
     start(frame);
-  given_flow_.reset();
   last_time_ = time;
   return steps ? &events_ : nullptr;
 }

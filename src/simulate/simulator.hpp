@@ -81,11 +81,12 @@ class IntervalSimulator {
   /// Writes the labels of all events of the last interval, which EventBuckets::write_to() wrote.
   virtual void label(const LabelledEvents&) {}
 
-  /// True if the simulator will find the optical flow of the next interval, unless it is given.
+  /// True if the simulator estimates the optical flow of each interval, unless it is known.
   virtual bool needs_flow() const { return false; }
 
-  /// Gives the flow up to the next frame, a view of an Image that is valid until it is pushed.
-  void give_flow(const ImageView<Flow>& flow) { given_flow_ = flow; }
+  /// Flow of the last interval, known or estimated; none if the simulator needed none. Valid until
+  /// the next call. Estimated flow is 0 far from changed pixels.
+  const std::optional<ImageView<Flow>>& flow() const { return flow_; }
 
   /// Forgets all frames; the next one is a first frame.
   void reset();
@@ -105,8 +106,8 @@ class IntervalSimulator {
   /// Fills `events` with noise events of an unchanged frame; false if the simulator has no noise.
   virtual bool hold(const StepTimes&, const Settings&, EventBuckets&) { return false; }
 
-  std::optional<Nanoseconds> last_time_;       ///< of the last frame, where an interval begins
-  std::optional<ImageView<Flow>> given_flow_;  ///< of the next interval
+  std::optional<Nanoseconds> last_time_;  ///< of the last frame, where an interval begins
+  std::optional<ImageView<Flow>> flow_;   ///< of the interval
   EventBuckets events_;
 
  private:
@@ -121,17 +122,20 @@ class Simulator : public IntervalSimulator {
  public:
   /// Processes the next frame, whose `format` must be the simulator's. `time` must be later than
   /// that of the last frame, by at most max_interval. Returns the sorted events of (time of the
-  /// last frame, time], valid until the next call; nullptr for the first frame. Throws
-  /// std::bad_alloc or an exception of the implementation (cv::Exception); after that the simulator
-  /// may only be destroyed.
-  const EventBuckets* push(const LumaView& frame, Nanoseconds time, const Settings& settings);
+  /// last frame, time], valid until the next call; nullptr for the first frame. `known_flow`, a
+  /// view of an Image, is the motion from the last frame to this one. Throws std::bad_alloc or an
+  /// exception of the implementation (cv::Exception); after that the simulator may only be
+  /// destroyed.
+  const EventBuckets* push(const LumaView& frame, Nanoseconds time, const Settings& settings,
+                           const std::optional<ImageView<Flow>>& known_flow = {});
 
  protected:
   using IntervalSimulator::IntervalSimulator;
 
   /// Stores the first frame.
   virtual void start(const LumaView& frame) = 0;
-  /// Fills `events` with the events between the last frame and this one, and stores this one.
+  /// Fills `events` with the events between the last frame and this one, and stores this one. Sets
+  /// flow_ if it needs flow that is not known.
   virtual void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
                         EventBuckets& events) = 0;
 };

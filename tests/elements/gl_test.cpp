@@ -271,6 +271,7 @@ class Busy : public testing::TestWithParam<const char*> {
     take_over_contexts();
     is_busy = false;
     Harness idle(GetParam());
+    gst_harness_set_live(h.get(), FALSE);
     idle.caps(video);
     for (int i = 0; i < 6; ++i) idle.push(frame(idle, i));
     intervals = outputs_until_eos(idle);
@@ -325,16 +326,19 @@ TEST_P(Busy, IntervalsAreReadWhenTheNextFrameHasBeenQueued) {
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
 }
 
-TEST_P(Busy, IntervalsNeedNoFurtherFrame) {
-  is_busy = false;
-  expect_interval(0, Buffer(gst_harness_pull(h.get())));
-  EXPECT_EQ(gst_harness_query_latency(h.get()), 40 * GST_MSECOND);
+TEST_P(Busy, IntervalsOfALiveStreamNeedNoFurtherFrame) {
+  Harness live(GetParam());
+  live.caps(video);
+  for (int i = 0; i < 6; ++i) {
+    live.push(frame(live, i));
+    if (i > 0) expect_interval(static_cast<std::size_t>(i - 1), live.pull());
+  }
+  EXPECT_EQ(gst_harness_query_latency(live.get()), 40 * GST_MSECOND);
 }
 
 TEST_P(Busy, IntervalsComeBeforeWhatFollowsThem) {
   gst_harness_push_event(h.get(), gst_event_new_gap(time_of(1), 80 * GST_MSECOND));
   expect_interval(0, h.pull());
-  EXPECT_EQ(gap_of(h.pull_event(GST_EVENT_GAP).get()).start, time_of(1));
   GstBuffer* discontinuous = frame(h, 4);
   GST_BUFFER_FLAG_SET(discontinuous, GST_BUFFER_FLAG_DISCONT);
   h.push(discontinuous);
@@ -354,6 +358,7 @@ TEST_P(Busy, IntervalsAreDroppedByAFlush) {
   is_busy = false;
   push(1);
   push(2);
+  h.wait_for_events();
   expect_interval(1, h.pull());
   EXPECT_FALSE(h.pull());
 }
@@ -405,6 +410,7 @@ class EitherOutput : public testing::TestWithParam<bool> {
  protected:
   EitherOutput() {
     take_over_contexts();
+    gst_harness_set_live(h.get(), FALSE);
     h.caps(video, GetParam() ? pictures_of("gleventsim-frame") : GST_EVENT_CAMERA_MEDIA_TYPE);
   }
 
@@ -450,6 +456,7 @@ constexpr const char* thread_has_ended =
 TEST(OpenGl, IsAnErrorWhereItsThreadHasEnded) {
   take_over_contexts();
   Harness h("gleventsim-frame");
+  gst_harness_set_live(h.get(), FALSE);
   h.caps(video);
   is_busy = true;
   h.push(h.flat(0, 0));
@@ -479,10 +486,10 @@ TEST_P(EitherOutput, HoldsFramesUntilItHasReadThem) {
     const auto is_held = [&frame] { return GST_MINI_OBJECT_REFCOUNT_VALUE(frame.get()) > 1; };
     is_busy = true;
     EXPECT_EQ(h.push(gst_buffer_ref(frame.get())), GST_FLOW_OK);
-    g_usleep(20'000);
     EXPECT_TRUE(is_held()) << i;
     is_busy = false;
-    for (int wait = 0; wait < 1000 && is_held(); ++wait) g_usleep(10'000);
+    gst_harness_push_event(
+        h.get(), gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("any")));
     EXPECT_FALSE(is_held()) << i;
   }
 }

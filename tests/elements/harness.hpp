@@ -198,7 +198,7 @@ class Harness {
 
   GstFlowReturn push(GstBuffer* buffer) { return gst_harness_push(h_.get(), buffer); }
 
-  /// Waits until an aggregator has handled the events that were pushed.
+  /// Waits until an aggregator has handled the events that were pushed, or a GPU the frames.
   void wait_for_events() {
     GstQuery* const query = gst_query_new_drain();
     gst_pad_peer_query(h_->srcpad, query);

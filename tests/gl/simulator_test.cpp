@@ -332,7 +332,6 @@ TEST(Simulator, ReadsEventsBackWhileTheGpuWorksOnTheNextFrame) {
       waits = 0;
       is_gpu_busy = true;
       simulator->queue(frame_of(i), i * scene::frame_time, settings);
-      EXPECT_FALSE(simulator->is_ready());
       EXPECT_EQ(waits, 0);
       is_gpu_busy = false;
       if (i == 0) continue;
@@ -341,8 +340,6 @@ TEST(Simulator, ReadsEventsBackWhileTheGpuWorksOnTheNextFrame) {
       if (events != nullptr) made.push_back(scene::copy(*events));
     }
     waits = 0;
-    EXPECT_TRUE(simulator->is_ready());
-    EXPECT_EQ(waits, 0);
     made.push_back(scene::copy(*simulator->read()));
     EXPECT_GT(waits, 0);
     EXPECT_EQ(made, expected);
