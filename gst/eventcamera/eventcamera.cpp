@@ -234,11 +234,12 @@ const GstMetaInfo* gst_event_camera_flow_meta_get_info() {
   return info;
 }
 
-/// Bytes whose address is aligned for floats: `bytes` themselves if they are.
+/// Bytes whose address is aligned for numbers of this type: `bytes` themselves if they are.
+template <class Number>
 static GBytes* aligned(GBytes* bytes) {
   gsize size = 0;
   gconstpointer const data = g_bytes_get_data(bytes, &size);
-  return GPOINTER_TO_SIZE(data) % alignof(gfloat) == 0 ? g_bytes_ref(bytes)
+  return GPOINTER_TO_SIZE(data) % alignof(Number) == 0 ? g_bytes_ref(bytes)
                                                        : g_bytes_new(data, size);
 }
 
@@ -253,7 +254,7 @@ GstEventCameraFlowMeta* gst_buffer_add_event_camera_flow_meta(GstBuffer* buffer,
                        nullptr);
 
   auto* meta = gst_buffer_get_event_camera_flow_meta(buffer);
-  GBytes* const added = aligned(flow);
+  GBytes* const added = aligned<gfloat>(flow);
   if (meta != nullptr)
     g_bytes_unref(meta->flow);
   else
@@ -276,6 +277,57 @@ GBytes* gst_event_camera_flow_meta_get_flow(const GstEventCameraFlowMeta* meta) 
   return meta->flow;
 }
 
+/* triggers and IMU samples: docs/formats.md describes the events that carry them */
+
+static const char* const triggers_name = "GstEventCameraTriggers";
+static const char* const imu_samples_name = "GstEventCameraImu";
+static const char* const records_field = "records";
+
+static GstEvent* new_event(const char* name, GBytes* records) {
+  return gst_event_new_custom(
+      GST_EVENT_CUSTOM_DOWNSTREAM,
+      gst_structure_new(name, records_field, G_TYPE_BYTES, records, nullptr));
+}
+
+/// The records of an event of this name, without a partial one at the end.
+template <class Record>
+static GBytes* records_of(GstEvent* event, const char* name) {
+  if (GST_EVENT_TYPE(event) != GST_EVENT_CUSTOM_DOWNSTREAM || !gst_event_has_name(event, name))
+    return nullptr;
+  const GValue* value = gst_structure_get_value(gst_event_get_structure(event), records_field);
+  if (value == nullptr || !G_VALUE_HOLDS(value, G_TYPE_BYTES) ||
+      g_value_get_boxed(value) == nullptr)
+    return g_bytes_new(nullptr, 0);
+  auto* const bytes = static_cast<GBytes*>(g_value_get_boxed(value));
+  const gsize size = g_bytes_get_size(bytes);
+  GBytes* const whole = g_bytes_new_from_bytes(bytes, 0, size - size % sizeof(Record));
+  GBytes* const records = aligned<Record>(whole);
+  g_bytes_unref(whole);
+  return records;
+}
+
+GstEvent* gst_event_new_event_camera_triggers(GBytes* triggers) {
+  g_return_val_if_fail(triggers != nullptr, nullptr);
+  g_return_val_if_fail(g_bytes_get_size(triggers) % sizeof(GstEventCameraTrigger) == 0, nullptr);
+  return new_event(triggers_name, triggers);
+}
+
+GBytes* gst_event_get_event_camera_triggers(GstEvent* event) {
+  g_return_val_if_fail(GST_IS_EVENT(event), nullptr);
+  return records_of<GstEventCameraTrigger>(event, triggers_name);
+}
+
+GstEvent* gst_event_new_event_camera_imu_samples(GBytes* samples) {
+  g_return_val_if_fail(samples != nullptr, nullptr);
+  g_return_val_if_fail(g_bytes_get_size(samples) % sizeof(GstEventCameraImuSample) == 0, nullptr);
+  return new_event(imu_samples_name, samples);
+}
+
+GBytes* gst_event_get_event_camera_imu_samples(GstEvent* event) {
+  g_return_val_if_fail(GST_IS_EVENT(event), nullptr);
+  return records_of<GstEventCameraImuSample>(event, imu_samples_name);
+}
+
 /// Writes an event as two words of 8 bytes: bits 32 to 62 of an event are x and y, bit 63 is the
 /// polarity.
 static void unpack(const GstEventCameraEvent& event, gint64 start,
@@ -288,25 +340,29 @@ static void unpack(const GstEventCameraEvent& event, gint64 start,
               &place_and_polarity, sizeof place_and_polarity);
 }
 
-gboolean gst_event_camera_unpack(GstBuffer* buffer, gpointer events, gsize n_events) {
-  g_return_val_if_fail(GST_IS_BUFFER(buffer), FALSE);
+GBytes* gst_event_camera_unpack(GstBuffer* buffer) {
+  g_return_val_if_fail(GST_IS_BUFFER(buffer), nullptr);
 
   GstEventCameraMap map;
-  if (!gst_event_camera_map(&map, buffer)) return FALSE;
-  const bool fits = map.n_events == n_events;
-  auto* const out = static_cast<GstEventCameraAbsoluteEvent*>(events);
-  for (gsize i = 0; fits && i < n_events; ++i)
+  if (!gst_event_camera_map(&map, buffer)) return nullptr;
+  auto* const out = g_try_new(GstEventCameraAbsoluteEvent, map.n_events);
+  if (out == nullptr && map.n_events > 0) {
+    gst_event_camera_unmap(&map);
+    return nullptr;
+  }
+  for (gsize i = 0; i < map.n_events; ++i)
     unpack(map.events[i], static_cast<gint64>(map.start), out[i]);
+  GBytes* const bytes = g_bytes_new_take(out, map.n_events * sizeof *out);
   gst_event_camera_unmap(&map);
-  return fits ? TRUE : FALSE;
+  return bytes;
 }
 
 /// Times beyond this, in either direction, are errors: 142 years.
 static constexpr gint64 max_time = gint64{1} << 52;
 
 /// Converts to the core's events. False if one is outside the sensor or earlier than the last one.
-static bool take_events(std::span<const GstEventCameraAbsoluteEvent> events, guint width,
-                        guint height, std::vector<eventcamera::AbsoluteEvent>& out) {
+static bool convert_events(std::span<const GstEventCameraAbsoluteEvent> events, guint width,
+                           guint height, std::vector<eventcamera::AbsoluteEvent>& out) {
   out.reserve(events.size());
   gint64 last = -max_time;
   for (const auto& event : events) {
@@ -317,20 +373,18 @@ static bool take_events(std::span<const GstEventCameraAbsoluteEvent> events, gui
   return true;
 }
 
-gboolean gst_event_camera_voxel_grid(gconstpointer events, gsize n_events, guint width,
-                                     guint height, guint bins, gpointer grid) {
+gboolean gst_event_camera_voxel_grid(const GstEventCameraAbsoluteEvent* events, gsize n_events,
+                                     guint width, guint height, guint bins, gfloat* grid) {
   g_return_val_if_fail(width > 0 && width <= GST_EVENT_CAMERA_MAX_SIDE, FALSE);
   g_return_val_if_fail(height > 0 && height <= GST_EVENT_CAMERA_MAX_SIDE, FALSE);
   g_return_val_if_fail(bins > 0 && bins <= GST_EVENT_CAMERA_MAX_BINS, FALSE);
 
   try {
     std::vector<eventcamera::AbsoluteEvent> sorted;
-    if (!take_events({static_cast<const GstEventCameraAbsoluteEvent*>(events), n_events}, width,
-                     height, sorted))
-      return FALSE;
+    if (!convert_events({events, n_events}, width, height, sorted)) return FALSE;
     eventcamera::EventTensor(static_cast<int>(width), static_cast<int>(height),
                              {.bins = static_cast<int>(bins)})
-        .write(sorted, 0, static_cast<std::byte*>(grid));
+        .write(sorted, 0, reinterpret_cast<std::byte*>(grid));
     return TRUE;
   } catch (const std::exception& error) {
     g_warning("%s", error.what());

@@ -147,19 +147,19 @@ GstCaps* gst_event_camera_info_to_caps(const GstEventCameraInfo* info);
 
 /**
  * GstEventCameraMap:
- * @events: (array length=n_events): the events of the buffer, sorted by time
  * @n_events: the number of events
  * @start: the time at which t is 0, in microseconds: floor(PTS / 1000)
  *
- * The events of a mapped buffer.
- *
- * PyGObject takes @events for an array of pointers, and crashes: use gst_event_camera_unpack() or
- * gst_buffer_extract_dup().
+ * The events of a mapped buffer. In C, `events` is the array of its #GstEventCameraEvent, sorted by
+ * time; other languages call gst_event_camera_unpack() or gst_buffer_extract_dup().
  *
  * Since: 0.1
  */
 struct _GstEventCameraMap {
+  /*< private >*/ /* an array, which only C can index */
   const GstEventCameraEvent* events;
+
+  /*< public >*/
   gsize n_events;
   guint64 start;
 
@@ -241,25 +241,25 @@ struct _GstEventCameraLabel {
 /**
  * GstEventCameraLabelMeta:
  * @meta: parent #GstMeta
- * @labels: (array length=n_labels): label i is that of event i of the buffer
  * @n_labels: the number of labels
  *
- * Labels of the events of a buffer of format XYTP. They are valid if there is one for each event,
- * and are otherwise ignored.
+ * Labels of the events of a buffer of format XYTP, in the order of the events. They are valid if
+ * there is one for each event, and are otherwise ignored. In C, `labels` is their array; other
+ * languages call gst_event_camera_label_meta_get_bytes().
  *
  * A copy of a buffer has a copy of its labels, and a copy of a part has the labels of the events in
  * it. Elements that drop or reorder events do the same to the labels. The API has the tag `events`:
  * elements that turn events into anything else drop it.
- *
- * PyGObject takes @labels for an array of pointers, and crashes: use
- * gst_event_camera_label_meta_get_bytes().
  *
  * Since: 0.1
  */
 struct _GstEventCameraLabelMeta {
   GstMeta meta;
 
+  /*< private >*/ /* an array, which only C can index */
   GstEventCameraLabel* labels;
+
+  /*< public >*/
   gsize n_labels;
 };
 
@@ -338,8 +338,7 @@ GstEventCameraLabelMeta* gst_buffer_get_event_camera_label_meta(GstBuffer* buffe
  * @meta: labels of a writable buffer
  * @n_labels: the new number of labels, at most the present one
  *
- * Drops the last labels, those of events that are cut from the end of the buffer with
- * gst_buffer_set_size().
+ * Drops the last labels, after gst_buffer_set_size() has cut events from the end of the buffer.
  *
  * Since: 0.1
  */
@@ -477,20 +476,109 @@ struct _GstEventCameraAbsoluteEvent {
 };
 
 /**
- * gst_event_camera_unpack:
- * @buffer: a buffer of an event stream of format XYTP, with a PTS
- * @events: address of an array of #GstEventCameraAbsoluteEvent
- * @n_events: its length; the buffer has as many events, of 8 bytes each
+ * GstEventCameraTrigger:
+ * @t: microseconds, of the whole stream, as for #GstEventCameraAbsoluteEvent
+ * @input: the camera's input
+ * @is_rising: 1 for a rising edge, 0 for a falling one
  *
- * Writes the events of a buffer to memory that does not belong to GStreamer, such as that of a
- * NumPy array.
+ * An edge on a trigger input of a camera: 16 bytes, little-endian.
  *
- * Returns: %FALSE if @buffer cannot be mapped, has no PTS, or does not have @n_events events
+ * Since: 0.1
+ */
+typedef struct _GstEventCameraTrigger {
+  gint64 t;
+  guint32 input;
+  guint32 is_rising;
+} GstEventCameraTrigger;
+
+/**
+ * GstEventCameraImuSample:
+ * @t: microseconds, of the whole stream, as for #GstEventCameraAbsoluteEvent
+ * @temperature: in degrees Celsius
+ * @acceleration: along x, y and z, in g
+ * @rotation: around x, y and z, in degrees per second
+ * @magnetic_field: along x, y and z, in microtesla
+ *
+ * A sample of a camera's inertial measurement unit: 48 bytes, little-endian.
+ *
+ * Since: 0.1
+ */
+typedef struct _GstEventCameraImuSample {
+  gint64 t;
+  gfloat temperature;
+  gfloat acceleration[3];
+  gfloat rotation[3];
+  gfloat magnetic_field[3];
+} GstEventCameraImuSample;
+
+/**
+ * gst_event_new_event_camera_triggers:
+ * @triggers: an array of #GstEventCameraTrigger, sorted by time; may be empty
+ *
+ * Creates a serialized event that carries triggers with a stream of events. Readers send it before
+ * the buffer or GAP event of the interval; an empty one before the first buffer announces that
+ * triggers may follow. Writers store the triggers if their format has any, other elements forward
+ * them.
+ *
+ * Returns: (transfer full) (nullable): the event; %NULL if @triggers ends in a partial one
  *
  * Since: 0.1
  */
 GST_EVENT_CAMERA_API
-gboolean gst_event_camera_unpack(GstBuffer* buffer, gpointer events, gsize n_events);
+GstEvent* gst_event_new_event_camera_triggers(GBytes* triggers);
+
+/**
+ * gst_event_get_event_camera_triggers:
+ * @event: any event
+ *
+ * Returns: (transfer full) (nullable): the array of #GstEventCameraTrigger that the event carries,
+ *     at an address that is a multiple of 8; %NULL if it is an event of another kind
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GBytes* gst_event_get_event_camera_triggers(GstEvent* event);
+
+/**
+ * gst_event_new_event_camera_imu_samples:
+ * @samples: an array of #GstEventCameraImuSample, sorted by time; may be empty
+ *
+ * Creates a serialized event that carries IMU samples with a stream of events, in the same way as
+ * gst_event_new_event_camera_triggers().
+ *
+ * Returns: (transfer full) (nullable): the event; %NULL if @samples ends in a partial one
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GstEvent* gst_event_new_event_camera_imu_samples(GBytes* samples);
+
+/**
+ * gst_event_get_event_camera_imu_samples:
+ * @event: any event
+ *
+ * Returns: (transfer full) (nullable): the array of #GstEventCameraImuSample that the event
+ * carries, at an address that is a multiple of 8; %NULL if it is an event of another kind
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GBytes* gst_event_get_event_camera_imu_samples(GstEvent* event);
+
+/**
+ * gst_event_camera_unpack:
+ * @buffer: a buffer of an event stream of format XYTP, with a PTS
+ *
+ * Copies the events of a buffer for languages that read structures from bytes.
+ *
+ * Returns: (transfer full) (nullable): 16 bytes per event, in the layout of
+ *     #GstEventCameraAbsoluteEvent; %NULL if @buffer cannot be mapped, has no PTS, or ends in a
+ *     partial event, or if there is not enough memory
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GBytes* gst_event_camera_unpack(GstBuffer* buffer);
 
 /**
  * GST_EVENT_CAMERA_MAX_BINS:
@@ -502,13 +590,13 @@ gboolean gst_event_camera_unpack(GstBuffer* buffer, gpointer events, gsize n_eve
 #define GST_EVENT_CAMERA_MAX_BINS 256
 
 /**
- * gst_event_camera_voxel_grid:
- * @events: address of an array of #GstEventCameraAbsoluteEvent, sorted by time
- * @n_events: its length
+ * gst_event_camera_voxel_grid: (skip)
+ * @events: (array length=n_events): events sorted by time
+ * @n_events: the number of events
  * @width: of the sensor, in pixels
  * @height: of the sensor, in pixels
  * @bins: number of instants, at most %GST_EVENT_CAMERA_MAX_BINS
- * @grid: address of @bins x @height x @width 32-bit floating-point numbers
+ * @grid: memory for @bins x @height x @width numbers
  *
  * Writes the voxel grid of events, the same as the element `eventtensor` makes of a window: each
  * event adds its polarity, +1 or -1, to the two nearest of @bins instants, in proportion to their
@@ -520,7 +608,7 @@ gboolean gst_event_camera_unpack(GstBuffer* buffer, gpointer events, gsize n_eve
  * Since: 0.1
  */
 GST_EVENT_CAMERA_API
-gboolean gst_event_camera_voxel_grid(gconstpointer events, gsize n_events, guint width,
-                                     guint height, guint bins, gpointer grid);
+gboolean gst_event_camera_voxel_grid(const GstEventCameraAbsoluteEvent* events, gsize n_events,
+                                     guint width, guint height, guint bins, gfloat* grid);
 
 G_END_DECLS

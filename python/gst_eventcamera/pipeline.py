@@ -20,12 +20,11 @@ except ValueError as missing:
     raise ImportError(f"{missing}; on Debian, install: gir1.2-gst-plugins-base-1.0 gir1.2-gsteventcamera-1.0") from None
 from gi.repository import GLib, Gst, GstApp, GstEventCamera  # noqa: E402, F401
 
-from .events import Events  # noqa: E402
+from .events import EVENT, Events  # noqa: E402
 
 Gst.init(None)
 
 EVENT_CAPS = "application/x-event-camera,format=(string)XYTP"
-EVENT_SIZE = 8  # bytes of an event in a buffer
 LABEL = np.dtype([("object_class", "<u2"), ("cause", "u1"), ("reserved", "u1")])
 
 # Python handles Ctrl-C only between calls, so none waits longer.
@@ -266,15 +265,17 @@ def given_size(events: np.ndarray, width: int, height: int) -> tuple[int, int]:
 
 
 def events_of(sample: Gst.Sample) -> Events:
-    """The events of a buffer, written to the array in one pass."""
+    """The events of a buffer."""
     buffer = sample.get_buffer()
     start = buffer.pts / 1e9
     duration = 0 if buffer.duration == Gst.CLOCK_TIME_NONE else buffer.duration / 1e9
-    count = buffer.get_size() // EVENT_SIZE
-    events = Events(count, *sensor_size(sample.get_caps()), start, start + duration)
-    if count > 0 and not GstEventCamera.unpack(buffer, events.ctypes.data, count):
+    unpacked = GstEventCamera.unpack(buffer)
+    if unpacked is None:
         raise PipelineError("a buffer of events cannot be read")
-    if labels := GstEventCamera.buffer_get_event_camera_label_meta(buffer) if count > 0 else None:
+    events = np.frombuffer(bytearray(unpacked.get_data() or b""), EVENT).view(Events)
+    events.width, events.height = sensor_size(sample.get_caps())
+    events.start, events.end = start, start + duration
+    if labels := GstEventCamera.buffer_get_event_camera_label_meta(buffer) if len(events) > 0 else None:
         fields = np.frombuffer(labels.get_bytes().get_data(), LABEL)
         events.cause, events.object_class = fields["cause"].copy(), fields["object_class"].copy()
     return events

@@ -2,15 +2,22 @@
 """Events as tensors, computed by the core of the element eventtensor."""
 from __future__ import annotations
 
+import ctypes
 from typing import Iterator
 
 import numpy as np
+from numpy.ctypeslib import ndpointer
 
-from .events import packed_events
+from .events import EVENT, packed_events
 from .pipeline import Gst, GstEventCamera, Pipeline, given_size
 from .sources import SINK
 
 TENSOR_CAPS = "other/tensors,format=(string)static,num_tensors=1"
+
+# PyGObject would copy the arrays.
+_voxel_grid = ctypes.CDLL("libgsteventcamera-1.0.so.0").gst_event_camera_voxel_grid
+_voxel_grid.argtypes = [ndpointer(EVENT, ndim=1, flags="C"), ctypes.c_size_t, ctypes.c_uint, ctypes.c_uint, ctypes.c_uint,
+                        ndpointer(np.float32, ndim=3, flags=("C", "W"))]
 
 
 def voxel_grid(events: np.ndarray, bins: int = 5, width: int = 0, height: int = 0) -> np.ndarray:
@@ -29,7 +36,7 @@ def voxel_grid(events: np.ndarray, bins: int = 5, width: int = 0, height: int = 
         raise ValueError(f"no voxel grid of {bins} bins; give 1 to {GstEventCamera.MAX_BINS}")
     packed = packed_events(events)
     grid = np.empty((bins, height, width), np.float32)
-    if not GstEventCamera.voxel_grid(packed.ctypes.data, len(packed), width, height, bins, grid.ctypes.data):
+    if not _voxel_grid(packed, len(packed), width, height, bins, grid):
         raise ValueError(f"events are not sorted by time or outside the sensor of {width}x{height} pixels")
     return grid
 

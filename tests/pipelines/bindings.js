@@ -31,3 +31,19 @@ GstEventCamera.buffer_add_event_camera_flow_meta(frame, 4, 3, new GLib.Bytes(new
 const flowMeta = GstEventCamera.buffer_get_event_camera_flow_meta(frame);
 check('size', [flowMeta.width, flowMeta.height], [4, 3]);
 check('flow', Array.from(new Float32Array(flowMeta.get_flow().toArray().buffer)), Array.from(flow));
+
+// Events: a time in 64 bits, x and y in 16, the polarity, three bytes that are not used.
+const packed = Gst.Buffer.new_wrapped(new Uint8Array([5, 0, 0, 0, 1, 0, 2, 128]));
+packed.pts = 7999;
+const event = new DataView(GstEventCamera.unpack(packed).toArray().buffer);
+check('event', [event.getInt32(0, true), event.getUint16(8, true), event.getUint16(10, true), event.getUint8(12)],
+    [12, 1, 2, 1]);
+
+// Triggers and IMU samples.
+const triggers = Array.from({length: 32}, (_, i) => i);
+const sent = GstEventCamera.event_new_event_camera_triggers(new GLib.Bytes(triggers));
+check('triggers', Array.from(GstEventCamera.event_get_event_camera_triggers(sent).toArray()), triggers);
+check('no samples', GstEventCamera.event_get_event_camera_imu_samples(sent), null);
+const samples = Array.from({length: 48}, (_, i) => i);
+const sentSamples = GstEventCamera.event_new_event_camera_imu_samples(new GLib.Bytes(samples));
+check('samples', Array.from(GstEventCamera.event_get_event_camera_imu_samples(sentSamples).toArray()), samples);

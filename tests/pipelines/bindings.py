@@ -45,6 +45,49 @@ class Metas(unittest.TestCase):
         del meta, copy
         self.assertTrue(np.array_equal(read.reshape(3, 4, 2), flow))
 
+    def test_arrays_that_only_c_can_index(self):
+        buffer = Gst.Buffer.new_wrapped(struct.pack("<IHHIHH", 5, 1, 2, 6, 3, 4))
+        labels = GstEventCamera.buffer_add_event_camera_label_bytes(buffer, GLib.Bytes.new(bytes([7, *7 * [0]])))
+        buffer.pts = 0
+        mapped, events = GstEventCamera.map(buffer)
+        self.assertTrue(mapped)
+        self.assertEqual((events.n_events, labels.n_labels), (2, 2))
+        self.assertEqual((events.events.x, labels.labels.object_class), (1, 7))  # the first
+        GstEventCamera.unmap(events)
+
+
+class Events(unittest.TestCase):
+    def test_unpack(self):
+        buffer = Gst.Buffer.new_wrapped(struct.pack("<IHHIHH", 5, 1, 2, 6, 3, 0x8004))
+        self.assertIsNone(GstEventCamera.unpack(buffer))  # no time
+        buffer.pts = 7_999
+        events = list(struct.iter_unpack("<qHHB3x", GstEventCamera.unpack(buffer).get_data()))
+        self.assertEqual(events, [(12, 1, 2, 0), (13, 3, 4, 1)])
+        self.assertIsNone(GstEventCamera.unpack(Gst.Buffer.new_wrapped(bytes(9))))
+
+
+class SensorData(unittest.TestCase):
+    def test_triggers(self):
+        records = struct.pack("<qIIqII", 1, 2, 1, 3, 4, 0)
+        event = GstEventCamera.event_new_event_camera_triggers(GLib.Bytes.new(records))
+        self.assertEqual(event.type, Gst.EventType.CUSTOM_DOWNSTREAM)
+        self.assertEqual(GstEventCamera.event_get_event_camera_triggers(event).get_data(), records)
+        self.assertIsNone(GstEventCamera.event_get_event_camera_imu_samples(event))
+        self.assertIsNone(GstEventCamera.event_get_event_camera_triggers(Gst.Event.new_eos()))
+
+    def test_imu_samples(self):
+        records = struct.pack("<q10f", 1, 20, *range(9))
+        event = GstEventCamera.event_new_event_camera_imu_samples(GLib.Bytes.new(records))
+        self.assertEqual(GstEventCamera.event_get_event_camera_imu_samples(event).get_data(), records)
+        self.assertIsNone(GstEventCamera.event_get_event_camera_triggers(event))
+
+    def test_structures(self):
+        trigger = GstEventCamera.Trigger()
+        trigger.t, trigger.input, trigger.is_rising = 2**40, 3, 1
+        self.assertEqual((trigger.t, trigger.input, trigger.is_rising), (2**40, 3, 1))
+        sample = GstEventCamera.ImuSample()
+        self.assertEqual([list(sample.acceleration), list(sample.rotation), list(sample.magnetic_field)], 3 * [3 * [0.0]])
+
 
 if __name__ == "__main__":
     unittest.main()

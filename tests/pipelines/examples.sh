@@ -71,13 +71,17 @@ grep -qx "[1-9][0-9]* ON, [1-9][0-9]* OFF" "$work/expected"
 for language in py js; do
   "$SOURCE/pipelines/examples/on_and_off.$language" | diff "$work/expected" -
 done
-# Without its simulator.
+# Without its simulator; in C, built with the pkg-config file of the build directory.
 for language in py js c; do
   sed 's/eventsim-diff ! appsink name/appsink name/' "$SOURCE/pipelines/examples/on_and_off.$language" >"$work/video.$language"
 done
-# shellcheck disable=SC2046
-cc -o "$work/video" "$work/video.c" -I"$SOURCE" -L"$BUILD/gst/eventcamera" -lgsteventcamera-1.0 \
-  $(pkg-config --cflags --libs gstreamer-app-1.0)
+export PKG_CONFIG_PATH=$BUILD/meson-uninstalled
+flags=$(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
+# shellcheck disable=SC2086
+cc -o "$work/on_and_off" "$SOURCE/pipelines/examples/on_and_off.c" $flags
+"$work/on_and_off" | diff "$work/expected" -
+# shellcheck disable=SC2086
+cc -o "$work/video" "$work/video.c" $flags
 refused "receives no events; insert a simulator" "$work/video"
 refused "receives no events; insert a simulator" /usr/bin/python3 "$work/video.py"
 refused "receives no events; insert a simulator" gjs -m "$work/video.js"
