@@ -340,7 +340,8 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
     const bool encoded = priv.writable.take(taken, [&](const auto& events) {
       if (result == GST_FLOW_OK) result = push_header(self, start);
       if (result != GST_FLOW_OK) return;
-      priv.state->encoder->label(priv.writable.labels());
+      const auto labels = priv.state->encoder->label(priv.writable.labels());
+      priv.writable.written().lock()->labels += labels;
       result = encode_all(self, events, start);
     });
     if (!encoded) return GST_FLOW_ERROR;

@@ -106,9 +106,9 @@ void WritableEvents::warn(LeftOut& left_out, const std::string& what, const std:
 GstStructure* WritableEvents::stats() {
   const Written written = *written_.lock();
   return gst_structure_new("application/x-event-writer-stats", "events", G_TYPE_UINT64,
-                           written.events, "triggers", G_TYPE_UINT64, written.triggers, "frames",
-                           G_TYPE_UINT64, written.frames, "imu-samples", G_TYPE_UINT64,
-                           written.imu_samples, nullptr);
+                           written.events, "labels", G_TYPE_UINT64, written.labels, "triggers",
+                           G_TYPE_UINT64, written.triggers, "frames", G_TYPE_UINT64, written.frames,
+                           "imu-samples", G_TYPE_UINT64, written.imu_samples, nullptr);
 }
 
 Report WritableEvents::failure(const std::exception& error, const Report& otherwise) {

@@ -17,6 +17,7 @@
 /// Numbers of items in a file that is being written.
 struct Written {
   guint64 events = 0;
+  guint64 labels = 0;
   guint64 triggers = 0;
   guint64 frames = 0;
   guint64 imu_samples = 0;
@@ -81,7 +82,8 @@ class WritableEvents {
   /// The property stats of the element: what was written.
   GstStructure* stats();
   static constexpr auto stats_blurb =
-      "Counts of what was written to the file: events, triggers, frames and imu-samples";
+      "Counts of what was written to the file: events, their labels, triggers, frames and "
+      "imu-samples";
 
   /// Report for an exception from writing: `otherwise`, unless memory is short or the format cannot
   /// hold the stream.

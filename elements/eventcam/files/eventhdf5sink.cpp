@@ -186,7 +186,8 @@ static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
   const bool written = reported(self, [&] {
     return self->priv->writable.take(buffer, [&](const auto& events) {
       state.begun |= !events.empty();
-      state.writer->label(self->priv->writable.labels());
+      const auto labels = state.writer->label(self->priv->writable.labels());
+      self->priv->writable.written().lock()->labels += labels;
       state.writer->append(events);
     });
   });
