@@ -24,7 +24,7 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
 #endif
 
 #ifdef HAVE_ROS
-#define ROS_ELEMENTS(X) X(eventbagdec) X(eventmcapdec) X(eventmcapenc)
+#define ROS_ELEMENTS(X) X(eventbagdemux) X(eventmcapdemux) X(eventmcapenc)
 #else
 #define ROS_ELEMENTS(X)
 #endif

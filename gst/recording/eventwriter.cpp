@@ -56,7 +56,7 @@ struct State {
   bool written = false;
   WaitingItems<Trigger> triggers = {};
   Microseconds last = 0;              ///< time of the last encoded item
-  std::uint64_t pauses_reported = 0;  ///< microseconds left out that were warned of
+  std::uint64_t pauses_reported = 0;  ///< removed microseconds that a warning reported
 };
 
 }  // namespace
@@ -133,7 +133,7 @@ static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, Own
                            .encoder = std::move(encoder)});
 }
 
-/// Caps of this sensor that downstream takes.
+/// Caps of this sensor that downstream accepts.
 static OwnedCaps allowed_caps(GstPad* src, const GstEventCameraInfo& info) {
   const OwnedCaps own(gst_caps_make_writable(gst_pad_get_pad_template_caps(src)));
   for (guint i = 0; i < gst_caps_get_size(own.get()); ++i) {
@@ -170,8 +170,8 @@ static GstFlowReturn negotiate(GstEventWriter* self, const GstEventCameraInfo& i
              : GST_FLOW_NOT_NEGOTIATED;
 }
 
-/// Caps that the sink pad takes: the sensors that the format holds, and then all others, which the
-/// encoder refuses with a reason. Upstream that can choose takes the first.
+/// Caps that the sink pad accepts: the sensors that the format holds, and then all others, which
+/// the encoder refuses with a reason. Upstream prefers the first.
 static OwnedCaps sink_caps(GstPad* pad) {
   GstCaps* caps = gst_caps_make_writable(gst_pad_get_pad_template_caps(pad));
   gst_caps_append(caps, gst_caps_from_string(GST_EVENT_CAMERA_MEDIA_TYPE ", format=XYTP"));
@@ -311,7 +311,8 @@ static GstFlowReturn encode_all(GstEventWriter* self, std::span<const AbsoluteEv
   return result;
 }
 
-/// Warns of the first pause that is left out, and at the end of the file of all, if there are more.
+/// Warns of the first pause that is removed, and at the end of the file of the total, if there are
+/// more.
 static void warn_of_pauses(GstEventWriter* self, bool at_end) {
   auto& state = *priv_of(self).state;
   const auto left_out = state.encoder->left_out();
@@ -337,10 +338,11 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   GstClockTime start = GST_BUFFER_PTS(taken);
   return reported(self, [&] {
     GstFlowReturn result = GST_FLOW_OK;
-    const bool encoded = priv.writable.take(taken, [&](const auto& events) {
+    const bool encoded = priv.writable.write(taken, [&](const auto& events) {
       if (result == GST_FLOW_OK) result = push_header(self, start);
       if (result != GST_FLOW_OK) return;
-      priv.state->encoder->label(priv.writable.labels());
+      const auto labels = priv.state->encoder->label(priv.writable.labels());
+      priv.writable.written().lock()->labels += labels;
       result = encode_all(self, events, start);
     });
     if (!encoded) return GST_FLOW_ERROR;
@@ -400,9 +402,9 @@ static void end_file(GstEventWriter* self) {
   });
 }
 
-/// Takes triggers, which wait for the events of their interval. If too many wait, there are none:
-/// pushes them. May throw.
-static GstFlowReturn take_triggers(GstEventWriter* self, std::span<const Trigger> triggers) {
+/// Queues triggers for the events of their interval. Pushes them if too many are queued, since the
+/// stream then has no events. May throw.
+static GstFlowReturn queue_triggers(GstEventWriter* self, std::span<const Trigger> triggers) {
   auto& priv = priv_of(self);
   if (!priv.state) return GST_FLOW_OK;
   priv.state->triggers.push(triggers);
@@ -412,7 +414,7 @@ static GstFlowReturn take_triggers(GstEventWriter* self, std::span<const Trigger
   const auto start = static_cast<GstClockTime>(first) * GST_USECOND;
   if (const GstFlowReturn result = push_header(self, start); result != GST_FLOW_OK) return result;
   encode_all_triggers(self);
-  priv.writable.reach(priv.state->last);
+  priv.writable.advance_to(priv.state->last);
   return push_bytes(self, start, GST_CLOCK_TIME_NONE);
 }
 
@@ -423,7 +425,7 @@ static bool is_file(const State& state) {
                                 GST_EVENT_CAMERA_MEDIA_TYPE) == FALSE;
 }
 
-static gboolean take_caps(GstEventWriter* self, GstEvent* event) {
+static gboolean handle_caps(GstEventWriter* self, GstEvent* event) {
   const auto& priv = priv_of(self);
   GstCaps* caps = nullptr;
   gst_event_parse_caps(event, &caps);
@@ -467,7 +469,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   auto* self = GST_EVENT_WRITER(parent);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CAPS: {
-      const gboolean taken = take_caps(self, event);
+      const gboolean taken = handle_caps(self, event);
       gst_event_unref(event);
       return taken;
     }
@@ -483,7 +485,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
     case GST_EVENT_CUSTOM_DOWNSTREAM:
       if (const auto triggers = triggers_of(event)) {
         gst_event_unref(event);
-        return reported(self, [&] { return take_triggers(self, *triggers); }) == GST_FLOW_OK;
+        return reported(self, [&] { return queue_triggers(self, *triggers); }) == GST_FLOW_OK;
       }
       break;
     default:

@@ -47,13 +47,13 @@ std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> event
                                                     std::span<const Label> labels) {
   picked_.clear();
   picked_labels_.clear();
-  std::size_t before_last_left_out = 0;
+  std::size_t before_last_dropped = 0;
   for (const auto& event : events) {
     const AbsoluteEvent absolute{start + event.t, event.x, event.y_p};
     const bool outside = event.x >= sensor_.width || absolute.y() >= sensor_.height;
     if (outside || absolute.t < latest_) {
       ++(outside ? outside_ : earlier_).count;
-      before_last_left_out = picked_.size();
+      before_last_dropped = picked_.size();
       continue;
     }
     latest_ = absolute.t;
@@ -68,7 +68,7 @@ std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> event
                        ": outside the sensor, or earlier than those written",
                        events.size() - picked_.size(), events.size(),
                        GST_TIME_ARGS(static_cast<GstClockTime>(start) * GST_USECOND));
-  if (picked_.size() > before_last_left_out) {
+  if (picked_.size() > before_last_dropped) {
     if (earlier_.reported == 0) warn_of_earlier();
     if (outside_.reported == 0) warn_of_outside();
   }
@@ -93,22 +93,22 @@ void WritableEvents::warn_of_outside() {
        "x or y is past the width or height in the caps");
 }
 
-void WritableEvents::warn(LeftOut& left_out, const std::string& what, const std::string& cause) {
-  if (left_out.count == left_out.reported) return;
-  const Report report{code_, "Left out " + std::to_string(left_out.count) + " event" +
-                                 (left_out.count == 1 ? "" : "s") +
-                                 (left_out.reported == 0 ? " " : " in total ") + what};
+void WritableEvents::warn(Dropped& dropped, const std::string& what, const std::string& cause) {
+  if (dropped.count == dropped.reported) return;
+  const Report report{code_, "Left out " + std::to_string(dropped.count) + " event" +
+                                 (dropped.count == 1 ? "" : "s") +
+                                 (dropped.reported == 0 ? " " : " in total ") + what};
   GST_CAT_WARNING_OBJECT(category_, element_, "%s (%s)", report.text.c_str(), cause.c_str());
   post_message(element_, GST_MESSAGE_WARNING, report, cause);
-  left_out.reported = left_out.count;
+  dropped.reported = dropped.count;
 }
 
 GstStructure* WritableEvents::stats() {
   const Written written = *written_.lock();
   return gst_structure_new("application/x-event-writer-stats", "events", G_TYPE_UINT64,
-                           written.events, "triggers", G_TYPE_UINT64, written.triggers, "frames",
-                           G_TYPE_UINT64, written.frames, "imu-samples", G_TYPE_UINT64,
-                           written.imu_samples, nullptr);
+                           written.events, "labels", G_TYPE_UINT64, written.labels, "triggers",
+                           G_TYPE_UINT64, written.triggers, "frames", G_TYPE_UINT64, written.frames,
+                           "imu-samples", G_TYPE_UINT64, written.imu_samples, nullptr);
 }
 
 Report WritableEvents::failure(const std::exception& error, const Report& otherwise) {

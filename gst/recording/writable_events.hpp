@@ -17,6 +17,7 @@
 /// Numbers of items in a file that is being written.
 struct Written {
   guint64 events = 0;
+  guint64 labels = 0;
   guint64 triggers = 0;
   guint64 frames = 0;
   guint64 imu_samples = 0;
@@ -37,11 +38,11 @@ class WritableEvents {
   /// True if events of this sensor can be added to the file; reports an error if not.
   bool accepts(eventcamera::SensorSize sensor) const;
 
-  /// Passes the writable events of a buffer to `write`, in blocks that fit into the cache. Reports
-  /// an error and returns false if `buffer` is not a valid buffer of events. Throws what `write`
-  /// throws.
+  /// Passes the writable events of a buffer to `write_block`, in blocks that fit into the cache.
+  /// False, after an error message, if it is not a valid buffer of events. Throws what
+  /// `write_block` throws.
   template <class Write>
-  bool take(GstBuffer* buffer, const Write& write) {
+  bool write(GstBuffer* buffer, const Write& write_block) {
     constexpr std::size_t block = 1 << 14;
     const MappedEvents mapped(buffer);
     if (!mapped || GST_BUFFER_PTS(buffer) > G_MAXINT64) {
@@ -54,7 +55,7 @@ class WritableEvents {
     for (std::size_t done = 0; done < mapped.events().size(); done += block) {
       const auto size = std::min(mapped.events().size() - done, block);
       const auto few = mapped.events().subspan(done, size);
-      write(pick(few, mapped.start(), labels.empty() ? labels : labels.subspan(done, size)));
+      write_block(pick(few, mapped.start(), labels.empty() ? labels : labels.subspan(done, size)));
     }
     return true;
   }
@@ -65,23 +66,23 @@ class WritableEvents {
                                                    eventcamera::Microseconds start,
                                                    std::span<const eventcamera::Label> labels = {});
 
-  /// Leaves out later events that are earlier than `t`, at which something else was written.
-  void reach(eventcamera::Microseconds t) { latest_ = std::max(latest_, t); }
+  /// Drops further events that are earlier than `t`, the time of another written item.
+  void advance_to(eventcamera::Microseconds t) { latest_ = std::max(latest_, t); }
 
-  /// Labels of the events that pick() returned, or that `write` gets from take(): one for each, or
-  /// none.
+  /// Labels of the events that pick() returned, or that `write_block` gets: one for each, or none.
   std::span<const eventcamera::Label> labels() const { return picked_labels_; }
 
   void end_file();
 
-  /// What was written since begin_file(); the filter counts only the events. Any thread may read
-  /// it.
+  /// Counts since begin_file(), of which this class increments only the events. Any thread may read
+  /// them.
   Guarded<Written>& written() { return written_; }
 
-  /// The property stats of the element: what was written.
+  /// Property `stats` of the element.
   GstStructure* stats();
   static constexpr auto stats_blurb =
-      "Counts of what was written to the file: events, triggers, frames and imu-samples";
+      "Counts of what was written to the file: events, their labels, triggers, frames and "
+      "imu-samples";
 
   /// Report for an exception from writing: `otherwise`, unless memory is short or the format cannot
   /// hold the stream.
@@ -89,7 +90,7 @@ class WritableEvents {
 
  private:
   /// Counters of events dropped for one reason.
-  struct LeftOut {
+  struct Dropped {
     guint64 count = 0;
     guint64 reported = 0;
   };
@@ -97,7 +98,7 @@ class WritableEvents {
   void report_buffer(GstBuffer* buffer) const;
   void warn_of_earlier();
   void warn_of_outside();
-  void warn(LeftOut& left_out, const std::string& what, const std::string& cause);
+  void warn(Dropped& dropped, const std::string& what, const std::string& cause);
 
   GstElement* element_;
   GstDebugCategory* category_;
@@ -106,7 +107,7 @@ class WritableEvents {
   eventcamera::Microseconds latest_ = 0;  ///< latest time written
   std::vector<eventcamera::AbsoluteEvent> picked_;
   std::vector<eventcamera::Label> picked_labels_;
-  LeftOut earlier_;
-  LeftOut outside_;
+  Dropped earlier_;
+  Dropped outside_;
   Guarded<Written> written_;
 };

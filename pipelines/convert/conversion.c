@@ -11,8 +11,7 @@
 /* A conversion that runs. */
 typedef struct {
   const char* in;
-  const Format* format;
-  const ElementOptions* options;
+  const FileElement* writer;
   const Part* part;
   GstElement* pipeline;
   guint64 events;
@@ -65,6 +64,14 @@ static gboolean count_streams(GstElement* reader, GstPad* pad, gpointer count) {
   return TRUE;
 }
 
+/* True if an element has pads of this template. */
+static gboolean has_pads(const FileElement* element, const char* template_name) {
+  const GList* item = gst_element_factory_get_static_pad_templates(element->factory);
+  for (; item != NULL; item = item->next)
+    if (strcmp(((GstStaticPadTemplate*)item->data)->name_template, template_name) == 0) return TRUE;
+  return FALSE;
+}
+
 /* Links the streams of a file once they are known. Runs in the streaming thread, before data
  * flows. `muxer` takes frames, too, unless it is NULL. */
 static void link_streams(GstElement* reader, gpointer muxer) {
@@ -90,8 +97,7 @@ static void link_when_known(const Conversion* self) {
   g_autoptr(GstElement) reader = gst_bin_get_by_name(GST_BIN(self->pipeline), "reader");
   g_autoptr(GstElement) writer = gst_bin_get_by_name(GST_BIN(self->pipeline), "writer");
   /* Frames are not cropped, so they would not match the events. */
-  const gboolean takes_frames =
-      !is_cropped(self->part) && strcmp(self->format->media_type, "application/x-aedat") == 0;
+  const gboolean takes_frames = !is_cropped(self->part) && has_pads(self->writer, "video_%u");
   g_signal_connect(reader, "no-more-pads", G_CALLBACK(link_streams), takes_frames ? writer : NULL);
 }
 
@@ -100,13 +106,6 @@ static GstStructure* stats_of(GstElement* pipeline, const char* name) {
   GstStructure* stats = NULL;
   g_object_get(element, "stats", &stats, NULL);
   return stats;
-}
-
-/* True if the file that is written keeps labels. */
-static gboolean keeps_labels(const Conversion* self) {
-  const char* extension = self->format->extension;
-  return strcmp(extension, ".npz") == 0 || strcmp(extension, ".h5") == 0 ||
-         g_strcmp0(self->options->values[OPTION_FORMAT], "labels") == 0;
 }
 
 /* Prints what the file that is written cannot store. */
@@ -127,8 +126,9 @@ static void print_left_out(const Conversion* self) {
       g_string_append_printf(text, "%s%" G_GUINT64_FORMAT " %s", text->len > 0 ? ", " : "",
                              of_in - of_out, kinds[i].name);
   }
-  if (self->labelled && !keeps_labels(self))
-    g_string_append(text, text->len > 0 ? ", labels" : "labels");
+  guint64 labels = 0;
+  gst_structure_get_uint64(written, "labels", &labels);
+  if (self->labelled && labels == 0) g_string_append(text, text->len > 0 ? ", labels" : "labels");
   if (text->len > 0) fprintf(stderr, "%s: left out: %s\n", self->in, text->str);
 }
 
@@ -322,13 +322,18 @@ static void probe(Conversion* self) {
                     self, NULL);
 }
 
-int convert_events(const char* in, const Reader* reader, const char* out, const Format* format,
-                   const ElementOptions* options, const Part* part, guint64* events) {
+int convert_events(const char* in, const FileElement* reader, const char* out,
+                   const FileElement* writer, const ElementOptions* options, const Part* part,
+                   guint64* events) {
   g_autoptr(GError) error = NULL;
-  g_autofree gchar* line =
-      g_strdup_printf("filesrc name=in ! %s name=reader %s queue name=events ! %s %s",
-                      reader->element, reader->has_streams ? "" : "!",
-                      is_cropped(part) ? "eventcrop name=crop !" : "", format->writer);
+  const gboolean has_streams = has_pads(reader, "events_%u");
+  const gboolean is_sink =
+      gst_element_factory_list_is_type(writer->factory, GST_ELEMENT_FACTORY_TYPE_SINK);
+  g_autofree gchar* line = g_strdup_printf(
+      "filesrc name=in ! %s name=reader %s queue name=events ! %s %s name=writer %s %s",
+      GST_OBJECT_NAME(reader->factory), has_streams ? "" : "!",
+      is_cropped(part) ? "eventcrop name=crop !" : "", GST_OBJECT_NAME(writer->factory),
+      writer->settings, is_sink ? "" : "! filesink name=out");
   g_autoptr(GstElement) pipeline =
       gst_parse_launch_full(line, NULL, GST_PARSE_FLAG_FATAL_ERRORS, &error);
   if (pipeline == NULL) {
@@ -338,9 +343,9 @@ int convert_events(const char* in, const Reader* reader, const char* out, const 
   if (!set_options(options, pipeline)) return 2;
   set_location(pipeline, "in", in);
   set_location(pipeline, "out", out);
-  Conversion self = {in, format, options, part, pipeline, 0, FALSE};
+  Conversion self = {in, writer, part, pipeline, 0, FALSE};
   probe(&self);
-  if (reader->has_streams) link_when_known(&self);
+  if (has_streams) link_when_known(&self);
   const gboolean ok = run(&self);
   if (ok) print_left_out(&self);
   if (ok && !interrupted && self.events == 0 && (is_trimmed(part) || is_cropped(part)))

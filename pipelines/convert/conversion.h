@@ -5,8 +5,7 @@
 
 #include <gst/gst.h>
 
-#include "element_options.h"
-#include "file_formats.h"
+#include "file_elements.h"
 
 G_BEGIN_DECLS
 
@@ -22,8 +21,9 @@ typedef struct {
 
 /* Converts `in` to the file `out`, which exists, and counts the events. Prints progress, what `out`
  * cannot store, and errors. Returns the exit status. */
-int convert_events(const char* in, const Reader* reader, const char* out, const Format* format,
-                   const ElementOptions* options, const Part* part, guint64* events);
+int convert_events(const char* in, const FileElement* reader, const char* out,
+                   const FileElement* writer, const ElementOptions* options, const Part* part,
+                   guint64* events);
 
 /* The first Ctrl-C, SIGTERM or SIGHUP from now on completes the file with the events so far; a
  * second Ctrl-C or SIGTERM kills the program. */

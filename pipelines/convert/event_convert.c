@@ -19,8 +19,7 @@
 
 #include "../plugin.h"
 #include "conversion.h"
-#include "element_options.h"
-#include "file_formats.h"
+#include "file_elements.h"
 
 /* Text is printed unchanged by stdio: names are bytes, messages are UTF-8. g_print() would replace
  * characters that the locale lacks. */
@@ -61,24 +60,29 @@ static const GOptionEntry options[] = {
     G_OPTION_ENTRY_NULL,
 };
 
+/* Appends a line about files with an extension. */
+static void append_file(GString* text, const FileElement* element, const char* note) {
+  const gchar* description =
+      gst_element_factory_get_metadata(element->factory, GST_ELEMENT_METADATA_DESCRIPTION);
+  g_string_append_printf(text, note[0] != '\0' ? "  %-8s %s (%s)\n" : "  %-8s %s\n",
+                         element->extension, description, note);
+}
+
 /* Part of --help after the options. */
 static gchar* help(void) {
   GString* text = g_string_new(
       "IN is recognised by its content, or else by its extension. Formats, by the extension of "
       "OUT:\n");
-  for (const Format* format = formats; format->extension != NULL; ++format)
-    g_string_append_printf(text, "  %-8s %s\n", format->extension, format->description);
+  for (const FileElement* writer = file_writers(); writer->factory != NULL; ++writer)
+    append_file(text, writer, writer->settings);
+  for (const FileElement* reader = file_readers(); reader->factory != NULL; ++reader)
+    if (with_extension_of(file_writers(), reader->extension) == NULL)
+      append_file(text, reader, "read only");
   g_string_append(text, "\nNames that options accept:\n");
-  append_accepted_values(text, ".raw", "evtenc", "format");
-  append_accepted_values(text, ".csv and .txt", "eventcsvenc", "format");
-  append_accepted_values(text, ".aedat4", "aedatmux", "compression");
-  append_accepted_values(text, ".h5", "eventhdf5sink", "compression");
-  append_accepted_values(text, ".mcap", "eventmcapenc", "format");
-  append_accepted_values(text, ".mcap", "eventmcapenc", "compression");
-  append_accepted_values(text, "text and NumPy", "eventcsvdec", "time-unit");
+  append_accepted_values(text);
   g_string_append(text, "  --extension, all:");
-  for (const Format* format = formats; format->extension != NULL; ++format)
-    if (format->writer != NULL) g_string_append_printf(text, " %s", format->extension + 1);
+  for (const FileElement* writer = file_writers(); writer->factory != NULL; ++writer)
+    g_string_append_printf(text, " %s", writer->extension + 1);
   g_string_append_c(text, '\n');
   g_string_append(text, "\nExit status: 0 = converted, 1 = failed or interrupted, 2 = wrong usage");
   return g_string_free(text, FALSE);
@@ -134,13 +138,13 @@ static gchar* target_of(const char* path) {
 }
 
 /* Returns the exit status. */
-static int write_file(const char* in, const Reader* reader, const char* path,
-                      const Format* format) {
+static int write_file(const char* in, const FileElement* reader, const char* path,
+                      const FileElement* writer) {
   guint64 events = 0;
   g_autofree gchar* unfinished = create_unfinished(path);
   if (unfinished == NULL) return 1;
   const int status =
-      convert_events(in, reader, unfinished, format, &element_options, &part, &events);
+      convert_events(in, reader, unfinished, writer, &element_options, &part, &events);
   if (!finish(unfinished, path, status == 0)) return MAX(status, 1);
   printf("%" G_GUINT64_FORMAT " events from %s to %s\n", events, in, path);
   return 0;
@@ -159,11 +163,11 @@ static void warn_of_journal(const char* in) {
 
 /* Returns the exit status. */
 static int convert(const char* in, const char* out) {
-  const Format* format = format_of(out);
-  if (!can_write(out, format)) return 2;
-  const Reader* reader = find_reader(in);
+  const FileElement* writer = find_writer(out);
+  if (writer == NULL) return 2;
+  const FileElement* reader = find_reader(in);
   if (reader == NULL) return 1;
-  if (!options_apply(&element_options, format)) return 2;
+  if (!options_apply(&element_options, writer)) return 2;
   if (same_file(in, out)) {
     fprintf(stderr, "%s and %s are the same file\n", in, out);
     return 2;
@@ -171,7 +175,7 @@ static int convert(const char* in, const char* out) {
   g_autofree gchar* path = target_of(out);
   if (path == NULL) return 1;
   warn_of_journal(in);
-  return write_file(in, reader, path, format);
+  return write_file(in, reader, path, writer);
 }
 
 /* Path of the converted file in the output directory. */

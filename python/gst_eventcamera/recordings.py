@@ -20,21 +20,6 @@ from .pipeline import (
     quoted, sensor_size, utf8_path)
 from .sources import SINK
 
-# Elements that write a file, by its extension.
-WRITERS = {
-    ".raw": "evtenc ! filesink name=file",
-    ".dat": "eventdatenc ! filesink name=file",
-    ".es": "eventesenc ! filesink name=file",
-    ".csv": "eventcsvenc ! filesink name=file",
-    ".txt": "eventcsvenc format=rpg ! filesink name=file",
-    ".npy": "eventnpyenc ! filesink name=file",
-    ".npz": "eventnpzenc ! filesink name=file",
-    ".aedat4": "aedatmux ! filesink name=file",
-    ".mcap": "eventmcapenc ! filesink name=file",
-    ".h5": "eventhdf5sink name=file",
-    ".hdf5": "eventhdf5sink name=file format=metavision",
-}
-
 # Latest time of an event that readers of files accept, in microseconds: 142 years.
 MAX_TIME = 1 << 52
 # Microseconds of the buffers that are written.
@@ -43,6 +28,19 @@ BUFFER = 10_000
 MAX_QUEUED = 1 << 24
 LOOK = Gst.MSECOND
 XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
+
+
+def _writers() -> Iterator[tuple[str, str]]:
+    """Extensions of files, and elements that write them, which have "output-extensions" in GStreamer's registry."""
+    for factory in Gst.Registry.get().get_feature_list(Gst.ElementFactory):
+        is_sink = factory.list_is_type(Gst.ELEMENT_FACTORY_TYPE_SINK)
+        extensions = factory.get_metadata("output-extensions")
+        for extension, *settings in map(str.split, extensions.split(";") if extensions else ()):
+            writer = " ".join([factory.get_name(), *settings])
+            yield f".{extension}", writer + (" name=file" if is_sink else " ! filesink name=file")
+
+
+WRITERS = dict(sorted(_writers()))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -33,9 +33,9 @@ class Encoder {
     append(events, out);
   }
 
-  /// Takes the labels of the next events, one for each; formats without labels ignore them. Events
-  /// without labels have empty ones.
-  virtual void label(std::span<const Label> /*labels*/) {}
+  /// Labels the next events, one for each, or none. Returns the number of labels that the format
+  /// stores.
+  virtual std::size_t label(std::span<const Label> /*labels*/) { return 0; }
 
   /// Appends an encoded trigger, which is not earlier than anything before it. False if the format
   /// has no triggers, or none of this input.

@@ -142,9 +142,9 @@ class Kind {
     if (pad.takes_frames()) return video;
     if (pad.takes_events()) return events;
     if (pad.name == "flow_sink") return flow(frames);
-    const auto* const file =
-        std::ranges::find(recording_files::files, name_, &recording_files::File::reader);
-    if (file == std::end(recording_files::files)) g_error("no file for %s", name_.c_str());
+    const auto& files = recording_files::files();
+    const auto file = std::ranges::find(files, name_, &recording_files::File::reader);
+    if (file == files.end()) g_error("no file for %s", name_.c_str());
     return "filesrc location=" + in_quotes(file->path());
   }
 

@@ -5,6 +5,7 @@
 #include <gst/video/video.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <initializer_list>
@@ -53,13 +54,15 @@ inline const char* const simulators[] = {
     "eventsim-frame",   "eventsim-dense",   "eventsim-sparse",   "eventsim-diff",  "eventsim-dvs",
     "gleventsim-frame", "gleventsim-dense", "gleventsim-sparse", "gleventsim-diff"};
 
-/// Those that take frames in system memory, and in textures.
-inline const auto cpu_simulators = std::span(simulators).first<5>();
-inline const auto gpu_simulators = std::span(simulators).last<4>();
-
 inline bool is_on_gpu(const std::string& element) {
   return element.starts_with("gl");
 }
+
+/// Simulators whose frames are in system memory, and in textures.
+inline const auto on_cpu =
+    static_cast<std::size_t>(std::ranges::find_if(simulators, is_on_gpu) - std::begin(simulators));
+inline const auto cpu_simulators = std::span(simulators).first(on_cpu);
+inline const auto gpu_simulators = std::span(simulators).subspan(on_cpu);
 
 /// Caps of the pictures that a simulator draws. The tests read those in textures like others.
 inline std::string pictures_of(const std::string& element) {

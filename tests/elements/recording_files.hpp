@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <random>
 #include <span>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -42,6 +45,28 @@ inline std::vector<AbsoluteEvent> some_events() {
   return events;
 }
 
+/// Launch lines of the elements that read or write files, by extension, as GStreamer's registry
+/// knows them.
+inline std::map<std::string, std::string> elements_with(const char* extensions) {
+  gst_init(nullptr, nullptr);
+  std::map<std::string, std::string> elements;
+  GList* const features =
+      gst_registry_get_feature_list(gst_registry_get(), GST_TYPE_ELEMENT_FACTORY);
+  for (const GList* item = features; item != nullptr; item = item->next) {
+    auto* const factory = GST_ELEMENT_FACTORY(item->data);
+    const char* const text = gst_element_factory_get_metadata(factory, extensions);
+    std::string entries = text != nullptr ? text : "";
+    std::ranges::replace(entries, ',', ';');
+    std::istringstream stream(entries);
+    for (std::string entry; std::getline(stream >> std::ws, entry, ';');) {
+      const auto end = std::min(entry.find(' '), entry.size());
+      elements[entry.substr(0, end)] = GST_OBJECT_NAME(factory) + entry.substr(end);
+    }
+  }
+  gst_plugin_feature_list_free(features);
+  return elements;
+}
+
 /// The files, in a folder that lasts as long as the tests.
 class Folder {
  public:
@@ -74,18 +99,10 @@ class Folder {
     save("atis.bin", atis_bin(events));
     save("ros1.bag", eventcamera::rosbags::of_events(sensor, events, 1000));
     save("ros2.db3", eventcamera::rosbags::db3_of_events(sensor, events, 1000));
-    for (const auto& [name, writer] : {std::pair{"a.dat", "eventdatenc ! filesink"},
-                                       {"a.es", "eventesenc ! filesink"},
-                                       {"a.csv", "eventcsvenc ! filesink"},
-                                       {"a.txt", "eventcsvenc format=rpg ! filesink"},
-                                       {"a.npy", "eventnpyenc ! filesink"},
-                                       {"a.npz", "eventnpzenc ! filesink"},
-                                       {"a.aedat4", "aedatmux ! filesink"},
-                                       {"a.mcap", "eventmcapenc ! filesink"},
-                                       {"dsec.h5", "eventhdf5sink"},
-                                       {"metavision.hdf5", "eventhdf5sink format=metavision"}}) {
+    for (const auto& [extension, writer] : elements_with("output-extensions")) {
       Pipeline pipeline("filesrc location=" + in_quotes(path_ / "evt3.raw") + " ! evtdec ! " +
-                        writer + " location=" + in_quotes(path_ / name));
+                        writer + (writer.starts_with("eventhdf5sink") ? "" : " ! filesink") +
+                        " location=" + in_quotes(path_ / ("a." + extension)));
       EXPECT_TRUE(pipeline.play()) << pipeline.error;
     }
   }
@@ -116,23 +133,25 @@ class Folder {
 };
 
 struct File {
-  const char* name;
-  const char* reader;
+  std::string name;
+  std::string reader;
 
   std::string path() const { return Folder::path(name); }
 };
 
-inline constexpr File files[] = {
-    {"evt2.raw", "evtdec"},         {"evt21.raw", "evtdec"},
-    {"evt3.raw", "evtdec"},         {"evt4.raw", "evtdec"},
-    {"a.dat", "eventdatdec"},       {"a.es", "eventesdec"},
-    {"a.csv", "eventcsvdec"},       {"a.txt", "eventcsvdec"},
-    {"a.npy", "eventnpydec"},       {"a.npz", "eventnpzdec"},
-    {"aedat2.aedat", "aedatdemux"}, {"a.aedat4", "aedatdemux"},
-    {"aedat3.aedat", "aedatdemux"}, {"metavision.hdf5", "eventhdf5dec"},
-    {"dsec.h5", "eventhdf5dec"},    {"a.mcap", "eventmcapdec"},
-    {"ros1.bag", "eventbagdec"},    {"ros2.db3", "eventbagdec"},
-};
+inline const std::vector<File>& files() {
+  static const auto files = [] {
+    std::vector<File> made = {{"evt2.raw", "evtdec"},         {"evt21.raw", "evtdec"},
+                              {"evt4.raw", "evtdec"},         {"aedat2.aedat", "aedatdemux"},
+                              {"aedat3.aedat", "aedatdemux"}, {"ros1.bag", "eventbagdemux"},
+                              {"ros2.db3", "eventbagdemux"}};
+    auto readers = elements_with("input-extensions");
+    for (const auto& [extension, writer] : elements_with("output-extensions"))
+      made.push_back({"a." + extension, readers.at(extension)});
+    return made;
+  }();
+  return files;
+}
 
 /// Part of a test's name.
 inline std::string test_name(std::string text) {

@@ -143,11 +143,11 @@ for file in masked undistorted; do [ "$(wc -l <$file.csv)" -gt 1000 ] || fail "$
 # Bags of ROS: written, and those of recorders read, with their images.
 launch filesrc location=candidate.raw ! evtdec ! eventmcapenc ! filesink location=candidate.mcap
 launch filesrc location=candidate.raw ! evtdec ! eventcsvenc ! filesink location=candidate.csv
-launch filesrc location=candidate.mcap ! eventmcapdec ! eventcsvenc ! filesink location=from-mcap.csv
+launch filesrc location=candidate.mcap ! eventmcapdemux ! eventcsvenc ! filesink location=from-mcap.csv
 cmp candidate.csv from-mcap.csv || fail "a bag has other events"
 /usr/bin/python3 "$SOURCE/tests/formats/bag_files.py" .
 for file in evt3.mcap evt3.bag evt3.db3; do
-  launch filesrc location=$file ! eventbagdec name=d  d.events_0 ! queue ! eventcsvenc ! filesink location=$file.csv  d.video_0 ! queue ! filesink location=images
+  launch filesrc location=$file ! eventbagdemux name=d  d.events_0 ! queue ! eventcsvenc ! filesink location=$file.csv  d.video_0 ! queue ! filesink location=images
   [ "$(wc -l <$file.csv)" = 6001 ] || fail "$file: $(wc -l <$file.csv) lines"
   [ "$(stat -c %s images)" = $((40 * 88 * 65)) ] || fail "$file: images of $(stat -c %s images) bytes"
 done

@@ -29,7 +29,7 @@ check() {
 # Event files, read in part, and files of another kind.
 work=$(mktemp -d)
 trap 'rm -rf "$log" "$work"' EXIT
-for pair in evtenc:evtdec eventdatenc:eventdatdec eventesenc:eventesdec eventcsvenc:eventcsvdec eventnpyenc:eventnpydec eventnpzenc:eventnpzdec eventmcapenc:eventmcapdec; do
+for pair in evtenc:evtdec eventdatenc:eventdatdec eventesenc:eventesdec eventcsvenc:eventcsvdec eventnpyenc:eventnpydec eventnpzenc:eventnpzdec eventmcapenc:eventmcapdemux; do
   file=$work/${pair%:*}
   check videotestsrc num-buffers=8 ! eventsim-frame ! "${pair%:*}" ! filesink location="$file"
   check filesrc location="$file" ! queue ! "${pair#*:}" ! fakesink num-buffers=1
@@ -78,9 +78,9 @@ check videotestsrc num-buffers=8 ! eventsim-frame ! eventundistort location=/now
 # Bags of events and images.
 /usr/bin/python3 "$SOURCE/tests/formats/bag_files.py" "$work"
 for file in "$work"/evt3.{mcap,bag,db3}; do
-  check filesrc location="$file" ! queue ! eventbagdec name=d  d.events_0 ! queue ! fakesink  d.video_0 ! queue ! fakesink
-  check filesrc location="$file" ! eventbagdec ! fakesink num-buffers=1
+  check filesrc location="$file" ! queue ! eventbagdemux name=d  d.events_0 ! queue ! fakesink  d.video_0 ! queue ! fakesink
+  check filesrc location="$file" ! eventbagdemux ! fakesink num-buffers=1
 done
-check filesrc location="$0" ! eventbagdec ! fakesink
+check filesrc location="$0" ! eventbagdemux ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! identity error-after=4 ! eventsim-dense ! fakesink

@@ -96,7 +96,7 @@ class Player {
 class EveryPlayer : public testing::TestWithParam<std::tuple<const char*, File>> {};
 INSTANTIATE_TEST_SUITE_P(, EveryPlayer,
                          testing::Combine(testing::Values("playbin", "playbin3"),
-                                          testing::ValuesIn(files)),
+                                          testing::ValuesIn(files())),
                          [](const auto& test) {
                            return test_name(std::get<0>(test.param) + std::string("_") +
                                             std::get<1>(test.param).name);
@@ -129,7 +129,7 @@ class EveryDecodebin : public testing::TestWithParam<std::tuple<const char*, Fil
 INSTANTIATE_TEST_SUITE_P(
     , EveryDecodebin,
     testing::Combine(testing::Values("decodebin", "decodebin3", "queue ! decodebin"),
-                     testing::ValuesIn(files)),
+                     testing::ValuesIn(files())),
     [](const auto& test) {
       return test_name(std::get<0>(test.param) + std::string("_") + std::get<1>(test.param).name);
     });

@@ -28,7 +28,7 @@ from gst_eventcamera.sources import SINK
 
 FOLDER = tempfile.TemporaryDirectory()
 WIDTH, HEIGHT = 346, 260
-EXTENSIONS = ["raw", "dat", "es", "csv", "npz", "aedat4", "mcap", "h5", "hdf5"]
+EXTENSIONS = [extension[1:] for extension in recordings.WRITERS]
 
 
 def path_of(name):
@@ -68,7 +68,7 @@ class Recordings(unittest.TestCase):
                 read = ec.read(path)
                 self.assertEqual(sorted(read["t"]), sorted(self.events["t"]))
                 self.assertEqual(read["p"].sum(), self.events["p"].sum())
-                if extension != "csv":  # text has no size
+                if extension not in ("csv", "txt", "npy"):  # they have no size
                     self.assertGreaterEqual(read.width, WIDTH)
 
     def test_writes_the_formats_of_event_convert(self):

@@ -329,9 +329,9 @@ std::vector<Play> plays() {
   constexpr int count = std::size(scenarios);
   std::vector<Play> plays;
   for (std::size_t line = 0; line < std::size(lines); ++line)
-    for (std::size_t file = 0; file < std::size(files); ++file)
+    for (std::size_t file = 0; file < files().size(); ++file)
       for (int i = repetitions(2, count); i > 0; --i)
-        plays.push_back({lines[line], files[file],
+        plays.push_back({lines[line], files()[file],
                          scenarios[(line + file + static_cast<std::size_t>(i)) % count]});
   return plays;
 }

@@ -16,28 +16,28 @@ using eventcamera::SensorSize;
 /// Maximum time that events wait to be written as a packet.
 static constexpr Microseconds max_wait = 100'000;
 
-void AedatFile::leave_out(const char* what, const std::string& cause) {
+void AedatFile::warn_skipped(const char* what, const std::string& cause) {
   warn_(element_, {GST_STREAM_ERROR_MUX, std::string("Left out ") + what + "."}, cause);
 }
 
 /* streams */
 
-bool AedatFile::take_sensor(SensorSize size) {
+bool AedatFile::handle_sensor(SensorSize size) {
   if (encoder_ && !writable_.accepts(size)) return false;
   size_ = size;
   return true;
 }
 
 template <class Item>
-bool AedatFile::take(std::optional<std::vector<Item>>&& items, Waiting<Item>& waiting) {
+bool AedatFile::queue(std::optional<std::vector<Item>>&& items, Waiting<Item>& waiting) {
   if (!items) return false;
   if (!waiting) waiting.emplace();
   waiting->push(*items);
   return true;
 }
 
-bool AedatFile::take_items(GstEvent* event) {
-  return take(triggers_of(event), triggers_) || take(imu_samples_of(event), imu_samples_);
+bool AedatFile::handle_items(GstEvent* event) {
+  return queue(triggers_of(event), triggers_) || queue(imu_samples_of(event), imu_samples_);
 }
 
 /* bytes */
@@ -87,8 +87,8 @@ AedatFile::Bytes AedatFile::write_items() {
 void AedatFile::write_events(GstBuffer* buffer, Bytes& out) {
   const MappedEvents mapped(buffer);
   if (!mapped)
-    return leave_out("a buffer with a partial event",
-                     std::to_string(gst_buffer_get_size(buffer)) + " bytes");
+    return warn_skipped("a buffer with a partial event",
+                        std::to_string(gst_buffer_get_size(buffer)) + " bytes");
   GST_CAT_LOG_OBJECT(category_, element_, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                      mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
   encoder_->encode(writable_.pick(mapped.events(), mapped.start()), out);
@@ -98,8 +98,8 @@ void AedatFile::write_events(GstBuffer* buffer, Bytes& out) {
 void AedatFile::write_frame(GstBuffer* buffer, Microseconds t, Bytes& out) {
   GST_CAT_LOG_OBJECT(category_, element_, "frame at %" G_GINT64_FORMAT " us", gint64{t});
   const auto reject = [&](const char* cause) {
-    leave_out("a frame that does not fit into the file",
-              std::string(cause) + ", at " + std::to_string(t) + " us");
+    warn_skipped("a frame that does not fit into the file",
+                 std::string(cause) + ", at " + std::to_string(t) + " us");
   };
   if (!video_) return reject("no caps");
   const VideoFrame video(*video_, buffer, GST_MAP_READ);

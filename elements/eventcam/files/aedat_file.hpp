@@ -25,14 +25,13 @@ class AedatFile {
         writable_(element, category, GST_STREAM_ERROR_MUX),
         warn_(category) {}
 
-  /// Sets the sensor of the events. False, after an error message, if the file has another one.
-  bool take_sensor(eventcamera::SensorSize size);
-  void take_video(const GstVideoInfo& video) { video_ = video; }
+  /// Sets the sensor of the events. False, after an error message, if the file has another sensor.
+  bool handle_sensor(eventcamera::SensorSize size);
+  void set_video(const GstVideoInfo& video) { video_ = video; }
   /// Sets the name of the camera.
-  void take_source(const gchar* name) { source_ = name; }
-  /// Takes triggers or IMU samples, which wait for the next buffer. False if the event has other
-  /// contents.
-  bool take_items(GstEvent* event);
+  void set_source(const gchar* name) { source_ = name; }
+  /// Queues the triggers or IMU samples of an event for the next buffer. False for other events.
+  bool handle_items(GstEvent* event);
   /// True if too many items wait to wait any longer.
   bool is_full() const {
     const auto is_full = [](const auto& waiting) { return waiting && waiting->is_full(); };
@@ -43,29 +42,30 @@ class AedatFile {
   bool has_video() const { return video_.has_value(); }
   bool has_begun() const { return encoder_ != nullptr; }
 
-  /// Returns the header. `settings` tells what is not known here. May throw.
+  /// Returns the header. `settings` has the compression, and whether there are frames and a table.
+  /// May throw.
   Bytes begin(eventcamera::Aedat4Settings settings);
   /// Encodes the items that wait. May throw.
   Bytes write_items();
   /// Encodes the items that wait and a buffer of time `t`: events, a frame, or neither if it is
   /// empty. May throw.
   Bytes write(GstBuffer* buffer, Microseconds t, bool has_events);
-  /// Ends the packets that wait. May throw.
+  /// Ends incomplete packets. May throw.
   Bytes flush();
   /// Returns the end of the file. May throw.
   Bytes finish();
-  /// What is to be overwritten then.
+  /// Bytes of the header to overwrite after finish().
   std::optional<eventcamera::FilePatch> patch() { return encoder_->patch(); }
 
-  /// Warns about input that is left out.
-  void leave_out(const char* what, const std::string& cause);
+  /// Warns about skipped input.
+  void warn_skipped(const char* what, const std::string& cause);
 
-  /// Forgets what was written, for a new file of the same streams.
+  /// Starts a new file of the same streams.
   void start_over();
   /// Forgets the streams, too.
   void reset();
 
-  /// What was written, from any thread.
+  /// Counts of written items; any thread may ask.
   GstStructure* stats() { return writable_.stats(); }
 
  private:
@@ -75,7 +75,7 @@ class AedatFile {
   using Waiting = std::optional<eventcamera::WaitingItems<Item>>;
 
   template <class Item>
-  bool take(std::optional<std::vector<Item>>&& items, Waiting<Item>& waiting);
+  bool queue(std::optional<std::vector<Item>>&& items, Waiting<Item>& waiting);
   template <class Item>
   std::size_t encode(Waiting<Item>& waiting, const char* name, Bytes& out);
   void write_events(GstBuffer* buffer, Bytes& out);

@@ -265,8 +265,8 @@ static GstFlowReturn write_next(GstAedatMux* self) {
   if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
   const GstClockTime running = running_time(pad.get(), buffer.get());
   if (!GST_CLOCK_TIME_IS_VALID(running)) {
-    file.leave_out("a buffer without a timestamp, or outside its segment",
-                   "pad " + std::string(GST_PAD_NAME(pad.get())) + ", no running time");
+    file.warn_skipped("a buffer without a timestamp, or outside its segment",
+                      "pad " + std::string(GST_PAD_NAME(pad.get())) + ", no running time");
     return GST_FLOW_OK;
   }
   const bool of_events = kind_of(pad.get()) == Kind::events;
@@ -363,7 +363,7 @@ static GstClockTime get_next_time(GstAggregator* aggregator) {
 
 /* events, queries, pads */
 
-static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* caps) {
+static bool handle_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* caps) {
   auto& file = self->priv->file;
   const Kind kind = kind_of(caps);
   for (const Pad& other : sink_pads(self)) {
@@ -379,12 +379,12 @@ static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* c
   if (kind == Kind::video) {
     GstVideoInfo video;
     if (!gst_video_info_from_caps(&video, caps)) return false;
-    file.take_video(video);
+    file.set_video(video);
     return true;
   }
   GstEventCameraInfo info;
   return gst_event_camera_info_from_caps(&info, caps) &&
-         file.take_sensor({info.width, info.height});
+         file.handle_sensor({info.width, info.height});
 }
 
 static GstFlowReturn sink_event_pre_queue(GstAggregator* aggregator, GstAggregatorPad* pad,
@@ -411,18 +411,18 @@ static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, Gst
     GstCaps* caps = nullptr;
     gst_event_parse_caps(event, &caps);
     GST_DEBUG_OBJECT(pad, "%" GST_PTR_FORMAT, caps);
-    if (!take_caps(self, pad, caps)) {
+    if (!handle_caps(self, pad, caps)) {
       gst_event_unref(event);
       return FALSE;
     }
-  } else if (file.take_items(event)) {
+  } else if (file.handle_items(event)) {
     gst_event_unref(event);
     return reported(self, [&] { return write_waiting(self); }) == GST_FLOW_OK;
   } else if (GST_EVENT_TYPE(event) == GST_EVENT_TAG) {
     GstTagList* tags = nullptr;
     gchar* source = nullptr;
     gst_event_parse_tag(event, &tags);
-    if (gst_tag_list_get_string(tags, GST_TAG_DEVICE_MODEL, &source)) file.take_source(source);
+    if (gst_tag_list_get_string(tags, GST_TAG_DEVICE_MODEL, &source)) file.set_source(source);
     g_free(source);
   } else if (GST_EVENT_TYPE(event) == GST_EVENT_GAP) {
     take_segment_end(pad, event);

@@ -184,9 +184,10 @@ static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
   if (state.ended) return GST_FLOW_EOS;
   if (!state.writer) return GST_FLOW_NOT_NEGOTIATED;
   const bool written = reported(self, [&] {
-    return self->priv->writable.take(buffer, [&](const auto& events) {
+    return self->priv->writable.write(buffer, [&](const auto& events) {
       state.begun |= !events.empty();
-      state.writer->label(self->priv->writable.labels());
+      const auto labels = state.writer->label(self->priv->writable.labels());
+      self->priv->writable.written().lock()->labels += labels;
       state.writer->append(events);
     });
   });
@@ -290,9 +291,9 @@ static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
   properties.add(
       &Settings::commit_interval,
       g_param_spec_uint64("commit-interval", "Commit interval",
-                          "Time between two states of the file that survive if the process is "
-                          "killed (ns of the clock; 0 = none before the end, and the same events "
-                          "in the same buffers make the same bytes)",
+                          "Interval between flushes; data before the last flush survives a crash "
+                          "(ns of the clock; 0 = flush only at the end, and the same events in the "
+                          "same buffers make the same bytes)",
                           0, G_MAXINT64, defaults.commit_interval, mutable_ready_flags));
   install_stats(
       object_class,

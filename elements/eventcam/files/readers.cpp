@@ -354,8 +354,8 @@ GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_re
 
 #ifdef HAVE_ROS
 /**
- * SECTION:element-eventmcapdec
- * @title: eventmcapdec
+ * SECTION:element-eventmcapdemux
+ * @title: eventmcapdemux
  * @short_description: reads MCAP files, which are ROS 2 bags
  *
  * Reads events and images from MCAP files of ROS 2 and ROS 1, without ROS: messages
@@ -364,7 +364,7 @@ GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_re
  * compressed with LZ4 or Zstandard.
  *
  * The first topic of events in the file is read, and all of images; a message names the others,
- * which #GstEventMcapDec:topics selects.
+ * which #GstEventMcapDemux:topics selects.
  *
  * PTS are the stamps of the messages' headers. Packets have the clock of the camera: their first
  * stamp gives the time of its start, so that intervals between events are exact. Triggers are sent
@@ -375,7 +375,7 @@ GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_re
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 filesrc location=walk.mcap ! eventmcapdec name=d  d.events_0 ! queue !
+ * gst-launch-1.0 filesrc location=walk.mcap ! eventmcapdemux name=d  d.events_0 ! queue !
  * eventrender ! videoconvert ! autovideosink
  * ]|
  */
@@ -385,7 +385,7 @@ static std::unique_ptr<RecordingDecoder> make_bag_decoder(const GstCaps* /*caps*
 }
 
 static const EventReaderFormat mcap = {
-    .type_name = "GstEventMcapDec",
+    .type_name = "GstEventMcapDemux",
     .long_name = "MCAP demuxer",
     .description = "Reads events and images from MCAP files, which are ROS 2 bags",
     .caps = "application/x-mcap",
@@ -394,16 +394,17 @@ static const EventReaderFormat mcap = {
     .add_properties = add_topics,
     .make_decoder = make_bag_decoder,
 };
-GST_ELEMENT_REGISTER_DEFINE(eventmcapdec, "eventmcapdec", GST_RANK_PRIMARY, event_reader_type(mcap))
+GST_ELEMENT_REGISTER_DEFINE(eventmcapdemux, "eventmcapdemux", GST_RANK_PRIMARY,
+                            event_reader_type(mcap))
 
 /**
- * SECTION:element-eventbagdec
- * @title: eventbagdec
+ * SECTION:element-eventbagdemux
+ * @title: eventbagdemux
  * @short_description: reads ROS 1 bags, and ROS 2 bags with SQLite
  *
  * Reads events and images from ROS 1 bags (`.bag`, version 2.0, with chunks compressed with
  * bzip2 or LZ4 or not at all), and from ROS 2 bags that are SQLite databases (`.db3`), without
- * ROS. It reads the same messages as eventmcapdec, and chooses topics in the same way.
+ * ROS. It reads the same messages as eventmcapdemux, and chooses topics in the same way.
  *
  * PTS are the stamps of the messages' headers. Databases need random access, so upstream should
  * support pull mode, as filesrc does; in push mode a database is collected in memory, up to 256
@@ -411,12 +412,12 @@ GST_ELEMENT_REGISTER_DEFINE(eventmcapdec, "eventmcapdec", GST_RANK_PRIMARY, even
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 filesrc location=walk.bag ! eventbagdec name=d  d.events_0 ! queue ! eventrender !
- * videoconvert ! autovideosink
+ * gst-launch-1.0 filesrc location=walk.bag ! eventbagdemux name=d  d.events_0 ! queue ! eventrender
+ * ! videoconvert ! autovideosink
  * ]|
  */
 static const EventReaderFormat bag = {
-    .type_name = "GstEventBagDec",
+    .type_name = "GstEventBagDemux",
     .long_name = "ROS bag demuxer",
     .description = "Reads events and images from ROS bags",
     .caps = "application/x-rosbag; application/x-rosbag2-db3",
@@ -425,5 +426,6 @@ static const EventReaderFormat bag = {
     .add_properties = add_topics,
     .make_decoder = make_bag_decoder,
 };
-GST_ELEMENT_REGISTER_DEFINE(eventbagdec, "eventbagdec", GST_RANK_PRIMARY, event_reader_type(bag))
+GST_ELEMENT_REGISTER_DEFINE(eventbagdemux, "eventbagdemux", GST_RANK_PRIMARY,
+                            event_reader_type(bag))
 #endif

@@ -41,11 +41,12 @@ class DsecLayout final : public Hdf5Layout {
 
   bool append(std::span<const Trigger> /*triggers*/) override { return false; }
 
-  void label(std::span<const Label> labels) override {
-    if (labels.empty()) return;
+  std::size_t label(std::span<const Label> labels) override {
+    if (labels.empty()) return 0;
     if (!labels_) labels_.emplace(group_.get(), compression_);
     labels_->complete(t_.count());
     for (const auto& label : labels) labels_->put(label);
+    return labels.size();
   }
 
   void flush() override {

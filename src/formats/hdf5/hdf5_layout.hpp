@@ -19,7 +19,7 @@ class Hdf5Layout {
   virtual ~Hdf5Layout() = default;
   virtual void append(std::span<const AbsoluteEvent> events) = 0;
   virtual bool append(std::span<const Trigger> triggers) = 0;
-  virtual void label(std::span<const Label> /*labels*/) {}
+  virtual std::size_t label(std::span<const Label> /*labels*/) { return 0; }
 
   /// Hands all rows to the library.
   virtual void flush() = 0;

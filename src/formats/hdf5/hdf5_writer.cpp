@@ -72,10 +72,10 @@ void Hdf5Writer::append(std::span<const AbsoluteEvent> events) {
   if (commit_interval_.count() > 0 && Clock::now() - committed_ >= commit_interval_) commit();
 }
 
-void Hdf5Writer::label(std::span<const Label> labels) {
+std::size_t Hdf5Writer::label(std::span<const Label> labels) {
   const Hdf5Session session;
   file_->output.check();
-  layout_->label(labels);
+  return layout_->label(labels);
 }
 
 bool Hdf5Writer::append(std::span<const Trigger> triggers) {

@@ -43,9 +43,10 @@ class Hdf5Writer {
   /// `commit_interval` ago.
   void append(std::span<const AbsoluteEvent> events);
 
-  /// Takes the labels of the next events, one for each, before these are appended. The DSEC layout
-  /// stores them as events/cause and events/class, 0 for events without; the other has none.
-  void label(std::span<const Label> labels);
+  /// Labels the next events, one for each, before these are appended. The DSEC layout stores the
+  /// labels as events/cause and events/class, 0 for events without; the other has none. Returns the
+  /// number of stored labels.
+  std::size_t label(std::span<const Label> labels);
 
   /// False for the DSEC layout, which has no triggers.
   bool append(std::span<const Trigger> triggers);

@@ -92,14 +92,15 @@ class NpzEncoder final : public Encoder {
 
   std::uint64_t pending() const override { return ended_ ? 0 : count_; }
 
-  void label(std::span<const Label> labels) override {
-    if (labels.empty()) return;
+  std::size_t label(std::span<const Label> labels) override {
+    if (labels.empty()) return 0;
     if (columns_.size() == event_columns) {
       columns_.emplace_back("cause.npy", "|u1");
       columns_.emplace_back("class.npy", "<u2");
     }
     complete_labels();
     add_labels(labels);
+    return labels.size();
   }
 
  private:

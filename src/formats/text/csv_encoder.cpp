@@ -118,8 +118,10 @@ char* CsvEncoder::write(char* at, Microseconds t) const {
   return at + 6;
 }
 
-void CsvEncoder::label(std::span<const Label> labels) {
-  if (format_.labels) labels_.insert(labels_.end(), labels.begin(), labels.end());
+std::size_t CsvEncoder::label(std::span<const Label> labels) {
+  if (!format_.labels) return 0;
+  labels_.insert(labels_.end(), labels.begin(), labels.end());
+  return labels.size();
 }
 
 char* CsvEncoder::write(char* at, const AbsoluteEvent& event) {

@@ -49,7 +49,7 @@ class CsvEncoder final : public Encoder {
  public:
   CsvEncoder(const CsvFormat& format, SensorSize size);
 
-  void label(std::span<const Label> labels) override;
+  std::size_t label(std::span<const Label> labels) override;
 
  private:
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
