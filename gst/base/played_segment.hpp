@@ -15,7 +15,7 @@ inline const GstSegment& segment_of(GstEvent* event) {
   return *segment;
 }
 
-/// True if times of `next` go on from those of `current`.
+/// True if `next` maps timestamps as `current` does.
 inline bool continues(const GstSegment& current, const GstSegment& next) {
   return next.format == current.format && next.rate == current.rate && next.base == current.base &&
          next.start == current.start && next.time == current.time;
@@ -30,8 +30,8 @@ inline bool refuse_segment(gpointer element, GstEvent* event, const Report& repo
   return false;
 }
 
-/// True if a SEGMENT event has a positive rate. Else posts an error message of `element`, which
-/// says what it cannot do: `verb` events, such as "merge"; and unrefs the event.
+/// True if a SEGMENT event has a positive rate. Otherwise posts an error message of `element` and
+/// unrefs the event. `verb` is what the element does with events, such as "merge".
 inline bool plays_forwards(gpointer element, GstEvent* event, const char* verb) {
   return segment_of(event).rate > 0 ||
          refuse_segment(
@@ -40,7 +40,7 @@ inline bool plays_forwards(gpointer element, GstEvent* event, const char* verb) 
               std::string("Cannot ") + verb + " events backwards; play at a positive rate."});
 }
 
-/// True if a SEGMENT event has times, and a positive rate. Else as plays_forwards().
+/// Like plays_forwards(), and also requires a segment in time format.
 inline bool plays_events(gpointer element, GstEvent* event, const char* verb) {
   const GstFormat format = segment_of(event).format;
   if (format == GST_FORMAT_TIME) return plays_forwards(element, event, verb);
