@@ -7,13 +7,11 @@
 #include <string>
 
 #include "gst/base/errors.hpp"
-#include "gst/drawing/drawn_video.hpp"
 
 /// Warnings about video that makes wrong events, each posted once.
 class InputWarnings {
  public:
-  explicit InputWarnings(GstDebugCategory* category)
-      : warn_of_interlacing_(category), warn_of_drawn_input_(category) {}
+  explicit InputWarnings(GstDebugCategory* category) : warn_of_interlacing_(category) {}
 
   /// Warns about interlaced video, whose two fields are captured at different times.
   void check_interlacing(GstBaseTransform* element, const GstVideoInfo& video, GstBuffer* frame) {
@@ -30,20 +28,6 @@ class InputWarnings {
         std::string("interlace-mode=") + gst_video_interlace_mode_to_string(mode));
   }
 
-  /// Warns if the video already shows drawn events, of a recording or of another simulator.
-  void check_source(GstBaseTransform* element) {
-    GstQuery* query = new_drawn_events_query();
-    if (gst_pad_peer_query(GST_BASE_TRANSFORM_SINK_PAD(element), query))
-      warn_of_drawn_input_(
-          element,
-          {GST_STREAM_ERROR_FORMAT,
-           "The video shows events that were drawn upstream, not a scene. A recording of events "
-           "needs no simulator. To feed one video to two simulators, insert a tee before both."},
-          "an element upstream answered that it draws events");
-    gst_query_unref(query);
-  }
-
  private:
   WarnOnce warn_of_interlacing_;
-  WarnOnce warn_of_drawn_input_;
 };

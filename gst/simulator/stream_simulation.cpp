@@ -73,7 +73,6 @@ bool StreamSimulation::set_caps(GstCaps* in, GstCaps* out) {
   if (!made) return false;
   GST_DEBUG_OBJECT(element_, "%s of %" GST_PTR_FORMAT, state_->draws ? "event frames" : "events",
                    in);
-  stream_.warnings.check_source(element_);
   // Pictures have the time of their frame, intervals that of the previous frame.
   const GstClockTime duration = state_->draws ? 0 : frame_duration(video);
   if (duration > 0 || state_->draws) timing.expect(static_cast<Nanoseconds>(duration));
