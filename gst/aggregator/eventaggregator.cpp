@@ -73,7 +73,7 @@ std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime tim
   return running;
 }
 
-/// Sends an event to all sink pads. Returns true if each upstream takes it.
+/// Sends an event upstream from all sink pads. Returns true if all accept it.
 static gboolean forward(GstAggregator* element, GstEvent* event) {
   bool taken = true;
   for_each_sink_pad(element, [&](GstAggregatorPad* pad) {
@@ -83,8 +83,7 @@ static gboolean forward(GstAggregator* element, GstEvent* event) {
   return taken ? TRUE : FALSE;
 }
 
-/// Answers a caps query on a pad whose buffers are passed through: the caps that downstream
-/// accepts.
+/// Answers a caps query on a pad whose buffers pass through with the caps that downstream accepts.
 static void answer_caps_of_passed(GstAggregator* aggregator, GstAggregatorPad* pad,
                                   GstQuery* query) {
   GstCaps* filter = nullptr;
@@ -102,7 +101,7 @@ struct EventAggregatorFunctions {
     return gst_event_aggregator_impl(GST_EVENT_AGGREGATOR(element));
   }
 
-  /// True if output buffers are those of a pad.
+  /// True if the buffers of a pad pass through.
   static bool is_passed(const EventAggregator& self, GstAggregatorPad* pad) {
     return pad == self.main_pad_ && self.role_.passes_main_pad;
   }
@@ -121,8 +120,8 @@ struct EventAggregatorFunctions {
     self.segment_ended_ = false;
   }
 
-  /// True if an event goes through in its place in the stream. GstAggregator would forward it from
-  /// any pad, before the segment, and drop tags.
+  /// True if an event is forwarded in order with the buffers. gst_aggregator_default_sink_event()
+  /// would forward it from any pad, before the segment, and drop tags.
   static bool is_passed_on(const EventAggregator& self, GstAggregatorPad* pad, GstEvent* event) {
     switch (GST_EVENT_TYPE(event)) {
       case GST_EVENT_TAG:
@@ -139,7 +138,7 @@ struct EventAggregatorFunctions {
     }
   }
 
-  /// Passes an event on at once, or after the segment. May throw.
+  /// Forwards an event, once the segment is sent. May throw.
   static gboolean pass_on(EventAggregator& self, OwnedEvent event) {
     if (self.segment_sent_)
       return gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self.element_), event.release());
@@ -153,7 +152,8 @@ struct EventAggregatorFunctions {
       gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self.element_), event.release());
   }
 
-  /// GstAggregator sends the segment just before a buffer or EOS.
+  /// Sends waiting events between the segment and the first buffer or EOS: GstAggregator pushes the
+  /// segment itself, in gst_aggregator_push_mandatory_events(), and has no virtual function there.
   static GstPadProbeReturn probe_output(GstPad*, GstPadProbeInfo* info, gpointer element) {
     const bool is_buffer = (GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0;
     if (is_buffer || GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_EOS)
@@ -171,7 +171,7 @@ struct EventAggregatorFunctions {
     };
     if (self.main_pad_ != nullptr)
       done = segment_end_of(self.main_pad_);
-    else if (all_have_ended())  // otherwise downstream has
+    else if (all_have_ended())  // otherwise downstream has returned EOS
       for (const auto& pad : pads)
         if (auto end = segment_end_of(pad.get())) done = std::move(end);
     if (!done) return GST_FLOW_EOS;
@@ -216,14 +216,14 @@ struct EventAggregatorFunctions {
     return GST_FLOW_OK;
   }
 
-  static bool take_caps(EventAggregator& self, GstAggregatorPad* pad, GstEvent* event) {
+  static bool handle_caps(EventAggregator& self, GstAggregatorPad* pad, GstEvent* event) {
     GstCaps* caps = nullptr;
     gst_event_parse_caps(event, &caps);
-    if (!self.take_caps(pad, caps)) {
+    if (!self.handle_caps(pad, caps)) {
       GST_ERROR_OBJECT(pad, "cannot %s %" GST_PTR_FORMAT, self.role_.verb, caps);
       return false;
     }
-    GST_DEBUG_OBJECT(pad, "takes %" GST_PTR_FORMAT, caps);
+    GST_DEBUG_OBJECT(pad, "accepted %" GST_PTR_FORMAT, caps);
     if (is_passed(self, pad)) {
       self.main_caps_.reset(gst_caps_ref(caps));
       gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(self.element_));
@@ -231,11 +231,11 @@ struct EventAggregatorFunctions {
     return true;
   }
 
-  static void take_segment(EventAggregator& self, GstAggregatorPad* pad,
-                           const GstSegment& segment) {
+  static void handle_segment(EventAggregator& self, GstAggregatorPad* pad,
+                             const GstSegment& segment) {
     GST_DEBUG_OBJECT(pad, "%" GST_SEGMENT_FORMAT, &segment);
     if (pad != self.main_pad_) return;
-    self.take_segment(segment);
+    self.handle_segment(segment);
     self.set_segment(segment);
   }
 
@@ -248,13 +248,13 @@ struct EventAggregatorFunctions {
   static gboolean sink_event(GstAggregator* element, GstAggregatorPad* pad, GstEvent* event) {
     auto& self = of(element);
     if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
-      const bool taken = guard(self, [&] { return take_caps(self, pad, event); });
+      const bool taken = guard(self, [&] { return handle_caps(self, pad, event); });
       gst_event_unref(event);
       return taken ? TRUE : FALSE;
     }
     if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT) {
       if (!plays_events(element, event, self.role_.verb)) return FALSE;
-      if (!guard(self, [&] { take_segment(self, pad, segment_of(event)); })) {
+      if (!guard(self, [&] { handle_segment(self, pad, segment_of(event)); })) {
         gst_event_unref(event);
         return FALSE;
       }
@@ -264,7 +264,7 @@ struct EventAggregatorFunctions {
       if (self.main_pad_ != nullptr && pad != self.main_pad_) return TRUE;
       return guard(self, [&] { return pass_on(self, std::move(passed)); });
     }
-    if (GST_EVENT_TYPE(event) == GST_EVENT_GAP) take_segment_end(pad, event);
+    if (GST_EVENT_TYPE(event) == GST_EVENT_GAP) store_segment_end(pad, event);
     if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP) forget_segment_end(pad);
     return PARENT_AGGREGATOR_CLASS->sink_event(element, pad, event);
   }
@@ -288,7 +288,8 @@ struct EventAggregatorFunctions {
     });
     if (!all_would) return FALSE;
     GST_DEBUG_OBJECT(element, "forwarding %" GST_PTR_FORMAT, event.get());
-    // GstAggregator would apply it to its segment at once, before that of the main pad is there.
+    // gst_aggregator_do_seek() would apply it to the output's segment at once, before the new
+    // segment of the main pad arrives.
     if (!request.flushes()) return forward(element, event.release());
     self.prepare_seek(request);
     return PARENT_AGGREGATOR_CLASS->src_event(element, event.release());
@@ -302,8 +303,8 @@ struct EventAggregatorFunctions {
     return PARENT_AGGREGATOR_CLASS->src_event(element, event);
   }
 
-  /// Range of the main pad, or of the first one. GstAggregator would always answer that seeking is
-  /// impossible.
+  /// Answers with the range of the main pad, or of the first one. GstAggregator's default is "not
+  /// seekable".
   static gboolean answer_seeking(const EventAggregator& self, GstQuery* query) {
     bool is_first = true;
     bool all_can = true;

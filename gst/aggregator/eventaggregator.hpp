@@ -17,20 +17,20 @@
 /// Implementation of an element that combines event streams and video. Each subclass of
 /// GstEventAggregator owns one, which lives as long as the element.
 ///
-/// One sink pad is the main pad: its segment, its tags and its custom events, such as triggers, are
-/// those of the output, and its upstream determines the seekable range. If pads are requested there
-/// is none; the output has the custom events of all, the subclass sets the segment, upstream of the
-/// first pad determines the range, and a seek must flush, because pads reach it at different times.
-/// A seek is forwarded to all pads, or to none if one of them would refuse it.
+/// One sink pad is the main pad: the output has its segment, tags and custom events, such as
+/// triggers, and its seekable range. An element with request pads has no main pad: the output has
+/// the custom events of all pads, the subclass sets the segment, the first pad determines the
+/// seekable range, and a seek must flush, because the pads reach it at different times. A seek is
+/// forwarded to all pads, or to none if one of them would refuse it.
 ///
-/// Called from the source pad's thread only, or while there is none.
+/// Only for the source pad's thread, or while it does not run.
 class EventAggregator {
  public:
   struct Role {
     const char* verb;  ///< what the element does with events, for messages: "draw"
     /// Name of the main pad; null if pads are requested.
     const char* main_pad = "sink";
-    /// Output buffers are those of the main pad, with its caps.
+    /// Buffers of the main pad pass through, with its caps.
     bool passes_main_pad = true;
   };
 
@@ -49,9 +49,9 @@ class EventAggregator {
   virtual void release_memory() noexcept = 0;
 
   /// Returns false to reject `caps`. May throw.
-  virtual bool take_caps(GstAggregatorPad* pad, GstCaps* caps) = 0;
+  virtual bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) = 0;
   /// Handles a new segment of the main pad, before the pad stores it. May throw.
-  virtual void take_segment(const GstSegment&) {}
+  virtual void handle_segment(const GstSegment&) {}
   /// Like GstAggregatorClass::aggregate. Returns GST_FLOW_EOS once no more output follows because a
   /// pad has_ended(). May throw.
   virtual GstFlowReturn aggregate(bool timed_out) = 0;
@@ -93,16 +93,16 @@ class EventAggregator {
   GstAggregatorPad* main_pad_;
   OwnedCaps main_caps_;
   std::vector<OwnedEvent> waiting_;  ///< to be sent after the segment
-  bool segment_sent_ = false;        ///< that of the output
-  bool segment_ended_ = false;       ///< that of the output; other pads may still be in theirs
+  bool segment_sent_ = false;        ///< of the output
+  bool segment_ended_ = false;       ///< of the output; inputs may not have ended yet
   EventFaults faults_;
 };
 
-/// Segment of a pad. It starts at 0 if none was received, because live sources send theirs with the
-/// first buffer.
+/// Segment of a pad; a segment from 0 if none was received, as live sources send it with the first
+/// buffer.
 GstSegment segment_of(GstAggregatorPad* pad);
 
-/// True if GstAggregator has queued a buffer in place of a GAP event.
+/// True for the buffer that GstAggregator queues for a GAP event.
 inline bool is_gap(GstBuffer* buffer) {
   return GST_BUFFER_FLAG_IS_SET(buffer, GST_BUFFER_FLAG_GAP) && gst_buffer_get_size(buffer) == 0;
 }

@@ -6,10 +6,10 @@
 #include "gst/base/owned.hpp"
 #include "gst/base/played_segment.hpp"
 
-/// Ends of segments on sink pads. GstAggregator would pass SEGMENT_DONE on from each pad, and go on
-/// waiting for a buffer of the pad. Here a GAP event replaces SEGMENT_DONE and carries it;
-/// GstAggregator queues a buffer for that, which stays the next one of the pad until all pads have
-/// ended.
+/// Ends of segments on sink pads. gst_aggregator_default_sink_event() has no case for SEGMENT_DONE:
+/// it forwards the event from each pad, and gst_aggregator_check_pads_ready() then waits for a
+/// buffer of a pad that has ended. A GAP event, for which GstAggregator queues an empty buffer in
+/// order, replaces SEGMENT_DONE and carries it. That buffer stays queued until all pads have ended.
 
 inline GQuark segment_end_quark() {
   static const GQuark quark = g_quark_from_static_string("event-segment-end");
@@ -20,8 +20,8 @@ inline void unref_event(gpointer event) {
   gst_event_unref(GST_EVENT(event));
 }
 
-/// GAP event in place of a SEGMENT_DONE event, of which it takes ownership. Without a segment of
-/// times, the event itself.
+/// Returns a GAP event that owns a SEGMENT_DONE event, or the event itself if the segment is not in
+/// time format.
 inline GstEvent* gap_at_segment_end(GstAggregatorPad* pad, GstEvent* done) {
   const OwnedEvent sticky(gst_pad_get_sticky_event(GST_PAD(pad), GST_EVENT_SEGMENT, 0));
   if (!sticky) return done;
@@ -32,8 +32,8 @@ inline GstEvent* gap_at_segment_end(GstAggregatorPad* pad, GstEvent* done) {
   return gap;
 }
 
-/// Remembers the end of a segment that a GAP event of a pad stands for, if it does.
-inline void take_segment_end(GstAggregatorPad* pad, GstEvent* gap) {
+/// Stores the SEGMENT_DONE event that a GAP event carries, if any, with the pad.
+inline void store_segment_end(GstAggregatorPad* pad, GstEvent* gap) {
   gpointer const done = gst_mini_object_get_qdata(GST_MINI_OBJECT(gap), segment_end_quark());
   if (done != nullptr)
     g_object_set_qdata_full(G_OBJECT(pad), segment_end_quark(), gst_event_ref(GST_EVENT(done)),
@@ -59,8 +59,7 @@ inline bool has_ended(GstAggregatorPad* pad) {
          (gst_aggregator_pad_is_eos(pad) && !gst_aggregator_pad_has_buffer(pad));
 }
 
-/// The next buffer of a pad, which stays queued; null if there is none yet, or no more in its
-/// segment.
+/// The next queued buffer of a pad; null if there is none, or if the segment has ended.
 inline OwnedBuffer next_buffer(GstAggregatorPad* pad) {
   return OwnedBuffer(segment_end_of(pad) ? nullptr : gst_aggregator_pad_peek_buffer(pad));
 }

@@ -7,15 +7,14 @@
 #include <cstdlib>
 #include <optional>
 
-/// Segment that maps the times of a sender, or of a camera, to the running times at which they
-/// arrive.
+/// Segment that maps timestamps of a sender or camera to the running times of their arrival.
 class ArrivalSegment {
  public:
   /// The mapping follows drifts of more than `max_drift`.
   explicit ArrivalSegment(GstClockTimeDiff max_drift) : max_drift_(max_drift) {}
 
-  /// True if the segment holds for `start`, which arrived at this running time; if that is unknown,
-  /// `start` must not be earlier than the previous data.
+  /// True if the segment maps `start` to its arrival, a running time, within max_drift. If the
+  /// arrival is unknown, `start` must not precede the previous data.
   bool continues(GstClockTime start, GstClockTime arrival) const {
     if (!segment_ || start < segment_->start) return false;
     if (!GST_CLOCK_TIME_IS_VALID(arrival))
@@ -24,8 +23,8 @@ class ArrivalSegment {
     return std::abs(GST_CLOCK_DIFF(mapped, arrival)) <= max_drift_;
   }
 
-  /// Pushes a segment from `start`, which arrived at this running time; if that is unknown, it
-  /// begins where the last one ended. Without stream time, that is the running time. Returns the
+  /// Pushes a segment that maps `start` to its arrival, a running time, or to the end of the
+  /// previous segment if that is unknown. The stream time defaults to the running time. Returns the
   /// running time of `start`.
   GstClockTime begin(GstPad* src, guint32 seqnum, GstClockTime start, GstClockTime arrival,
                      GstClockTime stream_time) {
@@ -47,7 +46,7 @@ class ArrivalSegment {
   /// True if there is a segment.
   bool has_begun() const { return segment_.has_value(); }
 
-  /// Sets the end of the received data.
+  /// Extends the end of the received data to `end`.
   void reach(GstClockTime end) { segment_->position = std::max(segment_->position, end); }
 
   /// Ends the segment; the next data start a new one.

@@ -42,8 +42,8 @@ struct Report {
   std::string text;
 };
 
-/// True if an element posts an error again, in the state in which it posted it before. A sticky
-/// event that was refused comes again before each buffer and event that follows.
+/// True if an element posts an error again without a state change in between. A refused sticky
+/// event is sent again before each following buffer and event.
 inline bool repeats_error(GstElement* element, const std::string& text) {
   static const GQuark quark = g_quark_from_static_string("event-last-error");
   GST_OBJECT_LOCK(element);
@@ -55,8 +55,8 @@ inline bool repeats_error(GstElement* element, const std::string& text) {
   return repeats;
 }
 
-/// Like GST_ELEMENT_ERROR and GST_ELEMENT_WARNING, with code and text as values. Posts an error
-/// that repeats once. Bytes of a file that are quoted in them and are not UTF-8 become U+FFFD.
+/// Like GST_ELEMENT_ERROR and GST_ELEMENT_WARNING, with code and text as values. A repeated error
+/// is posted once. Invalid UTF-8, such as quoted bytes of a file, becomes U+FFFD.
 inline void post_message(gpointer element, GstMessageType type, const Report& report,
                          const std::string& cause, CallSite at = CallSite()) {
   if (type == GST_MESSAGE_ERROR && repeats_error(GST_ELEMENT(element), report.text)) return;
@@ -133,7 +133,7 @@ bool is_a(const std::exception& error) {
   return dynamic_cast<const Exception*>(&error) != nullptr;
 }
 
-/// Report for an exception from what an element does with events: "count".
+/// Report for an exception while an element processes events; `verb` is, for example, "count".
 inline Report events_report(const std::string& verb, const std::exception& error) {
   if (is_a<std::bad_alloc>(error))
     return {

@@ -11,7 +11,7 @@
 /// Reason for skipping events of a buffer.
 enum class EventFault { no_pts, pts_too_large, partial_event, beyond_sensor, unsorted };
 
-/// Why a buffer has no interval, or one that is too late for its use.
+/// Reason for a missing interval, or for one past the supported times.
 inline EventFault interval_fault(GstBuffer* buffer) {
   return GST_BUFFER_PTS_IS_VALID(buffer) ? EventFault::pts_too_large : EventFault::no_pts;
 }

@@ -14,7 +14,7 @@ GstBufferPool* event_pool_new();
 /// thread-safe.
 void event_pool_reserve(GstBuffer* buffer, gsize size);
 
-/// Event buffers of a stream, from a pool of its own. Not thread-safe.
+/// Event buffers of one stream, from a private pool. Not thread-safe.
 class EventBuffers {
  public:
   EventBuffers() = default;
@@ -25,7 +25,7 @@ class EventBuffers {
   /// Acquires a buffer of `size` > 0 bytes to write. Throws std::bad_alloc.
   GstFlowReturn acquire(gsize size, OwnedBuffer& buffer);
 
-  /// Frees the pool, once its buffers are back.
+  /// Drops the pool, which is freed once all buffers have returned.
   void reset();
 
  private:

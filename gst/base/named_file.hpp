@@ -12,12 +12,12 @@
 /// reason if it cannot be read or is larger.
 std::string read_bytes(const std::string& location, std::size_t max_size);
 
-/// Writes a file, as a whole or not at all if it is a regular one. A link is followed, and a device
-/// gets the bytes. Throws std::runtime_error with the reason.
+/// Writes a file, a regular one atomically. Follows links, and writes to devices. Throws
+/// std::runtime_error with the reason.
 void write_bytes(const std::string& location, std::string_view bytes);
 
-/// Returns parse(bytes) of the file that a property `location` names. An exception becomes a
-/// std::runtime_error that says that `what` cannot be read from there, and why.
+/// Returns parse(bytes) of the file `location`. Exceptions become a std::runtime_error that names
+/// `what`, the file and the reason.
 template <class Parse>
 auto read_named_file(const std::string& what, const std::string& location, std::size_t max_size,
                      const Parse& parse) {

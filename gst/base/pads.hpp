@@ -7,7 +7,7 @@
 
 #include "gst/base/owned.hpp"
 
-/// For class_init: adds the template of a pad. GstAggregator needs pads of its own type.
+/// For class_init: adds a pad template. GstAggregator requires pads of GST_TYPE_AGGREGATOR_PAD.
 inline void add_pad_template(GstElementClass* klass, const char* name, GstPadDirection direction,
                              const OwnedCaps& caps, GstPadPresence presence = GST_PAD_ALWAYS,
                              GType type = GST_TYPE_PAD) {
@@ -57,12 +57,12 @@ inline bool peer_can_seek(GstPad* pad, GstFormat format) {
   return seekable != FALSE;
 }
 
-/// As GST_EVENT_IS_SERIALIZED(), which mixes two enumerations.
+/// GST_EVENT_IS_SERIALIZED() without its warning about mixed enumerations.
 inline bool is_serialized(GstEvent* event) {
   return (gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED) != 0;
 }
 
-/// Pushes an event; returns why it was refused, if it was.
+/// Pushes an event; if it is refused, returns the last flow return of the pad.
 inline GstFlowReturn push_event(GstPad* src, GstEvent* event) {
   return gst_pad_push_event(src, event) ? GST_FLOW_OK : gst_pad_get_last_flow_return(src);
 }

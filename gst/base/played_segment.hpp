@@ -40,8 +40,8 @@ inline bool refuse_segment(gpointer element, GstEvent* event, const Report& repo
   return false;
 }
 
-/// True if a SEGMENT event has a positive rate. Else posts an error message of `element`, which
-/// says what it cannot do: `verb` events, such as "merge"; and unrefs the event.
+/// True if a SEGMENT event has a positive rate. Otherwise posts an error message of `element` and
+/// unrefs the event. `verb` is what the element does with events, such as "merge".
 inline bool plays_forwards(gpointer element, GstEvent* event, const char* verb) {
   return segment_of(event).rate > 0 ||
          refuse_segment(
@@ -50,7 +50,7 @@ inline bool plays_forwards(gpointer element, GstEvent* event, const char* verb) 
               std::string("Cannot ") + verb + " events backwards; play at a positive rate."});
 }
 
-/// True if a SEGMENT event has times, and a positive rate. Else as plays_forwards().
+/// Like plays_forwards(), and also requires a segment in time format.
 inline bool plays_events(gpointer element, GstEvent* event, const char* verb) {
   const GstFormat format = segment_of(event).format;
   if (format == GST_FORMAT_TIME) return plays_forwards(element, event, verb);

@@ -20,7 +20,7 @@ struct Edge {
   guint64 position;  ///< within the duration, if that is known
 };
 
-/// `unset` is the position that -1 stands for.
+/// `unset` is the position that -1 means.
 Edge edge_of(GstSeekType type, gint64 asked, guint64 kept, guint64 unset, guint64 duration) {
   const bool has_duration = GST_CLOCK_TIME_IS_VALID(duration);
   const auto distance =
@@ -80,14 +80,14 @@ bool count_from_start(OwnedEvent& seek, GstPad* pad) {
   const auto query = GST_PAD_IS_SRC(pad) ? gst_pad_query_duration : gst_pad_peer_query_duration;
   gint64 duration = 0;
   if (query(pad, GST_FORMAT_TIME, &duration) == FALSE) {
-    GST_WARNING_OBJECT(pad, "no duration to count from: refused %" GST_PTR_FORMAT, seek.get());
+    GST_WARNING_OBJECT(pad, "duration unknown: refused %" GST_PTR_FORMAT, seek.get());
     return false;
   }
   seek = request.from_start(duration).event();
   return true;
 }
 
-/// Segment of a sink pad; that of a stream which starts at 0 if none of times was received.
+/// Segment of a sink pad; a segment from 0 if it received none in time format.
 static GstSegment segment_of(GstPad* sink) {
   const OwnedEvent event(gst_pad_get_sticky_event(sink, GST_EVENT_SEGMENT, 0));
   if (event && segment_of(event.get()).format == GST_FORMAT_TIME) return segment_of(event.get());

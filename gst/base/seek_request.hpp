@@ -36,7 +36,7 @@ class SeekRequest {
 
   /// The same seek with positions that count from the start of a stream of this duration.
   SeekRequest from_start(gint64 duration) const;
-  /// The same seek in a stream that starts so much later.
+  /// The same seek in a stream that starts `delay` later.
   SeekRequest in_later_stream(gint64 delay) const;
   OwnedEvent event() const;
 
@@ -54,9 +54,9 @@ class SeekRequest {
   guint32 seqnum_;
 };
 
-/// Makes the positions of a seek event count from the start of the stream, by the duration that a
-/// source pad tells, or upstream of a sink pad. False if these tell none. For elements with several
-/// inputs, which have ends of their own.
+/// Converts positions from the end into positions from the start, using the duration that a source
+/// pad, or the peer of a sink pad, reports; false if unknown. For elements with several inputs,
+/// whose durations differ.
 bool count_from_start(OwnedEvent& seek, GstPad* pad);
 
 /// True if the element upstream of a sink pad would accept a seek. For elements with several

@@ -15,8 +15,10 @@ inline GType enum_type(const char* name, const GEnumValue* values) {
   return type;
 }
 
-/// Registers a type. For classes that several plugins contain: names of types are unique in a
-/// process, so G_DEFINE_TYPE would fail in the second plugin.
+/// Registers a type. For classes that several plugins contain, each with its own type name: names
+/// are unique in a process, and g_type_register_static() refuses a second one
+/// (check_type_name_I() of gtype.c), so G_DEFINE_TYPE would fail in the second plugin. The classes
+/// are not in the library gsteventcamera-1.0, because they are no public API.
 template <class Instance, class Class>
 GType register_type(GType parent, const char* name, void (*class_init)(Class*),
                     void (*init)(Instance*), GTypeFlags flags) {

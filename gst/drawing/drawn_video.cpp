@@ -61,18 +61,6 @@ void keep_metas(GstBuffer* frame, GstBuffer* picture) {
   gst_buffer_foreach_meta(frame, keep, picture);
 }
 
-static constexpr const char* drawn_events_query = "event-camera-drawn-events";
-
-GstQuery* new_drawn_events_query() {
-  return gst_query_new_custom(GST_QUERY_CUSTOM, gst_structure_new_empty(drawn_events_query));
-}
-
-bool is_drawn_events_query(GstQuery* query) {
-  if (GST_QUERY_TYPE(query) != GST_QUERY_CUSTOM) return false;
-  const GstStructure* asked = gst_query_get_structure(query);
-  return asked != nullptr && gst_structure_has_name(asked, drawn_events_query);
-}
-
 bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps) {
   GstVideoInfo drawn;
   if (!gst_video_info_from_caps(&drawn, caps)) return false;

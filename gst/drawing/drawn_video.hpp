@@ -19,10 +19,6 @@ GType palette_type();
 /// of interest.
 void keep_metas(GstBuffer* frame, GstBuffer* picture);
 
-/// A query that elements answer whose video shows drawn events, and so no scene to simulate.
-GstQuery* new_drawn_events_query();
-bool is_drawn_events_query(GstQuery* query);
-
 /// For decide_allocation(): uses downstream's buffer pool if it offers one that takes such buffers,
 /// else a new video pool.
 /// False if `caps` are not video.

@@ -28,16 +28,16 @@ namespace {
 struct Counters {
   guint64 received = 0;
   guint64 dropped = 0;   ///< by the filter
-  guint64 rejected = 0;  ///< that are invalid
+  guint64 rejected = 0;  ///< invalid events
 };
 
-/// What is known of a stream.
+/// State of a stream, from caps to stop.
 struct State {
   SensorSize sensor{};
   SensorSize output{};
   /// Time of the last event.
   Microseconds passed = std::numeric_limits<Microseconds>::min() / 2;
-  Microseconds delay = 0;  ///< of the times that the filter sees
+  Microseconds delay = 0;  ///< added to the times that the filter sees
 };
 
 }  // namespace
@@ -46,7 +46,7 @@ struct GstEventFilterPrivate {
   std::unique_ptr<EventFilter> impl;
   Guarded<Counters> counters;
 
-  // Accessed by the streaming thread only, or while there is none.
+  // Only for the streaming thread, or while it does not run.
   std::optional<State> state;
   EventFaults faults{"filter", GST_CAT_DEFAULT};
 };
@@ -181,7 +181,7 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
       gst_event_new_gap(GST_BUFFER_PTS(empty.get()), GST_BUFFER_DURATION(empty.get())));
 }
 
-/// Copies nothing but the buffer's head: its memory is copied on write.
+/// Copies only the metadata of a shared buffer; its memory is copied on write.
 static GstFlowReturn prepare_output_buffer(GstBaseTransform*, GstBuffer* in, GstBuffer** out) {
   *out = gst_buffer_is_writable(in) ? in : gst_buffer_copy(in);
   return GST_FLOW_OK;
@@ -258,8 +258,8 @@ static void gst_event_filter_class_init(GstEventFilterClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
   install_stats(object_class, stats_of,
-                "Counts of events since the start: events that came in, dropped-events that the "
-                "filter left out, rejected-events that were outside the sensor or out of order");
+                "Counts of events since the start: events (received), dropped-events (by the "
+                "filter), rejected-events (outside the sensor or out of order)");
   add_pad_templates(GST_ELEMENT_CLASS(klass), EVENT_CAPS, EVENT_CAPS);
 
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);

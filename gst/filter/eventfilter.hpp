@@ -16,14 +16,13 @@
 /// Implementation of an element that filters events in place. Each subclass of GstEventFilter owns
 /// one, which lives as long as the element.
 ///
-/// Called from the streaming thread only, or while there is none. Any call may throw.
+/// Only for the streaming thread, or while it does not run. Any call may throw.
 class EventFilter {
  public:
   virtual ~EventFilter() = default;
 
-  /// Begins a stream of a sensor of size `in`, after set_caps. `out` is the size in the caps of the
-  /// output, which the events that are kept have to fit into; it differs from `in` only if the
-  /// subclass overrides transform_caps.
+  /// Starts a stream of a sensor of size `in`. All kept events must fit into `out`, the size in the
+  /// output caps, which differs from `in` only if the subclass overrides transform_caps.
   virtual void start(eventcamera::SensorSize in, eventcamera::SensorSize out) = 0;
   /// Drops all state.
   virtual void stop() = 0;
@@ -34,8 +33,8 @@ class EventFilter {
   virtual void forget() = 0;
 };
 
-/// An element's settings, which are or contain those of an eventcamera::Filter, and the filter,
-/// which is made from the sensor's size or from the sizes of input and output.
+/// Settings of an element, derived from the settings of an eventcamera::Filter, and the filter,
+/// made from the sensor's size or from the sizes of input and output.
 template <eventcamera::Filter Core,
           std::derived_from<typename Core::Settings> SettingsType = typename Core::Settings>
 class EventFilterOf : public EventFilter {
@@ -69,7 +68,7 @@ class EventFilterOf : public EventFilter {
 ///
 /// Events outside the sensor, and those out of order, are dropped before. An interval without
 /// events left is a GAP. Filters forget the past after a flush and where time goes back. They keep
-/// it through gaps, new segments and DISCONT: what they remember has its time, and ages.
+/// it through gaps, new segments and DISCONT: state is timestamped, so it expires by itself.
 #define GST_TYPE_EVENT_FILTER (gst_event_filter_get_type())
 G_DECLARE_DERIVABLE_TYPE(GstEventFilter, gst_event_filter, GST, EVENT_FILTER, GstBaseTransform)
 

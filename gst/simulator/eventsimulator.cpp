@@ -234,14 +234,7 @@ static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
   return PARENT_TRANSFORM_CLASS->src_event(transform, event);
 }
 
-/// True if the events are drawn here.
-static bool draws(GstBaseTransform* transform) {
-  const OwnedCaps caps(gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(transform)));
-  return caps && event_simulator_draws(caps.get());
-}
-
 static gboolean query(GstBaseTransform* transform, GstPadDirection direction, GstQuery* query) {
-  if (direction == GST_PAD_SRC && is_drawn_events_query(query) && draws(transform)) return TRUE;
   const bool is_serialized =
       (gst_query_type_get_flags(GST_QUERY_TYPE(query)) & GST_QUERY_TYPE_SERIALIZED) != 0;
   if (direction == GST_PAD_SINK && is_serialized) simulation_of(transform).finish();

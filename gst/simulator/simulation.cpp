@@ -86,7 +86,6 @@ bool Simulation::set_caps(GstCaps* in, GstCaps* out) {
   if (!made) return false;
   GST_DEBUG_OBJECT(element_, "%s of %" GST_PTR_FORMAT, state_->draws ? "event frames" : "events",
                    in);
-  check_source();
   const GstClockTime before = latency();
   draws_ = state_->draws;
   stream_.interval.expect(static_cast<Nanoseconds>(frame_duration(video)));
@@ -101,19 +100,6 @@ bool Simulation::ensure_state() {
   const OwnedCaps in(gst_pad_get_current_caps(GST_BASE_TRANSFORM_SINK_PAD(element_)));
   const OwnedCaps out(gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(element_)));
   return in && out && set_caps(in.get(), out.get());
-}
-
-/// Warns if the video already shows drawn events, of a recording or of another simulator.
-void Simulation::check_source() {
-  GstQuery* query = new_drawn_events_query();
-  if (gst_pad_peer_query(GST_BASE_TRANSFORM_SINK_PAD(element_), query))
-    stream_.warn_of_drawn_input(
-        element_,
-        {GST_STREAM_ERROR_FORMAT,
-         "The video shows events that were drawn upstream, not a scene. A recording of events "
-         "needs no simulator. To feed one video to two simulators, insert a tee before both."},
-        "an element upstream answered that it draws events");
-  gst_query_unref(query);
 }
 
 /* latency */

@@ -132,7 +132,6 @@ class Simulation {
     WarnOnce warn_of_no_pts{event_simulator_debug};
     WarnOnce warn_of_times{event_simulator_debug};
     WarnOnce warn_of_interlacing{event_simulator_debug};
-    WarnOnce warn_of_drawn_input{event_simulator_debug};
   };
 
   const EventSimulatorMethod& method() const {
@@ -151,7 +150,6 @@ class Simulation {
   std::optional<GstClockTime> time_of_arrival();
   const char* fault_of_time(Nanoseconds time) const;
   void check_interlacing(GstBuffer* frame);
-  void check_source();
   void warn_of_times(const char* what);
   void sync_controlled_properties(GstClockTime time);
   SimulatorSettings begin_interval();

@@ -216,7 +216,7 @@ CameraCalibration parse_calibration(std::string_view yaml) {
   calibration.cy = camera[5];
   if (!(calibration.fx > 0) || !(calibration.fy > 0) || camera[1] != 0 || camera[3] != 0)
     throw std::invalid_argument(
-        "camera_matrix is not that of a camera: focal lengths must be positive, without skew");
+        "camera_matrix is not a valid camera matrix: focal lengths must be positive, without skew");
   calibration.lens = lens_of(entries);
   const auto distortion = matrix(entries, {"distortion_coefficients", "dist_coeffs", "D"});
   const std::size_t max_count = calibration.lens == CameraCalibration::Lens::fisheye ? 4 : 5;

@@ -15,7 +15,7 @@ enum class DenoiseMethod {
   /// Background activity filter (Delbruck 2008): one of 8 neighbours fired within the correlation
   /// time.
   baf,
-  /// Spatio-temporal correlation filter (Guo and Delbruck 2022): so many of them did.
+  /// Spatio-temporal correlation filter (Guo and Delbruck 2022): at least min_neighbours fired.
   stcf,
   /// The time since the last event of equal polarity of each of 24 neighbours, from 1 for none
   /// down to 0 for the correlation time, adds up to the threshold.

@@ -63,7 +63,7 @@ class Neighbours {
 template <int radius, class Value>
 HWY_INLINE void find_support(const StampedBatch<Stamp>& batch, Stamp correlation_time,
                              std::uint32_t needed, const Value& value) {
-  // Few enough that what is loaded early stays in the cache.
+  // Few enough that prefetched lines stay in the cache.
   constexpr std::size_t distance = radius == 1 ? 16 : 4;
   const typename Neighbours<radius>::Lanes lanes;
   const Neighbours<radius> neighbours(batch.cells.stride);

@@ -15,7 +15,7 @@ static std::string_view without_first(std::string_view text, std::string_view ch
 }
 
 /// Takes a number off the front of `line`; max_side if there is none that a sensor can have.
-static int take_number(std::string_view& line) {
+static int parse_number(std::string_view& line) {
   int number = 0;
   const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), number);
   if (error != std::errc() || number < 0 || number >= max_side) return max_side;
@@ -31,9 +31,9 @@ std::vector<PixelPosition> parse_pixel_list(std::string_view text) {
     text.remove_prefix(std::min(line.size() + 1, text.size()));
     line = without_first(line, blanks);
     if (line.empty() || line.front() == '#') continue;
-    const int x = take_number(line);
+    const int x = parse_number(line);
     line = without_first(line, " \t,");
-    const int y = take_number(line);
+    const int y = parse_number(line);
     if (x == max_side || y == max_side || !without_first(line, blanks).empty())
       throw std::invalid_argument("line " + std::to_string(number) +
                                   " is not a column and a row of a pixel");

@@ -8,7 +8,7 @@
 namespace eventcamera {
 namespace {
 
-/// A picture that libpng reads; it frees what it holds.
+/// A picture read by libpng, which owns its memory.
 struct PngImage : png_image {
   PngImage() : png_image{} { version = PNG_IMAGE_VERSION; }
   ~PngImage() { png_image_free(this); }

@@ -50,7 +50,7 @@ class ScaleFilter {
   bool is_same_size_;
   std::vector<std::uint16_t> columns_;  ///< of the output, by column of the input
   std::vector<Row> rows_;
-  std::vector<Moment> last_kept_;      ///< that of the last event kept, by pixel and polarity
+  std::vector<Moment> last_kept_;      ///< time of the last event kept, by pixel and polarity
   std::vector<std::uint16_t> counts_;  ///< events since
   Moment moment_ = 0;                  ///< of the last event
   Microseconds time_ = std::numeric_limits<Microseconds>::min() / 2;

@@ -111,7 +111,7 @@ class StampedPixels {
     });
   }
 
-  /// Number of events of a batch, whose stamps go on from that of the first.
+  /// Number of events of a batch, whose stamps count from the stamp of the first.
   static std::size_t batch_size(std::span<const Event> events, Stamp first) {
     const auto size = std::min(events.size(), max_batch_size);
     const std::uint64_t last = first + std::uint64_t{events[size - 1].t} - events.front().t;

@@ -44,7 +44,7 @@ struct Classification {
   std::uint64_t false_negatives = 0;
   double true_positive_rate = 0;   ///< recall: the fraction of the light that is kept
   double false_positive_rate = 0;  ///< the fraction of the noise that is kept
-  double precision = 0;            ///< the fraction of light in what is kept
+  double precision = 0;            ///< fraction of light among the kept events
 
   /// Rates without any event to measure them are 0.
   static Classification of(const CauseCounts& before, const CauseCounts& after) {

@@ -16,7 +16,7 @@ namespace eventcamera {
 /// Maximum distances in time of matching events, in increasing order.
 inline constexpr std::array<Microseconds, 3> match_distances = {1'000, 5'000, 10'000};
 
-/// How close the events of a stream are to those of another.
+/// Similarity of the events of two streams.
 struct MatchFigures {
   /// Fraction of the events with a match within each of match_distances.
   std::array<double, match_distances.size()> shares{};

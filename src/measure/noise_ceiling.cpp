@@ -8,7 +8,7 @@
 namespace eventcamera {
 namespace {
 
-/// Correlation of two wholes, given that of two halves.
+/// Correlation of two wholes, from the correlation of two halves.
 double spearman_brown(double halves) {
   return 2 * std::max(halves, 0.0) / (1 + std::abs(halves));
 }

@@ -48,11 +48,11 @@ InvalidEvents StreamComparison::add(StreamRole role, std::span<const Event> even
       events, base, end / 1000 - base,
       [&](const AbsoluteEvent& event) { arriving.waiting.push_back(event); }, labels);
   arriving.end = std::max(arriving.end, end);
-  if (this->start()) take_until(this->end() / 1000);
+  if (this->start()) move_until(this->end() / 1000);
   return skipped;
 }
 
-void StreamComparison::take_until(Microseconds end) {
+void StreamComparison::move_until(Microseconds end) {
   const Microseconds begin = *start() / 1000;
   if (!std::exchange(begun_, true)) {
     rates_ = RateCurve(begin);

@@ -64,7 +64,7 @@ class StreamComparison {
   std::optional<Nanoseconds> start() const;
   Nanoseconds end() const;
   /// Processes the waiting events of both streams up to `end`, in order of time.
-  void take_until(Microseconds end);
+  void move_until(Microseconds end);
 
   PerRole<Arriving> arriving_;
   StreamSimilarity similarity_;

@@ -41,7 +41,7 @@ struct RenderSettings {
 /// file may state, it has one for 2x2, 3x3, ... of them.
 class Renderer {
  public:
-  static constexpr int max_pixels = 1 << 23;  ///< of a picture; those of 4K video fit
+  static constexpr int max_pixels = 1 << 23;  ///< of a picture; 4K video fits
 
   /// For a sensor of at most max_side x max_side pixels. Throws std::bad_alloc, as do configure()
   /// and add().

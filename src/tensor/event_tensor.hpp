@@ -20,7 +20,7 @@ namespace eventcamera {
 /// A time surface (Lagorce et al., TPAMI 2017) remembers the last events of earlier windows.
 class EventTensor {
  public:
-  /// Bytes of a tensor and of what it is made from: numbers before conversion, times of events.
+  /// Bytes of a tensor and its intermediate values: numbers before conversion, times of events.
   static std::size_t memory(const TensorShape& shape, const TensorSettings& settings);
 
   /// Throws std::bad_alloc.

@@ -35,7 +35,7 @@ struct WindowSettings {
 /// event. A window of intervals holds the events that came with them.
 class WindowQueue {
  public:
-  /// Bounds the memory: a window has at most so many events.
+  /// Maximum number of events in a window; bounds the memory.
   static constexpr std::size_t max_events = std::size_t{1} << 24;
 
   struct Window {
@@ -66,7 +66,7 @@ class WindowQueue {
   /// Returns the last window, shorter than the others, if it has an event that no other had.
   std::optional<Window> finish();
 
-  /// True if a window has begun that is not complete: it starts before what is added next.
+  /// True if an incomplete window has started.
   bool is_open() const;
 
   /// End of the last interval; nothing before the first.

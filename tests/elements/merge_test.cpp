@@ -36,12 +36,12 @@ AbsoluteEvent on_at(int x, int y, Microseconds t) {
 /// other.
 class MergedOutput {
  public:
-  void take_interval(GstClockTime start, GstClockTime duration) {
+  void add_interval(GstClockTime start, GstClockTime duration) {
     EXPECT_TRUE(!GST_CLOCK_TIME_IS_VALID(end_) || start >= end_);
     end_ = start + duration;
   }
   void take(GstBuffer* buffer) {
-    take_interval(GST_BUFFER_PTS(buffer), GST_BUFFER_DURATION(buffer));
+    add_interval(GST_BUFFER_PTS(buffer), GST_BUFFER_DURATION(buffer));
     for (const auto& event : events_of(buffer))
       EXPECT_LE(event.t * GST_USECOND, GST_BUFFER_DURATION(buffer));
     append_events(buffer, events);
@@ -196,6 +196,33 @@ TEST_F(MergeTest, PutsSensorsSideBySide) {
   push(b(), 10 * ms, {on(0, 0, 2)});
   EXPECT_EQ(next_size(), "8x4");
   EXPECT_EQ(output_.events.back(), on_at(0, 0, 10'002));
+}
+
+/// A launch line sets the position of a pad that it releases until there is a stream to link.
+TEST_F(MergeTest, KeepsThePositionOfAPadOnlyUntilItIsLinked) {
+  const auto requested = [this] {
+    return Owned<GstPad>(gst_element_request_pad_simple(element(), "sink_7"));
+  };
+  const auto xpos_of = [](const Owned<GstPad>& pad) {
+    guint xpos = 0;
+    g_object_get(pad.get(), "xpos", &xpos, nullptr);
+    return xpos;
+  };
+  const auto release = [this](Owned<GstPad> pad) {
+    gst_element_release_request_pad(element(), pad.get());
+  };
+  auto pad = requested();
+  g_object_set(pad.get(), "xpos", 8, nullptr);
+  release(std::move(pad));
+  pad = requested();
+  EXPECT_EQ(xpos_of(pad), 8U);
+  const Owned<GstPad> source(gst_pad_new(nullptr, GST_PAD_SRC));
+  ASSERT_EQ(gst_pad_link(source.get(), pad.get()), GST_PAD_LINK_OK);
+  gst_pad_unlink(source.get(), pad.get());
+  release(std::move(pad));
+  pad = requested();
+  EXPECT_EQ(xpos_of(pad), 0U);
+  release(std::move(pad));
 }
 
 TEST_F(MergeTest, HasTheSizeThatDownstreamSets) {

@@ -271,17 +271,6 @@ launch videotestsrc num-buffers=3 ! video/x-raw,width=2049,height=16 ! videoscal
 refused "Set width and height to those of the sender" udpsrc port=0 ! eventdatagramdepay ! fakesink
 refused "up to 1024x512 pixels" videotestsrc num-buffers=3 ! video/x-raw,width=1280,height=720 ! eventsim-frame ! eventdatagrampay format=jaer ! fakesink
 
-# Warned of.
-warnings() { # ARGUMENT...
-  timeout 60 "$GST_LAUNCH" "$@" 2>&1 | grep "^WARNING" || true
-}
-warnings videotestsrc num-buffers=3 ! eventsim-diff ! queue ! videoconvert ! eventsim-dense ! fakesink | grep -q "insert a tee before both" ||
-  fail "no warning about events of drawn events"
-warnings filesrc location=out.raw ! decodebin ! eventsim-dense ! fakesink | grep -q "A recording of events needs no simulator" ||
-  fail "no warning about events of a drawn recording"
-[ -z "$(warnings videotestsrc num-buffers=3 ! tee name=t  t. ! queue ! eventsim-diff ! videoconvert ! fakesink  t. ! queue ! eventsim-dense ! fakesink)" ] ||
-  fail "a warning of two simulators side by side"
-
 # Other refusals.
 timeout 5 "$GST_LAUNCH" -q filesrc location=ball-frame.xytp ! aedatdemux ! fakesink 2>refusal && fail "a file that is not AEDAT was read"
 grep -q "this is not AEDAT" refusal || fail "the refusal does not name the format"

@@ -5,8 +5,8 @@
  * @short_description: draws events over video
  *
  * Draws the events of the pad `event_sink` over the video of the pad `video_sink`. Each frame shows
- * the events of the interval that it starts, or those of the #GstEventOverlay:accumulation-time
- * before the interval's end. Frames without a duration or framerate show the events since the last
+ * the events of the interval that it starts, or of the #GstEventOverlay:accumulation-time before
+ * the interval's end. Frames without a duration or framerate show the events since the last
  * one. The two streams are synchronized by running time. Events are scaled to the video if the
  * sensor has a different size.
  *
@@ -65,22 +65,22 @@ class EventOverlay final : public EventAggregator {
   void stop() override;
   void flush() noexcept override;
   void release_memory() noexcept override { flush(); }
-  bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
 
   Guarded<Settings> settings;
 
  private:
-  bool take_video_caps(const GstCaps* caps);
-  bool take_event_caps(const GstCaps* caps);
+  bool handle_video_caps(const GstCaps* caps);
+  bool handle_event_caps(const GstCaps* caps);
   std::optional<EventInterval> interval_of_frame(GstBuffer* frame) const;
   std::span<const Event> in_running_time(std::span<const Event> events, double rate);
-  bool take_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end);
-  bool take_buffer(GstBuffer* buffer, GstClockTime end);
-  bool take_events_until(GstClockTime end);
+  bool add_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end);
+  bool handle_buffer(GstBuffer* buffer, GstClockTime end);
+  bool add_events_until(GstClockTime end);
   GstFlowReturn draw(const EventInterval& interval, GstBuffer* buffer);
-  GstFlowReturn take_frame(const std::optional<EventInterval>& interval, bool timed_out);
+  GstFlowReturn handle_frame(const std::optional<EventInterval>& interval, bool timed_out);
 
   GstAggregatorPad* const events_pad_ = pad("event_sink");
 
@@ -135,7 +135,7 @@ std::span<const Event> EventOverlay::in_running_time(std::span<const Event> even
 
 /// Adds the events of a buffer, whose `interval` is in running time, up to running time `end`.
 /// Returns true if these were all. May throw.
-bool EventOverlay::take_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end) {
+bool EventOverlay::add_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end) {
   const MappedEvents mapped(buffer);
   if (!mapped) {
     warn(EventFault::partial_event, buffer);
@@ -158,7 +158,7 @@ bool EventOverlay::take_events(GstBuffer* buffer, const EventInterval& interval,
 
 /// Adds the events of the first queued buffer up to running time `end`. Returns true if more are
 /// needed to reach `end`. May throw.
-bool EventOverlay::take_buffer(GstBuffer* buffer, GstClockTime end) {
+bool EventOverlay::handle_buffer(GstBuffer* buffer, GstClockTime end) {
   const auto interval = interval_of(buffer);
   const auto running = interval ? running_interval(events_pad_, *interval) : std::nullopt;
   if (!interval)
@@ -168,7 +168,7 @@ bool EventOverlay::take_buffer(GstBuffer* buffer, GstClockTime end) {
   if (begun_.get() != buffer) taken_ = 0;
   if (running) {
     if (running->start >= end) return false;
-    if (!take_events(buffer, *running, end)) {
+    if (!add_events(buffer, *running, end)) {
       begun_.reset(gst_buffer_ref(buffer));
       return false;
     }
@@ -181,11 +181,11 @@ bool EventOverlay::take_buffer(GstBuffer* buffer, GstClockTime end) {
 
 /// Adds the events up to running time `end`. Returns true if no more are expected before `end`. May
 /// throw.
-bool EventOverlay::take_events_until(GstClockTime end) {
+bool EventOverlay::add_events_until(GstClockTime end) {
   while (known_ + event_resolution <= end) {
     const auto buffer = next_buffer(events_pad_);
     if (!buffer) return has_ended(events_pad_);
-    if (!take_buffer(buffer.get(), end)) return true;
+    if (!handle_buffer(buffer.get(), end)) return true;
   }
   return true;
 }
@@ -212,8 +212,8 @@ GstFlowReturn EventOverlay::draw(const EventInterval& interval, GstBuffer* buffe
 }
 
 /// Draws on the first queued frame and pushes it. May throw.
-GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& interval,
-                                       bool timed_out) {
+GstFlowReturn EventOverlay::handle_frame(const std::optional<EventInterval>& interval,
+                                         bool timed_out) {
   if (interval) {
     if (sensor_ && !overlay_) {
       const SensorSize frame{GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)};
@@ -221,7 +221,7 @@ GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& inter
                        sensor_->width, sensor_->height, frame.width, frame.height);
       overlay_.emplace(*sensor_, frame);
     }
-    if (!take_events_until(interval->end) && !timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
+    if (!add_events_until(interval->end) && !timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
   OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
   if (interval) shown_ = interval->end;
@@ -243,7 +243,7 @@ GstFlowReturn EventOverlay::aggregate(bool timed_out) {
   if (!frame) return has_ended(main_pad()) ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
   const auto interval = video_ ? interval_of_frame(frame.get()) : std::nullopt;
   frame.reset();  // otherwise it would not be writable in place
-  return video_ ? take_frame(interval, timed_out) : GST_FLOW_NOT_NEGOTIATED;
+  return video_ ? handle_frame(interval, timed_out) : GST_FLOW_NOT_NEGOTIATED;
 }
 
 /// Time at which a live frame is pushed without waiting for events: at once if it has no time, and
@@ -257,7 +257,7 @@ GstClockTime EventOverlay::next_time() {
 
 /* negotiation, states */
 
-bool EventOverlay::take_video_caps(const GstCaps* caps) {
+bool EventOverlay::handle_video_caps(const GstCaps* caps) {
   GstVideoInfo video;
   if (!gst_video_info_from_caps(&video, caps)) return false;
   if (!video_ || GST_VIDEO_INFO_WIDTH(&*video_) != GST_VIDEO_INFO_WIDTH(&video) ||
@@ -276,7 +276,7 @@ bool EventOverlay::take_video_caps(const GstCaps* caps) {
   return true;
 }
 
-bool EventOverlay::take_event_caps(const GstCaps* caps) {
+bool EventOverlay::handle_event_caps(const GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
   const SensorSize sensor{info.width, info.height};
@@ -285,8 +285,8 @@ bool EventOverlay::take_event_caps(const GstCaps* caps) {
   return true;
 }
 
-bool EventOverlay::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
-  return pad == main_pad() ? take_video_caps(caps) : take_event_caps(caps);
+bool EventOverlay::handle_caps(GstAggregatorPad* pad, GstCaps* caps) {
+  return pad == main_pad() ? handle_video_caps(caps) : handle_event_caps(caps);
 }
 
 void EventOverlay::flush() noexcept {

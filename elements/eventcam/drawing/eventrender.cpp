@@ -80,8 +80,8 @@ class EventRender final : public EventAggregator {
   void stop() override;
   void flush() override;
   void release_memory() noexcept override { state_.reset(); }
-  bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
-  void take_segment(const GstSegment& segment) override;
+  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  void handle_segment(const GstSegment& segment) override;
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
 
@@ -95,9 +95,9 @@ class EventRender final : public EventAggregator {
   void drain();
   void start_over();
   bool approach(GstBuffer* buffer, const EventInterval& interval);
-  bool take_events(const MappedEvents& mapped, const EventInterval& interval,
-                   std::optional<GstClockTime> end, GstBuffer* buffer);
-  GstFlowReturn take_buffer(GstBuffer* buffer);
+  bool add_events(const MappedEvents& mapped, const EventInterval& interval,
+                  std::optional<GstClockTime> end, GstBuffer* buffer);
+  GstFlowReturn handle_buffer(GstBuffer* buffer);
   void drop_buffer();
   void begin_now();
   bool skip(const EventInterval& picture);
@@ -120,8 +120,8 @@ class EventRender final : public EventAggregator {
 
 /// Adds the events of a buffer up to `end`, or all if there is none. Returns true if these were
 /// all. May throw.
-bool EventRender::take_events(const MappedEvents& mapped, const EventInterval& interval,
-                              std::optional<GstClockTime> end, GstBuffer* buffer) {
+bool EventRender::add_events(const MappedEvents& mapped, const EventInterval& interval,
+                             std::optional<GstClockTime> end, GstBuffer* buffer) {
   const auto rest = mapped.events().subspan(std::min(*taken_, mapped.events().size()));
   if (*taken_ == 0)
     GST_LOG_OBJECT(main_pad(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, rest.size(),
@@ -164,7 +164,7 @@ bool EventRender::approach(GstBuffer* buffer, const EventInterval& interval) {
 
 /// Adds the events of a buffer that are due, and pushes the picture that this completes, if any.
 /// May throw.
-GstFlowReturn EventRender::take_buffer(GstBuffer* buffer) {
+GstFlowReturn EventRender::handle_buffer(GstBuffer* buffer) {
   const auto interval = interval_of(buffer);
   if (!interval) {
     warn(interval_fault(buffer), buffer);
@@ -182,7 +182,7 @@ GstFlowReturn EventRender::take_buffer(GstBuffer* buffer) {
       drop_buffer();
       return GST_AGGREGATOR_FLOW_NEED_DATA;
     }
-    all = take_events(mapped, *interval, due, buffer);
+    all = add_events(mapped, *interval, due, buffer);
   }
   known_ = std::max(known_, interval->end);
   if (due && (!all || interval->end + event_resolution > *due)) return push_next_picture();
@@ -211,7 +211,7 @@ GstFlowReturn EventRender::aggregate(bool timed_out) {
     return gst_aggregator_pad_has_buffer(pad) ? GST_FLOW_NOT_NEGOTIATED
                                               : GST_AGGREGATOR_FLOW_NEED_DATA;
   }
-  if (const auto buffer = next_buffer(pad)) return take_buffer(buffer.get());
+  if (const auto buffer = next_buffer(pad)) return handle_buffer(buffer.get());
   if (has_ended(pad)) return has_begun_picture() ? push_next_picture() : GST_FLOW_EOS;
   if (!timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
   if (times_) return push_next_picture();
@@ -233,7 +233,7 @@ GstClockTime EventRender::next_time() {
 /// Skips a picture that sinks would drop anyway. False if it must be drawn.
 bool EventRender::skip(const EventInterval& picture) {
   const auto time = running_time(main_pad(), picture.start);
-  if (!qos.is_late(time)) return false;
+  if (!qos.count_skipped(time)) return false;
   discontinuous_ = true;
   GST_DEBUG_OBJECT(element(), "downstream is late: skipped the picture at %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(picture.start));
@@ -352,7 +352,7 @@ bool EventRender::set_video(const GstCaps* caps) {
   return true;
 }
 
-bool EventRender::take_caps(GstAggregatorPad*, GstCaps* caps) {
+bool EventRender::handle_caps(GstAggregatorPad*, GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
   if (state_ && state_->width == info.width && state_->height == info.height) return true;
@@ -366,7 +366,7 @@ bool EventRender::take_caps(GstAggregatorPad*, GstCaps* caps) {
 
 /* segments, states */
 
-void EventRender::take_segment(const GstSegment& segment) {
+void EventRender::handle_segment(const GstSegment& segment) {
   if (continues(segment_of(main_pad()), segment)) return;
   drain();
   start_over();
@@ -403,14 +403,9 @@ DEFINE_EVENT_AGGREGATOR(GstEventRender, gst_event_render, EVENT_RENDER, EventRen
 static gboolean src_event(GstAggregator* element, GstEvent* event) {
   if (GST_EVENT_TYPE(event) != GST_EVENT_QOS)
     return GST_AGGREGATOR_CLASS(gst_event_render_parent_class)->src_event(element, event);
-  aggregator_impl<EventRender>(element).qos.take_event(event);
+  aggregator_impl<EventRender>(element).qos.handle_event(event);
   gst_event_unref(event);
   return TRUE;
-}
-
-static gboolean src_query(GstAggregator* element, GstQuery* query) {
-  if (is_drawn_events_query(query)) return TRUE;
-  return GST_AGGREGATOR_CLASS(gst_event_render_parent_class)->src_query(element, query);
 }
 
 static GstCaps* fixate_src_caps(GstAggregator*, GstCaps* caps) {
@@ -441,7 +436,6 @@ static void gst_event_render_class_init(GstEventRenderClass* klass) {
 
   GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
   aggregator_class->src_event = src_event;
-  aggregator_class->src_query = src_query;
   aggregator_class->fixate_src_caps = fixate_src_caps;
   aggregator_class->decide_allocation = decide_allocation;
   aggregator_class->update_src_caps = [](GstAggregator* element, GstCaps* caps, GstCaps** result) {

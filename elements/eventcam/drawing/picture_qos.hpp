@@ -11,8 +11,8 @@
 /// Quality of service of drawn pictures: predicts which ones sinks would drop, and counts them.
 class PictureQos {
  public:
-  /// Takes a QoS event from downstream, in any thread.
-  void take_event(GstEvent* event) {
+  /// Handles a QoS event from downstream, in any thread.
+  void handle_event(GstEvent* event) {
     GstQOSType type = GST_QOS_TYPE_UNDERFLOW;
     GstClockTimeDiff late = 0;
     GstClockTime time = GST_CLOCK_TIME_NONE;
@@ -24,8 +24,9 @@ class PictureQos {
       earliest_ = late > 0 ? time + factor * static_cast<GstClockTime>(late) : 0;
   }
 
-  /// Counts a picture. Returns true if it is too late; one without a running time never is.
-  bool is_late(std::optional<GstClockTime> running_time) {
+  /// Counts a picture as drawn or skipped. Returns true if it is skipped, because too late; a
+  /// picture without a running time never is.
+  bool count_skipped(std::optional<GstClockTime> running_time) {
     GstClockTime earliest = 0;
     {
       const std::lock_guard lock(mutex_);

@@ -156,7 +156,7 @@ static bool is_silent(GstBuffer* buffer) {
   return gst_buffer_get_size(buffer) == 0;
 }
 
-/// Running time that a buffer is written at: that of its start, but of the end of a gap, until
+/// Running time at which a buffer is written: its start, or the end of a gap, until
 /// which its pad has nothing to wait for.
 static GstClockTime due_time(GstAggregatorPad* pad, GstBuffer* buffer) {
   const auto segment = segment_of(pad);
@@ -296,7 +296,7 @@ static bool is_known(GstAedatMux* self) {
 
 /// Forgets the ends of segments that all inputs have reached, and returns one of them. Null if all
 /// have reached EOS.
-static OwnedEvent take_segment_ends(GstAedatMux* self) {
+static OwnedEvent pop_segment_ends(GstAedatMux* self) {
   OwnedEvent done;
   for (const Pad& pad : sink_pads(self)) {
     auto end = segment_end_of(pad.get());
@@ -308,7 +308,7 @@ static OwnedEvent take_segment_ends(GstAedatMux* self) {
   return done;
 }
 
-/// Writes the header, the earliest buffer, the end of a segment, or that of the file. May throw.
+/// Writes the header, the earliest buffer, or the end of a segment or file. May throw.
 static GstFlowReturn write_some(GstAedatMux* self) {
   auto& file = self->priv->file;
   const bool ended = std::ranges::all_of(sink_pads(self), is_at_end);
@@ -324,7 +324,7 @@ static GstFlowReturn write_some(GstAedatMux* self) {
     if (result != GST_FLOW_OK) return result;
   }
   if (!ended) return write_next(self);
-  if (OwnedEvent done = take_segment_ends(self)) {
+  if (OwnedEvent done = pop_segment_ends(self)) {
     const GstFlowReturn result = push_bytes(self, file.flush());
     gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self), done.release());
     return result;
@@ -425,7 +425,7 @@ static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, Gst
     if (gst_tag_list_get_string(tags, GST_TAG_DEVICE_MODEL, &source)) file.set_source(source);
     g_free(source);
   } else if (GST_EVENT_TYPE(event) == GST_EVENT_GAP) {
-    take_segment_end(pad, event);
+    store_segment_end(pad, event);
   } else if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP) {
     forget_segment_end(pad);
   }
@@ -482,7 +482,7 @@ static gboolean stop(GstAggregator* aggregator) {
   priv->file.reset();
   priv->segment.reset();
   priv->has_header = false;
-  take_segment_ends(GST_AEDAT_MUX(aggregator));
+  pop_segment_ends(GST_AEDAT_MUX(aggregator));
   return TRUE;
 }
 

@@ -9,17 +9,17 @@
  *
  * - `baf`, background activity filter: one of 8 neighbours fired within
  *   #GstEventDenoise:correlation-time, 2 ms by default;
- * - `stcf`, spatio-temporal correlation filter: #GstEventDenoise:min-neighbours of 8 did, within
- *   25 ms by default;
+ * - `stcf`, spatio-temporal correlation filter: at least #GstEventDenoise:min-neighbours of 8
+ *   fired within 25 ms by default;
  * - `time-kernel`: each of 24 neighbours supports the event with 1 - Δt / τ, where Δt is the time
  *   since its last event of equal polarity, and τ the correlation time, 32 ms by default; the sum
  *   is at least #GstEventDenoise:threshold;
  * - `dwf`, double window filter: at least one of the last 36 events that were kept, or of the last
  * 36 that were dropped, is at most #GstEventDenoise:search-distance away.
  *
- * Compared in docs/filters.md. What pixels remember is forgotten after a flush, where time goes
- * back, and if another method or #GstEventDenoise:match-polarity is set; it is kept through gaps,
- * new segments and DISCONT.
+ * Compared in docs/filters.md. The state of the pixels is reset by a flush, by time that goes back,
+ * and if another method or #GstEventDenoise:match-polarity is set; it is kept through gaps, new
+ * segments and DISCONT.
  *
  * ## Example launch line
  * |[

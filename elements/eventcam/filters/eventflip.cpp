@@ -8,7 +8,7 @@
  * caps if columns become rows. It implements #GstVideoDirection, so applications can control it
  * like videoflip. The methods `auto` and `custom` leave events as they are.
  *
- * Events keep their order; those of one microsecond are therefore no longer in raster order.
+ * Events keep their order, so events of one microsecond are no longer in raster order.
  *
  * ## Example launch line
  * |[

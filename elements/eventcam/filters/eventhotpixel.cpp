@@ -106,7 +106,7 @@ class HotPixels final : public EventFilterOf<HotPixelFilter, Settings> {
 
   // Of the file:
   std::vector<PixelPosition> read_;     ///< hot pixels of the sensor
-  std::vector<PixelPosition> outside_;  ///< those of a larger one, which stay in the file
+  std::vector<PixelPosition> outside_;  ///< of a larger sensor; kept in the file
 };
 
 }  // namespace
@@ -123,7 +123,7 @@ static void gst_event_hot_pixel_class_init(GstEventHotPixelClass* klass) {
                                      "", mutable_ready_flags));
   properties.add(&Settings::learn,
                  g_param_spec_boolean("learn", "Learn",
-                                      "Whether to find hot pixels; else they are those of the file",
+                                      "Detect hot pixels; if false, use only those in location",
                                       Settings().learn ? TRUE : FALSE, mutable_playing_flags));
   properties.add(
       &Settings::learning_period,

@@ -10,7 +10,7 @@
  *
  * Streams are merged by their timestamps, which do not change: recordings of two cameras with one
  * clock stay synchronized. The output has the segment of the stream that starts first, and follows
- * its new ones. A stream that goes back in time with a new segment, such as that of the next
+ * its new ones. A stream that goes back in time with a new segment, as in the next
  * recording of a concat, waits until all others have, too, or have ended. Events of one microsecond
  * are in the order of the pads. Labels stay with their events. Where a stream is flagged DISCONT,
  * so is the output. A seek must flush.
@@ -43,7 +43,6 @@
 #include <vector>
 
 #include "elements/eventcam/filters/eventmerge_pad.hpp"
-#include "elements/eventcam/filters/merged_timeline.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
@@ -88,7 +87,7 @@ GstEventMergePadPrivate& stream_of(const OwnedAggregatorPad& pad) {
   return *GST_EVENT_MERGE_PAD(pad.get())->priv;
 }
 
-/// The pads of an element by number, so that the order does not depend on when they are linked.
+/// The pads of an element in order of their numbers.
 std::vector<OwnedAggregatorPad> numbered_pads(gpointer element) {
   auto pads = sink_pads(element);
   std::ranges::sort(pads, {}, [](const OwnedAggregatorPad& pad) {
@@ -107,7 +106,7 @@ class EventMerge final : public EventAggregator {
   void stop() override;
   void flush() noexcept override;
   void release_memory() noexcept override { flush(); }
-  bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
   void prepare_seek(const SeekRequest& request) override;
@@ -116,9 +115,11 @@ class EventMerge final : public EventAggregator {
   GstStructure* stats() const;
 
   Guarded<Settings> settings;
-  /// Positions of released pads, by name, for pads that are requested again: a launch line requests
-  /// a pad, sets its position, and releases it until the stream to link is there.
-  Guarded<std::map<std::string, SensorPosition>> released;
+  /// Positions of pads that were released before they were ever linked, by name, for the next
+  /// request. In a launch line, gst_element_link_pads_full() requests a pad and releases it again
+  /// if the pad to link is not there yet, and gst_parse_new_child() of GStreamer's grammar.y sets a
+  /// property of the first such pad only.
+  Guarded<std::map<std::string, SensorPosition>> unlinked_positions;
 
  private:
   bool wait_for_streams(std::size_t linked);
@@ -128,29 +129,30 @@ class EventMerge final : public EventAggregator {
   void count(const MergedInterval& interval);
   void choose_segment(std::span<const OwnedAggregatorPad> pads);
   GstFlowReturn push_interval(const MergedInterval& interval, EventMerger::Inputs inputs);
-  GstFlowReturn push_silence(GstClockTime start, GstClockTime duration);
+  GstFlowReturn push_empty_interval(GstClockTime start, GstClockTime duration);
 
   Guarded<Counts> counts_;
   Guarded<std::optional<SeekRequest>> sought_;  ///< the latest seek
 
-  // Accessed by the source pad's thread only, or while there is none.
+  // Only for the source pad's thread, or while it does not run.
   EventMerger merger_;
   EventBuffers buffers_;
   GstClockTime latency_ = 0;
   bool segment_chosen_ = false;
-  bool discontinuous_ = true;  // the next buffer is
-  gint64 waiting_since_ = 0;   // for streams, monotonic time in microseconds; 0 = it does not
+  bool discontinuous_ = true;  // flag the next buffer DISCONT
+  gint64 waiting_since_ = 0;   // for missing streams, monotonic time (us); 0 = not waiting
   WarnOnce warn_of_late_{GST_CAT_DEFAULT};
   WarnOnce warn_of_missing_{GST_CAT_DEFAULT};
 };
 
 /* input */
 
-/// Pauses, since GstAggregator does not wait for pads that are not there. True once live streams
-/// have been waited for long enough.
+/// Pauses while streams are missing: gst_aggregator_aggregate_func() waits for data of the pads
+/// that are there, and calls aggregate() again without a pause if all have some. Returns false if
+/// more pauses are needed, true once the latency of live streams has passed.
 bool EventMerge::wait_for_streams(std::size_t linked) {
   constexpr gint64 pause = 10'000;
-  constexpr gint64 patience = G_USEC_PER_SEC;  // streams of a bin that decodes come late
+  constexpr gint64 patience = G_USEC_PER_SEC;  // decodebin adds its pads late
   const GstClockTime latency = gst_aggregator_get_latency(element());
   const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(element()));
   const GstClockTime next = next_time();
@@ -168,7 +170,7 @@ bool EventMerge::wait_for_streams(std::size_t linked) {
   return false;
 }
 
-/// A live stream arrives so much later than the interval that it covers starts.
+/// A live buffer arrives one interval after its PTS; adds that to the latency.
 void EventMerge::raise_latency(GstClockTime needed) {
   needed = std::min(needed, max_latency);
   if (needed <= latency_) return;
@@ -178,7 +180,7 @@ void EventMerge::raise_latency(GstClockTime needed) {
   gst_aggregator_set_latency(element(), latency_, latency_);
 }
 
-/// Loads the events of a queued buffer. Returns false if it is not one of events. May throw.
+/// Loads the events of a queued buffer. Returns false if it cannot be mapped as events. May throw.
 bool EventMerge::load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer,
                              Microseconds length) {
   auto& stream = stream_of(pad);
@@ -197,7 +199,7 @@ bool EventMerge::load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer,
   return true;
 }
 
-/// Loads the next queued interval of a pad, unless that is done. Returns false if there is none.
+/// Loads the next queued interval of a pad if it is not loaded yet. Returns false if there is none.
 /// May throw.
 bool EventMerge::load(const OwnedAggregatorPad& pad) {
   auto& stream = stream_of(pad);
@@ -223,7 +225,7 @@ bool EventMerge::load(const OwnedAggregatorPad& pad) {
 
 /* output */
 
-/// The segment of a stream, up to the end of the one that ends last.
+/// Segment of a pad, up to the latest end of all segments.
 GstSegment longest_segment(const OwnedAggregatorPad& of, std::span<const OwnedAggregatorPad> pads) {
   GstSegment segment = segment_of(of.get());
   for (const auto& pad : pads)
@@ -231,8 +233,8 @@ GstSegment longest_segment(const OwnedAggregatorPad& of, std::span<const OwnedAg
   return segment;
 }
 
-/// Chooses, once, the segment of the stream that starts first, up to the end of the one that ends
-/// last; from and to where a seek wants, which some streams may not reach.
+/// Sets the segment of the output, once: the segment of the stream that starts first, up to the
+/// latest end; start and stop of a seek replace those, as not all streams may reach them.
 void EventMerge::choose_segment(std::span<const OwnedAggregatorPad> pads) {
   if (pads.empty() || std::exchange(segment_chosen_, true)) return;
   const auto& first = *std::ranges::min_element(
@@ -273,12 +275,12 @@ void EventMerge::count(const MergedInterval& interval) {
   if (interval.late > 0)
     warn_of_late_(element(),
                   {GST_STREAM_ERROR_FAILED,
-                   "Left out events that arrived too late. Increase the property latency."},
+                   "Dropped events that arrived too late. Increase the property latency."},
                   std::to_string(interval.late) + " events are earlier than " +
                       std::to_string(interval.start) + " us, up to which events were sent");
 }
 
-GstFlowReturn EventMerge::push_silence(GstClockTime start, GstClockTime duration) {
+GstFlowReturn EventMerge::push_empty_interval(GstClockTime start, GstClockTime duration) {
   if (duration == 0) return GST_FLOW_OK;
   GST_LOG_OBJECT(element(), "no events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
                  GST_TIME_ARGS(start), GST_TIME_ARGS(duration));
@@ -292,7 +294,7 @@ GstFlowReturn EventMerge::push_interval(const MergedInterval& interval,
   if (!gst_pad_has_current_caps(GST_AGGREGATOR_SRC_PAD(element()))) return GST_FLOW_OK;
   const auto start = static_cast<GstClockTime>(interval.start) * GST_USECOND;
   const auto duration = static_cast<GstClockTime>(interval.end - interval.start) * GST_USECOND;
-  if (interval.events == 0) return push_silence(start, duration);
+  if (interval.events == 0) return push_empty_interval(start, duration);
   const gsize size = interval.events * sizeof(eventcamera::Event);
   OwnedBuffer buffer;
   const GstFlowReturn result = buffers_.acquire(size, buffer);
@@ -372,8 +374,7 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
   return result;
 }
 
-/// Live streams are waited for until the latency, which covers an interval, has passed since the
-/// start of the first interval that is known.
+/// The start of the first queued interval, from which the latency counts.
 GstClockTime EventMerge::next_time() {
   GstClockTime next = GST_CLOCK_TIME_NONE;
   for (const auto& pad : numbered_pads(element())) {
@@ -388,7 +389,7 @@ GstClockTime EventMerge::next_time() {
 
 /* negotiation, states */
 
-bool EventMerge::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
+bool EventMerge::handle_caps(GstAggregatorPad* pad, GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
   GST_EVENT_MERGE_PAD(pad)->priv->sensor = {info.width, info.height};
@@ -396,7 +397,7 @@ bool EventMerge::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
   return true;
 }
 
-/// Places the sensors. The output has at least the size that they need.
+/// Places the sensors, and chooses an output size that contains them.
 GstFlowReturn EventMerge::choose_caps(GstCaps* downstream, GstCaps** result) {
   SensorSize needed;
   for (const auto& pad : numbered_pads(element())) {
@@ -527,8 +528,8 @@ static GstPad* request_new_pad(GstElement* element, GstPadTemplate* pad_template
   GstPad* const pad = PARENT_ELEMENT_CLASS->request_new_pad(element, pad_template, name, caps);
   if (pad == nullptr) return nullptr;
   catch_exceptions(element, failure, [&] {
-    const auto position =
-        aggregator_impl<EventMerge>(element).released.lock()->extract(GST_OBJECT_NAME(pad));
+    const auto position = aggregator_impl<EventMerge>(element).unlinked_positions.lock()->extract(
+        GST_OBJECT_NAME(pad));
     if (position) *GST_EVENT_MERGE_PAD(pad)->priv->position.lock() = position.mapped();
   });
   gst_child_proxy_child_added(GST_CHILD_PROXY(element), G_OBJECT(pad), GST_OBJECT_NAME(pad));
@@ -536,15 +537,17 @@ static GstPad* request_new_pad(GstElement* element, GstPadTemplate* pad_template
 }
 
 static void release_pad(GstElement* element, GstPad* pad) {
-  catch_exceptions(element, failure, [&] {
-    (*aggregator_impl<EventMerge>(element).released.lock())[GST_OBJECT_NAME(pad)] =
-        GST_EVENT_MERGE_PAD(pad)->priv->position.copy();
-  });
+  const auto& stream = *GST_EVENT_MERGE_PAD(pad)->priv;
+  if (!stream.was_linked)
+    catch_exceptions(element, failure, [&] {
+      (*aggregator_impl<EventMerge>(element).unlinked_positions.lock())[GST_OBJECT_NAME(pad)] =
+          stream.position.copy();
+    });
   gst_child_proxy_child_removed(GST_CHILD_PROXY(element), G_OBJECT(pad), GST_OBJECT_NAME(pad));
   PARENT_ELEMENT_CLASS->release_pad(element, pad);
 }
 
-/// The segment of a stream is reset by a flush, but is needed to seek again before the next one.
+/// Keeps the segment, which a flush resets, for a second seek before the next segment.
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && segment_of(event).format == GST_FORMAT_TIME) {
     auto& stream = *GST_EVENT_MERGE_PAD(pad)->priv;

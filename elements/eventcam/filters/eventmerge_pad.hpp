@@ -3,12 +3,16 @@
 
 #include <gst/base/gstaggregator.h>
 
+#include <atomic>
+#include <optional>
+
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/seek_request.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/filter/event_merge.hpp"
 
-/// Pixel of the merged sensor where the top left one of a pad's sensor is.
+/// Column and row of the merged sensor where a pad's sensor starts.
 struct SensorPosition {
   guint x = 0;
   guint y = 0;
@@ -24,21 +28,40 @@ struct GstEventMergePadPrivate {
   GstEventMergePadPrivate() { gst_segment_init(&*segment.lock(), GST_FORMAT_TIME); }
 
   Guarded<SensorPosition> position;  ///< properties xpos and ypos
-  Guarded<GstSegment> segment;       ///< the last one received, also while the pad is flushed
+  std::atomic<bool> was_linked = false;
+  Guarded<GstSegment> segment;  ///< the last one received; a flush does not reset it
 
-  // Accessed by the source pad's thread only, or while there is none.
+  // Only for the source pad's thread, or while it does not run.
   guint32 segment_seqnum = GST_SEQNUM_INVALID;
-  bool segment_is_new = false;      ///< it is not the first, and nothing of it is merged yet
-  bool goes_back = false;           ///< its loaded interval does, in a new segment, and waits
-  bool has_output_segment = false;  ///< its segment is that of the output
+  bool segment_is_new = false;      ///< not the first segment, and none of its events are merged
+  bool goes_back = false;           ///< the loaded interval goes back in a new segment, and waits
+  bool has_output_segment = false;  ///< the output has the segment of this pad
   eventcamera::SensorSize sensor;   ///< 0x0 before caps
   SensorPosition placed;            ///< position in the negotiated output
   eventcamera::MergeInput input;
-  OwnedBuffer loaded;          ///< queued buffer whose events `input` has
-  bool discontinuous = false;  ///< its start, or that of a buffer dropped before it
+  OwnedBuffer loaded;          ///< queued buffer that `input` was loaded from
+  bool discontinuous = false;  ///< that buffer, or one dropped before it, is flagged DISCONT
 };
 
 struct _GstEventMergePad {
   GstAggregatorPad parent;
   GstEventMergePadPrivate* priv;
+};
+
+/// Stream time of the output: 0 is the timestamp at which the first input starts.
+class MergedTimeline {
+ public:
+  explicit MergedTimeline(GstElement* element);
+
+  /// Duration up to the end of the last stream; none if no end is known.
+  std::optional<gint64> duration() const;
+  /// Timestamp of a stream time.
+  GstClockTime timestamp_at(gint64 stream_time) const;
+
+  /// Translates the seek that GstAggregator forwards next to the stream time of each input.
+  void translate(const SeekRequest& request) const;
+
+ private:
+  GstElement* element_;
+  GstClockTimeDiff start_ = G_MAXINT64;
 };

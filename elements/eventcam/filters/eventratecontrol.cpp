@@ -4,15 +4,15 @@
  * @title: eventratecontrol
  * @short_description: limits the event rate
  *
- * Drops events where more than #GstEventRateControl:max-rate arrive. Every n-th event is kept, so
- * what is left is spread over the picture and over time. n follows from the events of the last
- * #GstEventRateControl:reference-period, or of this one if there are already more. The first period
- * of a flood keeps up to half more than its share; the next ones pay back, so the average is at
- * most #GstEventRateControl:max-rate. Where events come in bursts, as from simulators that put all
- * events of a frame at one time, the reference period should be at least the time between bursts.
+ * Limits the event rate to #GstEventRateControl:max-rate by keeping every n-th event, so the kept
+ * events are spread over the picture and over time. n follows from the number of events in the last
+ * #GstEventRateControl:reference-period, or in the current one if it already has more. The first
+ * period of a flood keeps up to half more than its share; the next ones compensate, so the average
+ * is at most #GstEventRateControl:max-rate. If events come in bursts, as from simulators that put
+ * all events of a frame at one time, set the reference period to at least the time between bursts.
  *
- * Nothing is delayed. The property `stats` counts what was dropped. The rate is forgotten after a
- * flush and where time goes back, and is kept through gaps, new segments and DISCONT.
+ * Adds no latency. The property `stats` counts the dropped events. A flush resets the rate, as does
+ * time that goes back; gaps, new segments and DISCONT do not.
  *
  * ## Example launch line
  * |[

@@ -4,16 +4,16 @@
  * @title: eventscale
  * @short_description: scales the sensor
  *
- * Scales the sensor to the size in the caps downstream, like videoscale: events move to the pixel
- * of the output that theirs is part of. Those of one polarity that fall on one pixel in one
- * microsecond become one. Without a size downstream, events pass unchanged; with a width or height
- * only, the other follows.
+ * Scales the sensor to the size in the caps downstream, like videoscale: events move to the output
+ * pixel that contains theirs. Events of one polarity on one output pixel in one microsecond become
+ * one. Without a size downstream, events pass unchanged; with only a width or height, the other
+ * follows.
  *
- * A pixel of the output sees the events of several pixels, so the event rate of each rises as the
- * size falls. With #GstEventScale:min-events it fires only once in so many events of a polarity:
- * the number of pixels that become one keeps the rate of pixels as it was.
+ * An output pixel gets the events of several pixels, so its event rate rises as the size falls.
+ * With #GstEventScale:min-events it fires only at every n-th event of a polarity; set that to the
+ * number of input pixels per output pixel to keep the rate per pixel.
  *
- * What is counted is forgotten after a flush and where time goes back.
+ * A flush resets these counts, as does time that goes back.
  *
  * ## Example launch line
  * |[
@@ -50,8 +50,8 @@ static GstCaps* transform_caps(GstBaseTransform*, GstPadDirection, GstCaps* caps
   return limited;
 }
 
-/// Chooses the side `first` nearest to what it was, then `second`, nearest to the same shape.
-/// Returns by how much the shape differs, as a factor.
+/// Fixates the side `first` nearest to the input, then `second` nearest to the same aspect ratio.
+/// Returns the change of the aspect ratio as a factor of at least 1.
 static double choose_size(GstStructure* to, const char* first, int from_first, const char* second,
                           int from_second) {
   int chosen_first = 0;
@@ -66,7 +66,7 @@ static double choose_size(GstStructure* to, const char* first, int from_first, c
   return std::max(stretch, 1 / stretch);
 }
 
-/// Chooses the width or the height nearest to that of the other side, whichever keeps the shape.
+/// Fixates width and height as near to the input as the aspect ratio allows.
 static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection, GstCaps* caps, GstCaps* othercaps) {
   othercaps = gst_caps_make_writable(gst_caps_truncate(othercaps));
   GstStructure* to = gst_caps_get_structure(othercaps, 0);

@@ -15,7 +15,7 @@
  * - `map-correlation` (#gdouble): Pearson correlation of the events per pixel;
  * - `rate-correlation` (#gdouble): Pearson correlation of the events per millisecond;
  * - `interval-distance` (#gdouble): Wasserstein distance between the logarithms of the times
- * between successive events of a pixel, in decades: 0.3 if those of one stream are twice as long;
+ * between successive events of a pixel, in decades: 0.3 if one stream's are twice as long;
  * accurate to 0.02; 0 if either stream has none;
  * - `reference-matches`, `candidate-matches` (#GstStructure): the fractions of the events of each
  *   stream that have a match in the other, of the same polarity, at the same pixel or next to it
@@ -93,7 +93,7 @@ class EventCompare final : public EventAggregator {
   void stop() override;
   void flush() noexcept override { comparison_.reset(); }
   void release_memory() noexcept override { flush(); }
-  bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
 
   Guarded<ReportFiles> settings;
@@ -105,7 +105,7 @@ class EventCompare final : public EventAggregator {
   bool begin();
   bool has_one_size() const;
   void compare(StreamRole role, GstBuffer* buffer);
-  GstFlowReturn take_next();
+  GstFlowReturn aggregate_next();
   void conclude();
 
   const PerRole<GstAggregatorPad*> pads_{pad("reference"), pad("candidate")};
@@ -201,7 +201,7 @@ GstStructure* structure_of(const StreamComparison& comparison) {
   return structure;
 }
 
-/// Posts and writes the statistics; those of empty streams if the comparison has not begun.
+/// Posts and writes the statistics, as of empty streams if there is no comparison yet.
 void EventCompare::conclude() {
   concluded_ = reported_ = true;
   const StreamComparison nothing(1, 1);
@@ -275,7 +275,7 @@ bool EventCompare::begin() {
 }
 
 /// Processes the next buffer of either stream. May throw.
-GstFlowReturn EventCompare::take_next() {
+GstFlowReturn EventCompare::aggregate_next() {
   const bool comparing = begin();
   const auto behind = comparing ? comparison_->behind() : StreamRole::candidate;
   if (behind == StreamRole::reference && !is_over(StreamRole::reference)) {
@@ -310,7 +310,7 @@ GstFlowReturn EventCompare::aggregate(bool) {
     if (!reported_) conclude();
     return GST_FLOW_EOS;
   }
-  return has_one_size() ? take_next() : GST_FLOW_NOT_NEGOTIATED;
+  return has_one_size() ? aggregate_next() : GST_FLOW_NOT_NEGOTIATED;
 }
 
 /* negotiation, states */
@@ -330,7 +330,7 @@ bool EventCompare::has_one_size() const {
   return true;
 }
 
-bool EventCompare::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
+bool EventCompare::handle_caps(GstAggregatorPad* pad, GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
   auto& sensor = sensors_[pad == main_pad() ? StreamRole::candidate : StreamRole::reference];

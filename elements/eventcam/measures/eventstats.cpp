@@ -6,8 +6,8 @@
  *
  * Passes events through and posts element messages `eventstats`: after every
  * #GstEventStats:interval of stream time with the statistics since the last one, and at EOS, at the
- * end of the segment in a segment seek, or on stop with those of the whole stream or segment.
- * Intervals end at buffer boundaries; what lies outside the segment does not count.
+ * end of the segment in a segment seek, or on stop with the statistics of all of it.
+ * Intervals end at buffer boundaries; events outside the segment are not counted.
  *
  * - `cumulative` (#gboolean): %TRUE for the statistics of the whole stream or segment;
  * - `start`, `end` (#gint64): the time covered, in stream time (ns);
@@ -21,11 +21,11 @@
  *   successive events of a pixel, accurate to 3 %;
  * - if events are labelled (#GstEventSimDvs:label): `light-events`, `leak-events`,
  *   `shot-noise-events`, `hot-pixel-events`, `exposure-pulse-events` and `unknown-events`
- *   (#guint64), by cause. After a denoiser, light events are its true positives, and those of other
- *   known causes its false positives.
+ *   (#guint64), by cause. After a denoiser, light events are its true positives, and events of
+ *   other known causes its false positives.
  *
- * Those of the whole, also on Ctrl-C, are written to #GstEventStats:location as JSON, and an image
- * of the events per pixel to #GstEventStats:map.
+ * The cumulative statistics are written to #GstEventStats:location as JSON, also on Ctrl-C, and an
+ * image of the events per pixel to #GstEventStats:map.
  *
  * ## Example launch line
  * |[
@@ -159,7 +159,7 @@ static void post(GstEventStats* self, GstStructure* structure) {
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_element(GST_OBJECT(self), structure));
 }
 
-/// Reports the statistics of the whole stream; those of an empty stream if no caps were received.
+/// Reports the statistics of the whole stream, as of an empty one if no caps were received.
 /// May throw.
 static void conclude(GstEventStats* self, const ReportFiles& files) {
   Measurement nothing(1, 1);
@@ -267,7 +267,7 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
 }
 
 /// May throw.
-static void take_gap(GstEventStats* self, GstEvent* event) {
+static void handle_gap(GstEventStats* self, GstEvent* event) {
   auto& measurement = self->priv->measurement;
   GstClockTime start = 0;
   GstClockTime duration = 0;
@@ -285,7 +285,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   auto& priv = *self->priv;
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_GAP:
-      reported(self, [&] { take_gap(self, event); });
+      reported(self, [&] { handle_gap(self, event); });
       break;
     case GST_EVENT_SEGMENT:
       if (!plays_events(self, event, "measure")) return FALSE;

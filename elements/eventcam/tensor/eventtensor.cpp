@@ -21,13 +21,13 @@
  * - Windows of buffers last from the start of the first to the end of the last; a GAP is a buffer
  *   without events.
  *
- * PTS and duration of a tensor are those of its window. At EOS the events that were in no window
- * make a last, shorter one; its duration ends with the stream.
+ * A tensor has the PTS and duration of its window. At EOS the remaining events make a last,
+ * shorter window, which ends with the stream.
  *
  * - `voxel-grid`: each event adds its polarity, +1 or -1, to the two nearest of
  *   #GstEventTensor:bins instants, in proportion to their closeness. The first instant is the time
- *   of the first event of the window, the last one that of the last event (Zhu et al., CVPR 2019;
- *   E2VID).
+ *   of the first event of the window, the last instant the time of the last event (Zhu et al., CVPR
+ * 2019; E2VID).
  * - `histogram`: the number of OFF (channel 0) and of ON events (channel 1) of each pixel.
  * - `time-surface`: a value that decays with the age of the last OFF (channel 0) and the last ON
  *   event (channel 1) at the end of the window, from 1; 0 where there was none (Lagorce et al.,
@@ -43,7 +43,7 @@
  * | `histogram`                 | v       | 128 + 32 × v | 255 × v       |
  * | `time-surface`              | 255 × v | 128 + 32 × v | 255 × v       |
  *
- * A tensor, with the numbers from which it is made, takes at most 1 GiB. Windows have at most
+ * A tensor and its intermediate values take at most 1 GiB. Windows have at most
  * 16777216 events; further ones are skipped.
  *
  * ## Example launch line
@@ -88,7 +88,7 @@ using eventcamera::WindowQueue;
 
 namespace {
 
-/// Maximum memory of a tensor and of what it is made from.
+/// Maximum memory of a tensor and its intermediate values.
 constexpr gsize max_tensor_bytes = gsize{1} << 30;
 
 /// State from caps to stop.
@@ -254,9 +254,9 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   });
 }
 
-/// Returns true if tensors take the place of the gap, such as that of a window that began before
-/// it. The next buffer gets the result.
-static bool take_gap(GstEventTensor* self, GstEvent* event) {
+/// Returns true if the gap is not forwarded, because tensors cover it. The next buffer returns a
+/// failure to push them.
+static bool handle_gap(GstEventTensor* self, GstEvent* event) {
   auto& priv = *self->priv;
   GstClockTime start = 0;
   GstClockTime duration = 0;
@@ -273,8 +273,8 @@ static bool take_gap(GstEventTensor* self, GstEvent* event) {
 
 /* negotiation */
 
-/// False, after an error message, if downstream takes only other tensors.
-static bool are_wanted(GstEventTensor* self, GstCaps* caps) {
+/// Returns true if downstream accepts the caps; otherwise posts an error message.
+static bool post_unless_accepted(GstEventTensor* self, GstCaps* caps) {
   const OwnedCaps wanted(gst_pad_peer_query_caps(self->priv->src, nullptr));
   if (gst_caps_can_intersect(wanted.get(), caps)) return true;
   gchar* const cause = gst_info_strdup_printf(
@@ -306,7 +306,7 @@ static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
   return true;
 }
 
-static gboolean take_caps(GstEventTensor* self, GstEvent* event) {
+static gboolean handle_caps(GstEventTensor* self, GstEvent* event) {
   auto& priv = *self->priv;
   GstCaps* caps = nullptr;
   gst_event_parse_caps(event, &caps);
@@ -323,7 +323,7 @@ static gboolean take_caps(GstEventTensor* self, GstEvent* event) {
   const OwnedCaps out = priv.state->format.caps();
   GST_DEBUG_OBJECT(self, "events of %dx%d pixels become %" GST_PTR_FORMAT, info.width, info.height,
                    out.get());
-  if (!are_wanted(self, out.get())) return FALSE;
+  if (!post_unless_accepted(self, out.get())) return FALSE;
   const gboolean taken = gst_pad_push_event(priv.src, gst_event_new_caps(out.get()));
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
   return taken;
@@ -334,12 +334,12 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   auto& priv = *self->priv;
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CAPS: {
-      const gboolean taken = take_caps(self, event);
+      const gboolean taken = handle_caps(self, event);
       gst_event_unref(event);
       return taken;
     }
     case GST_EVENT_GAP:
-      if (take_gap(self, event)) {
+      if (handle_gap(self, event)) {
         gst_event_unref(event);
         return priv.gap_result == GST_FLOW_OK ? TRUE : FALSE;
       }
