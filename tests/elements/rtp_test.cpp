@@ -4,19 +4,15 @@
 #include <gst/rtp/gstrtphdrext.h>
 #include <gst/rtp/gstrtpmeta.h>
 #include <gst/sdp/gstsdpmessage.h>
-#define GST_USE_UNSTABLE_API  // of tracers
-#include <gst/gsttracer.h>
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cstdlib>
 #include <optional>
 #include <random>
 
 #include "src/wire/rtp_payload.hpp"
 #include "tests/elements/event_buffer.hpp"
-#include "tests/elements/pipeline.hpp"
 #include "tests/wire/rtp_packets.hpp"
 
 static bool is_memory_short = false;
@@ -175,19 +171,6 @@ TEST_P(EveryFormat, GivesTheEventsOfAnIntervalThatTheEndCutsOff) {
   EXPECT_TRUE(events == expected);
 }
 
-TEST_P(EveryFormat, KeepsTheTimesOfAllEvents) {
-  Harness h("rtpeventpay format=" + std::string(GetParam()) + " ! rtpeventdepay");
-  h.caps(davis_caps);
-  // From the start of an interval, which is not at a whole microsecond, to its end.
-  const Interval interval{5'000'300,
-                          20'000'000,
-                          {Event::at(1, 2, 0, Polarity::on), Event::at(3, 4, 0, Polarity::off),
-                           Event::at(5, 6, 20'000, Polarity::on)}};
-  push(h, interval);
-  end(h);
-  EXPECT_TRUE(absolute(Output(h).intervals) == absolute({interval}));
-}
-
 TEST_P(EveryFormat, SendsPacketsUpToTheMtu) {
   const auto intervals = rtp_packets::random_intervals(davis, 40, 5);
   for (const unsigned mtu : {64U, 576U, 1500U, 9000U}) {
@@ -296,27 +279,6 @@ TEST_P(EveryFormat, CountsLossDuplicationAndReordering) {
   }
 }
 
-TEST_P(EveryFormat, AFloodOfRandomPacketsDisturbsNothing) {
-  const auto intervals = rtp_packets::random_intervals(davis, 30, 3);
-  std::mt19937 random(1);
-  Depayloader h(GetParam());
-  guint64 flood = 0;
-  for (const auto& packet : packets_of(intervals, std::string("format=") + GetParam())) {
-    for (int i = 0; i < 50; ++i, ++flood) {
-      std::vector<guint8> bytes(12 + random() % 600);
-      for (auto& byte : bytes) byte = static_cast<guint8>(random());
-      gst_buffer_extract(packet.get(), 0, bytes.data(), i % 2 == 0 ? 2 : 4);
-      h.push(gst_buffer_new_memdup(bytes.data(), bytes.size()));
-    }
-    h.take(packet.get());
-  }
-  end(h);
-  const Output output(h);
-  EXPECT_EQ(output.intervals, intervals);
-  EXPECT_EQ(stat_of(h.element(), "rejected-packets"), flood);
-  EXPECT_EQ(stat_of(h.element(), "lost-packets"), 0U);
-}
-
 /// Copy of a packet with another sequence number and, after the header of its payload, other bytes.
 GstBuffer* with_garbage(GstBuffer* packet, guint16 sequence_number) {
   GstBuffer* copy = gst_buffer_copy_deep(packet);
@@ -387,36 +349,6 @@ void push_custom_event(Harness& h, const char* name) {
       h.get(), gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty(name)));
 }
 
-/// Number of GstBuffers made by this process, from the first call on.
-int buffers_made() {
-  static std::atomic<int> made = 0;
-  static const bool is_counting = [] {
-    const auto count = +[](GObject*, GstClockTime, GstMiniObject* object) {
-      if (GST_IS_BUFFER(object)) ++made;
-    };
-    const GType counter =
-        g_type_register_static_simple(GST_TYPE_TRACER, "BufferCounter", sizeof(GstTracerClass),
-                                      nullptr, sizeof(GstTracer), nullptr, GTypeFlags{});
-    auto* tracer = static_cast<GstTracer*>(g_object_new(counter, nullptr));
-    gst_tracing_register_hook(tracer, "mini-object-created", G_CALLBACK(count));
-    return true;
-  }();
-  return is_counting ? made.load() : 0;
-}
-
-TEST(RtpEventPay, MakesNoPacketsWhileEventsWait) {
-  Harness h("rtpeventpay max-latency=1000000000");
-  h.caps(davis_caps, "application/x-rtp");
-  std::vector<Interval> intervals;
-  for (int i = 0; i < 20; ++i)
-    intervals.push_back({i * 1'000'000, 1'000'000, {Event::at(i, 2, 500, Polarity::on)}});
-  push(h, intervals.front());
-  const int before = buffers_made();
-  for (std::size_t i = 1; i < intervals.size(); ++i) push(h, intervals[i]);
-  EXPECT_EQ(buffers_made() - before, 19);  // the test's own
-  EXPECT_FALSE(h.pull());
-}
-
 TEST(RtpEventPay, JoinsBuffersWithTriggersAndImuSamplesBetweenThem) {
   Harness h("rtpeventpay max-latency=1000000000");
   h.caps(davis_caps, "application/x-rtp");
@@ -481,18 +413,6 @@ TEST(RtpEventPay, AddsItsLatency) {
   }
   g_object_set(h.element(), "max-latency", 9 * ms, nullptr);
   EXPECT_TRUE(h.message(GST_MESSAGE_LATENCY));
-}
-
-TEST(RtpEventPay, TellsOfSilence) {
-  Harness h("rtpeventpay");
-  h.caps(davis_caps, "application/x-rtp");
-  push(h, {0, 40'000'000, {}});
-  const auto packet = h.pull();
-  ASSERT_TRUE(packet);
-  const Fields fields(packet.get());
-  EXPECT_TRUE(fields.marker);
-  EXPECT_EQ(fields.header->event_count, 0);
-  EXPECT_EQ(fields.header->duration, 40'000'000);
 }
 
 TEST(RtpEventPay, TellsOfSilenceOfUnknownDuration) {
@@ -570,21 +490,6 @@ TEST(RtpEventPay, RefusesWhatItCannotSend) {
   xytp.caps(large, "application/x-rtp");
   push(xytp, {0, 10'000'000, {Event::at(2048, 0, 3, Polarity::on)}});
   EXPECT_TRUE(xytp.pull());
-}
-
-TEST(RtpEventPay, GoesOnWithAnotherSensor) {
-  Harness h("rtpeventpay max-latency=1000000000");
-  h.caps(davis_caps, "application/x-rtp");
-  push(h, {0, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});
-  gst_harness_set_src_caps_str(h.get(),
-                               "application/x-event-camera, format=XYTP, width=640, height=480");
-  EXPECT_TRUE(h.pull());  // what waited
-  push(h, {1'000'000, 1'000'000, {Event::at(639, 2, 3, Polarity::on)}});
-  end(h);
-  const auto packet = h.pull();
-  ASSERT_TRUE(packet);
-  EXPECT_EQ(Fields(packet.get()).header->first_event, 1U);
-  EXPECT_NE(h.out_caps().find("width=(string)640"), std::string::npos);
 }
 
 TEST(RtpEventPay, KeepsTheFormatOfItsStream) {
@@ -792,20 +697,6 @@ TEST(RtpEventDepay, IsDescribedBySdp) {
   g_free(text);
   gst_caps_unref(from_sdp);
   gst_sdp_media_free(media);
-}
-
-TEST(RtpStatistics, StayAfterTheStreamUntilTheNextOne) {
-  Pipeline pipeline(
-      "videotestsrc pattern=ball num-buffers=5 ! eventsim-diff ! rtpeventpay name=pay ! "
-      "rtpeventdepay name=depay ! fakesink sync=false");
-  std::vector<guint64> counts;
-  for (int times = 0; times < 2; ++times) {
-    ASSERT_TRUE(pipeline.play()) << pipeline.error;
-    ASSERT_TRUE(pipeline.reaches(GST_STATE_READY));
-    for (const char* name : {"pay", "depay"}) counts.push_back(pipeline.stat(name, "events"));
-  }
-  EXPECT_GT(counts[0], 0U);
-  EXPECT_EQ(std::ranges::count(counts, counts[0]), 4);
 }
 
 TEST(RtpEventDepay, KeepsTheStatisticsOfItsBaseClass) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The contract of dense flow, which every method keeps, on odd sizes and strides, textures and
-// noise: it equals its reference on every SIMD target, there is none between equal pictures, and it
-// does not depend on the number of threads, on earlier calls, or on what lies around a picture.
+// noise: it is the same on every SIMD target, 0 between equal pictures, and depends neither on the
+// number of threads, nor on earlier calls, nor on memory around a picture. How good it is:
+// dis_test.cpp and known_flow_test.cpp.
 #include "src/flow/dense_flow.hpp"
 
 #include <gtest/gtest.h>
@@ -14,45 +15,23 @@
 
 #include "tests/core/targets.hpp"
 #include "tests/flow/moving_pictures.hpp"
-#include "tests/reference/dis.hpp"
-#include "tests/reference/farneback.hpp"
 
 namespace {
 
 using namespace eventcamera;
 
-/// The border of a picture replicated, to a size that DIS takes.
-Picture padded(const Picture& picture) {
-  const int side = DisFlow::min_side;
-  Picture result(std::max(side, picture.width()), std::max(side, picture.height()));
-  for (int y = 0; y < result.height(); ++y)
-    for (int x = 0; x < result.width(); ++x) result.at(x, y) = reference::pixel_of(picture, x, y);
-  return result;
-}
-
-/// A method and what it must equal.
 struct Method {
   const char* name;
   FlowMethod method;
-  double mean_error;
-  double max_error;
 
   std::unique_ptr<DenseFlow> make() const { return make_dense_flow(method); }
-  Image<Flow> reference(const Picture& from, const Picture& to) const {
-    if (method == FlowMethod::farneback) return reference::farneback(from, to);
-    const auto quality = method == FlowMethod::dis_lq   ? DisFlow::low
-                         : method == FlowMethod::dis_mq ? DisFlow::medium
-                                                        : DisFlow::high;
-    return reference::dis(padded(from), padded(to), quality);
-  }
 };
 
-// A search of DIS may stop a step earlier or later where its error hardly changes.
-constexpr Method methods[] = {{"dis_lq", FlowMethod::dis_lq, 1e-3, 0.05},
-                              {"dis_mq", FlowMethod::dis_mq, 1e-3, 0.05},
-                              {"dis_hq", FlowMethod::dis_hq, 1e-3, 0.05},
-                              {"farneback", FlowMethod::farneback, 1e-4, 1e-4},
-                              {"opencv_dis", FlowMethod::opencv_dis, 0.02, 0.5}};
+constexpr Method methods[] = {{"dis_lq", FlowMethod::dis_lq},
+                              {"dis_mq", FlowMethod::dis_mq},
+                              {"dis_hq", FlowMethod::dis_hq},
+                              {"farneback", FlowMethod::farneback},
+                              {"opencv_dis", FlowMethod::opencv_dis}};
 
 void PrintTo(const Method& method, std::ostream* out) {
   *out << method.name;
@@ -84,38 +63,12 @@ INSTANTIATE_TEST_SUITE_P(
       return std::get<0>(test.param).name + ("_" + testing::PrintToString(std::get<1>(test.param)));
     });
 
-TEST_P(EveryFlow, EqualsItsReferenceOnEveryTarget) {
+TEST_P(EveryFlow, IsTheSameOnEveryTarget) {
   const auto from = pictures.at(0);
   const auto to = pictures.at(1);
   const auto best = flow_of(from, to);
-  const auto error = difference(best, method.reference(from, to));
-  // Where a border is replicated, neighbours have equally good flows, and rounding decides.
-  const bool is_tied = method.method == FlowMethod::dis_mq &&
-                       std::min(pictures.width, pictures.height) < DisFlow::min_side;
-  EXPECT_LT(error.mean, is_tied ? 3e-3 : method.mean_error);
-  EXPECT_LT(error.max, method.max_error);
   targets::for_each(
       [&](const char* target) { EXPECT_TRUE(equal(flow_of(from, to), best)) << "on " << target; });
-}
-
-/// Where it has more scales than dis_lq. Coarse scales would make noise of a fine texture.
-TEST(DisMediumQuality, EqualsItsReferenceInLargePictures) {
-  const auto picture = [](double left, double top) {
-    const auto texture = scene::texture<std::uint8_t>(200, 70, 8, left, top);
-    Picture large(800, 280);
-    for (int y = 0; y < large.height(); ++y)
-      for (int x = 0; x < large.width(); ++x) large.at(x, y) = texture.at(x / 4, y / 4);
-    return large;
-  };
-  const auto from = picture(0, 0);
-  const auto to = picture(-1.5, 0.75);
-  ASSERT_LT(DisFlow::medium.finest_scale(800, 280), DisFlow::low.finest_scale(800, 280));
-  ThreadPool threads;
-  const auto flow =
-      copy(make_dense_flow(FlowMethod::dis_mq)->find(from.view(), to.view(), threads));
-  const auto error = difference(flow, reference::dis(from, to, DisFlow::medium));
-  EXPECT_LT(error.mean, 1e-3);
-  EXPECT_LT(error.max, 0.05);
 }
 
 /// It moves by more than its size, and is smaller than a patch at the coarsest scale. Without
@@ -151,7 +104,7 @@ TEST(DisMediumQuality, FollowsASmallFastObject) {
   }
 }
 
-TEST_P(EveryFlow, IsNothingBetweenEqualPictures) {
+TEST_P(EveryFlow, IsZeroBetweenEqualPictures) {
   const auto flow = flow_of(pictures.at(0), pictures.at(0));
   for (int y = 0; y < flow.height(); ++y)
     for (int x = 0; x < flow.width(); ++x)
@@ -166,7 +119,7 @@ TEST_P(EveryFlow, DoesNotDependOnThreads) {
   }
 }
 
-TEST_P(EveryFlow, DoesNotDependOnWhatCameBefore) {
+TEST_P(EveryFlow, DoesNotDependOnEarlierCalls) {
   const auto flow = method.make();
   const auto small = scene::noise<std::uint8_t>(40, 30, 8, 5);
   flow->find(small.view(), small.view(), threads);
@@ -177,7 +130,7 @@ TEST_P(EveryFlow, DoesNotDependOnWhatCameBefore) {
 }
 
 /// Nothing outside the view is read, neither beside it nor past its end.
-TEST_P(EveryFlow, TakesAPartOfAPictureWhereItLies) {
+TEST_P(EveryFlow, AcceptsAViewOfALargerPicture) {
   const int width = pictures.width;
   const int height = pictures.height;
   const int stride = width + 13;

@@ -9,16 +9,13 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <fstream>
 #include <functional>
 #include <mutex>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "tests/elements/pipeline.hpp"
-#include "tests/wire/is_part.hpp"
 
 namespace {
 
@@ -93,9 +90,6 @@ class Receiver {
   void wait_for(std::size_t count) {
     wait_until([&] { return events().size() >= count; });
   }
-
-  /// Takes no more buffers until the lock is released.
-  std::unique_lock<std::mutex> stop() { return std::unique_lock(mutex_); }
 
  private:
   void take(GstSample* sample) {
@@ -202,18 +196,8 @@ void expect_everything(const std::string& to, const std::string& from) {
   EXPECT_EQ(receiving.stat("depay", "lost-events"), 0U) << from;
 }
 
-TEST(Rtp, PassesAJitterBuffer) {
-  expect_everything("rtpjitterbuffer latency=50");
-}
-
 TEST(Rtp, ArrivesInAByteStream) {
   expect_everything("rtpstreampay ! rtpstreamdepay");
-}
-
-TEST(Rtp, ArrivesOverUdp) {
-  const auto port = std::to_string(next_port());
-  expect_everything("udpsink host=127.0.0.1 port=" + port,
-                    "udpsrc port=" + port + " " + from_caps + " ! rtpjitterbuffer latency=50");
 }
 
 TEST(Rtp, PassesRtpbin) {
@@ -259,31 +243,6 @@ void count_buffers(GstElement* element, const char* name, std::atomic<guint64>& 
   gst_object_unref(pad);
 }
 
-/// Sends all buffers in parts: each when the packets of the one before have been counted.
-template <class Count>
-void send_counted(const Pipeline& sending, const Count& counted) {
-  constexpr int part = 10;
-  for (int i = 0; i < buffers; i += part) {
-    Sender(sending).send(i, i + part);
-    wait_until_sent(sending, i + part);
-    wait_until([&] { return counted() == sending.stat("pay", "packets"); });
-  }
-}
-
-TEST(Rtp, AWrongSrtpKeyYieldsNoEvent) {
-  const auto port = std::to_string(next_port());
-  Pipeline receiving(srtp_receiver(port, std::string(60, 'b')) + " name=decrypt ! " + sink);
-  Receiver receiver(receiving);
-  std::atomic<guint64> arrived = 0;
-  count_buffers(receiving["decrypt"], "rtp_sink", arrived);
-  receiving.set(GST_STATE_PLAYING);
-  Pipeline sending(source + " ! rtpeventpay name=pay ssrc=1234 ! srtpenc key=" + key +
-                   " ! udpsink host=127.0.0.1 port=" + port);
-  sending.set(GST_STATE_PLAYING);
-  send_counted(sending, [&] { return arrived.load(); });
-  EXPECT_TRUE(receiver.events().empty());
-}
-
 TEST(Rtp, ARestartedSrtpSenderIsHeardByItsNewSsrc) {
   const auto port = std::to_string(next_port());
   Pipeline receiving("udpsrc port=" + port + " caps=\"application/x-srtp," + rtp_fields +
@@ -304,18 +263,6 @@ TEST(Rtp, ARestartedSrtpSenderIsHeardByItsNewSsrc) {
     wait_until([&] { return receiver.events().size() == sent; });
     EXPECT_EQ(receiver.events().size(), sent);
   }
-}
-
-TEST(Rtp, EncryptedPacketsAreRejected) {
-  const auto port = std::to_string(next_port());
-  Pipeline receiving("udpsrc port=" + port + " " + from_caps + " ! " + sink);
-  Receiver receiver(receiving);
-  receiving.set(GST_STATE_PLAYING);
-  Pipeline sending(source + " ! rtpeventpay name=pay ! srtpenc key=" + key +
-                   " ! udpsink host=127.0.0.1 port=" + port);
-  sending.set(GST_STATE_PLAYING);
-  send_counted(sending, [&] { return receiving.stat("depay", "rejected-packets"); });
-  EXPECT_TRUE(receiver.events().empty());
 }
 
 /// Answers `signal` of an rtpbin with an element for session 0.
@@ -422,53 +369,6 @@ TEST(Rtp, ArrivesOverRist) {
                         " ! r.recv_rtcp_sink_0  rtpbin name=r latency=50  r.");
 }
 
-struct Network {
-  const char* name;
-  const char* properties;
-  bool loses;
-};
-
-class EveryNetwork : public testing::TestWithParam<Network> {};
-INSTANTIATE_TEST_SUITE_P(
-    , EveryNetwork,
-    testing::Values(Network{"Loss1", "drop-probability=0.01", true},
-                    Network{"Loss5", "drop-probability=0.05", true},
-                    Network{"Loss20", "drop-probability=0.2", true},
-                    Network{"Duplication", "duplicate-probability=0.3", false},
-                    Network{"Reordering", "delay-probability=0.2 min-delay=1 max-delay=30", true},
-                    Network{"Everything",
-                            "drop-probability=0.05 duplicate-probability=0.1 "
-                            "delay-probability=0.1 min-delay=1 max-delay=50",
-                            true}),
-    [](const auto& param) { return param.param.name; });
-
-TEST_P(EveryNetwork, WhatIsLostIsCounted) {
-  Pipeline pipeline(source + " ! rtpeventpay mtu=576 name=pay ! netsim name=net " +
-                    GetParam().properties + " ! " + sink);
-  Receiver receiver(pipeline);
-  pipeline.set(GST_STATE_PLAYING);
-  Sender sender(pipeline);
-  sender.send(0, buffers - 1);
-  wait_until_sent(pipeline, buffers - 1);
-  // The last packets arrive.
-  g_object_set(pipeline["net"], "drop-probability", 0.0, "duplicate-probability", 0.0,
-               "delay-probability", 0.0, nullptr);
-  sender.send(buffers - 1, buffers);
-  sender.end();
-  EXPECT_TRUE(pipeline.wait()) << pipeline.error;
-  const auto sent = sent_events();
-  const auto received = receiver.events();
-  ASSERT_FALSE(received.empty());
-  EXPECT_TRUE(is_part(received, sent));
-  const auto first = std::find(sent.begin(), sent.end(), received.front());
-  EXPECT_EQ(pipeline.stat("pay", "events"), sent.size());
-  EXPECT_EQ(pipeline.stat("depay", "events"), received.size());
-  // A receiver knows of no packets before its first.
-  EXPECT_EQ(pipeline.stat("depay", "lost-events"),
-            static_cast<std::size_t>(sent.end() - first) - received.size());
-  EXPECT_EQ(pipeline.stat("depay", "lost-events") > 0, GetParam().loses);
-}
-
 TEST(Rtp, AReorderedStreamIsWholeAfterAJitterBuffer) {
   std::atomic<guint64> passed = 0;
   Pipeline pipeline(source +
@@ -488,79 +388,6 @@ TEST(Rtp, AReorderedStreamIsWholeAfterAJitterBuffer) {
   receiver.wait_for(sent_events().size());
   EXPECT_EQ(receiver.events(), sent_events());
   EXPECT_EQ(pipeline.stat("depay", "lost-events"), 0U);
-}
-
-TEST(Rtp, AReceiverJoinsLateLeavesAndReturns) {
-  const auto port = std::to_string(next_port());
-  Pipeline sending(source + " ! rtpeventpay name=pay ! udpsink host=127.0.0.1 port=" + port);
-  sending.set(GST_STATE_PLAYING);
-  Sender sender(sending);
-  for (const int first : {0, 40}) {
-    sender.send(first, first + 20);
-    wait_until_sent(sending, first + 20);
-    Pipeline receiving("udpsrc port=" + port + " " + from_caps + " ! " + sink);
-    Receiver receiver(receiving);
-    receiving.set(GST_STATE_PLAYING);
-    sender.send(first + 20, first + 40, receiver);
-    EXPECT_TRUE(is_part(receiver.events(), sent_events()));
-    EXPECT_EQ(receiving.stat("depay", "lost-events"), 0U);
-  }
-}
-
-TEST(Rtp, ASenderRestarts) {
-  const auto port = std::to_string(next_port());
-  Pipeline receiving("udpsrc port=" + port + " " + from_caps + " ! " + sink);
-  Receiver receiver(receiving);
-  receiving.set(GST_STATE_PLAYING);
-  for (int i = 0; i < 2; ++i) {
-    Pipeline sending(source + " ! rtpeventpay ! udpsink host=127.0.0.1 port=" + port);
-    sending.set(GST_STATE_PLAYING);
-    Sender(sending).send(0, buffers, receiver);
-  }
-  auto twice = sent_events();
-  const auto once = twice;
-  twice.insert(twice.end(), once.begin(), once.end());
-  EXPECT_EQ(receiver.events(), twice);
-  EXPECT_EQ(receiving.stat("depay", "lost-events"), 0U);
-}
-
-/// True if no datagram waits in the socket of this process with this port.
-bool is_empty_socket(int port) {
-  std::ostringstream address;
-  address << " 00000000:" << std::hex << std::uppercase << port << ' ';
-  std::ifstream sockets("/proc/net/udp");
-  for (std::string line; std::getline(sockets, line);)
-    if (line.find(address.str()) != std::string::npos)
-      return line.find(" 00000000:00000000 ") != std::string::npos;
-  return false;
-}
-
-TEST(Rtp, ASlowReceiverLosesPacketsAndCountsThem) {
-  const int port = next_port();
-  Pipeline receiving("udpsrc buffer-size=4096 port=" + std::to_string(port) + " " + from_caps +
-                     " ! " + sink);
-  Receiver receiver(receiving);
-  receiving.set(GST_STATE_PLAYING);
-  Pipeline sending(source +
-                   " ! rtpeventpay name=pay ! udpsink host=127.0.0.1 port=" + std::to_string(port));
-  sending.set(GST_STATE_PLAYING);
-  Sender sender(sending);
-  sender.send(0, 1, receiver);
-  {
-    const auto stopped = receiver.stop();
-    sender.send(1, buffers - 1);
-    wait_until_sent(sending, buffers - 1);  // the sender does not wait
-  }
-  wait_until([&] { return is_empty_socket(port); });
-  sender.send(buffers - 1, buffers);
-  wait_until([&] {
-    return receiving.stat("depay", "events") + receiving.stat("depay", "lost-events") ==
-           sent_events().size();
-  });
-  receiver.wait_for(receiving.stat("depay", "events"));
-  EXPECT_TRUE(is_part(receiver.events(), sent_events()));
-  EXPECT_GT(receiving.stat("depay", "lost-events"), 0U);
-  EXPECT_EQ(receiver.events().size(), receiving.stat("depay", "events"));
 }
 
 }  // namespace

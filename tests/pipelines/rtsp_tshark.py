@@ -90,4 +90,4 @@ def rtsp_session():
         print(f"{len(packets)} packets")
 
 
-hosts.run([rtsp_session])
+hosts.run(rtsp_session)

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "gst/base/arrival_segment.hpp"
-#include "src/camera/arrival_clock.hpp"
+#include "src/wire/arrival_clock.hpp"
 
 /// Segments of a camera's stream: they map the camera's clock to running time, as its transfers
 /// arrive.

@@ -52,6 +52,7 @@
 
 #include "elements/eventcam/cameras/camera_buffers.hpp"
 #include "elements/eventcam/cameras/camera_segment.hpp"
+#include "elements/eventcam/cameras/event_camera.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
@@ -64,7 +65,6 @@
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/evt_caps.hpp"
-#include "src/camera/event_camera.hpp"
 #include "src/formats/chunker.hpp"
 #include "src/formats/evt/word_scanner.hpp"
 

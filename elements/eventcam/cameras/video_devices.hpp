@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "src/camera/event_camera.hpp"
+#include "elements/eventcam/cameras/event_camera.hpp"
 
 struct FoundDevice {
   std::string path;

@@ -10,16 +10,16 @@
 
 namespace eventcamera {
 
-/// Maps the clock of a camera to the one by which its transfers arrive. Transfers can be late but
-/// never early, so the least delayed one of the last two seconds gives the offset between the
-/// clocks. The offset stays until it is off by more than max_error, so that events keep their
-/// distances: clocks that drift apart by up to 300 ppm are mapped to within 2 ms of that transfer.
+/// Maps a camera's clock to the clock of the pipeline. Transfers may be late but never early, so
+/// the least delayed transfer of the last two seconds gives the offset between the clocks. The
+/// offset changes only when it is off by more than max_error, so intervals between events stay
+/// exact. Clocks within 300 ppm are mapped to within 2 ms of the least delayed transfer.
 class ArrivalClock {
  public:
   static constexpr Nanoseconds max_error = 1'000'000;
 
-  /// Notes that data up to the time `sent` arrived at `arrival`. After a gap, the camera's clock
-  /// may be another one. True if the offset changed.
+  /// Records that data up to the time `sent` arrived at `arrival`. After a gap, the camera's clock
+  /// may have been reset. Returns true if the offset changed.
   bool arrive(Microseconds sent, Nanoseconds arrival, bool after_gap) {
     const auto offset = arrival - sent * 1000;
     const bool is_early = offset_ && offset < *offset_ - max_error;
@@ -43,10 +43,10 @@ class ArrivalClock {
     return true;
   }
 
-  /// Time of arrival minus that of the camera; nothing before the first arrival.
+  /// Arrival time minus camera time; none before the first arrival.
   std::optional<Nanoseconds> offset() const { return offset_; }
 
-  /// Parts per million that the camera's clock is slow, measured since the clock began.
+  /// Parts per million by which the camera's clock is slow, since its first transfer.
   double drift() const { return drift_; }
 
  private:
@@ -75,9 +75,9 @@ class ArrivalClock {
   }
 
   std::optional<Nanoseconds> offset_;
-  Nanoseconds epoch_ = 0;                ///< its start
+  Nanoseconds epoch_ = 0;                ///< start of this epoch
   Nanoseconds min_offset_ = never;       ///< of this epoch
-  Nanoseconds last_min_offset_ = never;  ///< and of the one before
+  Nanoseconds last_min_offset_ = never;  ///< of the previous epoch
   Epoch first_;
   double drift_ = 0;
 };

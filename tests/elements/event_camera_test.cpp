@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Event cameras among the video devices of Linux, as the documentation of their drivers describes
 // them; no camera.
-#include "src/camera/event_camera.hpp"
+#include "elements/eventcam/cameras/event_camera.hpp"
 
 #include <gtest/gtest.h>
 

@@ -10,25 +10,25 @@
 
 namespace eventcamera {
 
-/// What the drivers of Linux say of a video device.
+/// Properties of a Linux video device, as its drivers report them.
 struct VideoDevice {
   std::string driver;
   std::string card;
   std::string fourcc;            ///< of its buffers
-  SensorSize buffers = {};       ///< their width and height
-  std::string sensor = {};       ///< that of its media device, such as "genx320 10-003c"
-  std::string word_format = {};  ///< control evt_format of the sensor
+  SensorSize buffers = {};       ///< width and height of its buffers
+  std::string sensor = {};       ///< sensor entity of its media device: "genx320 10-003c"
+  std::string word_format = {};  ///< value of the sensor's control evt_format
 };
 
 /// A video device that delivers EVT words.
 struct EventCamera {
   std::string name;                 ///< for users
-  std::optional<EvtFormat> format;  ///< nothing if the drivers do not say
+  std::optional<EvtFormat> format;  ///< none if the drivers do not report it
   SensorSize sensor;                ///< 0x0 if unknown
   bool is_grey = false;             ///< words come in buffers of grey pixels
 };
 
-/// Formats of V4L2, as the drivers of Prophesee for Zynq name them; upstream Linux has none.
+/// Word format of a V4L2 fourcc of Prophesee's drivers for Zynq; Linux itself defines none.
 std::optional<EvtFormat> words_of_fourcc(std::string_view fourcc);
 
 /// Recognises the devices of Prophesee's drivers (github.com/prophesee-ai: zynq-video-drivers,

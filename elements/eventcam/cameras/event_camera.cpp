@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/camera/event_camera.hpp"
+#include "elements/eventcam/cameras/event_camera.hpp"
 
 #include <algorithm>
 #include <iterator>
@@ -20,7 +20,7 @@ constexpr Words fourccs[] = {
     {"PSE3", EvtFormat::evt3},
 };
 
-/// Values of the control evt_format; ME is the order of bytes in which the upper half comes first.
+/// Values of the control evt_format; ME: upper half first.
 constexpr Words controls[] = {
     {"EVT2", EvtFormat::evt2},
     {"EVT21ME", EvtFormat::evt21_legacy},
@@ -41,7 +41,7 @@ struct Sensor {
 
 constexpr Sensor sensors[] = {{"imx636", {1280, 720}}, {"genx320", {320, 320}}};
 
-/// The sensor of an entity, whose name continues with the address on its bus.
+/// Sensor of a media entity, whose name is followed by its bus address.
 const Sensor* sensor_named(std::string_view entity) {
   const auto name = entity.substr(0, entity.find(' '));
   const auto* const found = std::ranges::find(sensors, name, &Sensor::name);
@@ -63,7 +63,7 @@ std::optional<EventCamera> event_camera_of(const VideoDevice& device) {
   if (is_grey ? !is_of_prophesee : !format) return std::nullopt;
   EventCamera camera{.name = "Event camera ", .format = format, .sensor = {}, .is_grey = is_grey};
   camera.name += sensor != nullptr ? sensor->name : device.card;
-  // Grey buffers are packets of words, which have nothing to do with the pixels of the sensor.
+  // The size of grey buffers is the size of a transfer, not of the sensor.
   if (sensor != nullptr)
     camera.sensor = sensor->size;
   else if (!is_grey)

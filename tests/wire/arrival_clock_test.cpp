@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/camera/arrival_clock.hpp"
+#include "src/wire/arrival_clock.hpp"
 
 #include <gtest/gtest.h>
 
