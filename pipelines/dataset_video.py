@@ -172,6 +172,7 @@ def remove_events(output, name):
 
 def write_record(path, record):
     """Writes all of the record or nothing."""
+    os.makedirs(os.path.dirname(path), exist_ok=True)
     with tempfile.NamedTemporaryFile("w", dir=os.path.dirname(path), delete=False, encoding="utf-8") as file:
         json.dump(record, file, indent=1, sort_keys=True)
     os.chmod(file.name, 0o644)
@@ -210,7 +211,8 @@ def simulate(video, path):
         raise Refused("too short: nothing is left of it after the filters")
     if array:
         array.close()
-    return figures.described(len(frames.times)), png_of(picture_of(figures.busiest())), frames.warnings(), sorted(decoders)
+    picture = png_of(picture_of(figures.busiest()))
+    return figures.described(len(frames.times)), picture, frames.warnings(), sorted(decoders)
 
 
 def is_of_machine(failure):

@@ -25,7 +25,7 @@ import sys
 try:
     import gst_eventcamera as ec
     from dataset_report import write_reports
-    from dataset_video import extension_of, hash_of, making_of, path_in, record_of, state_of, write_record
+    from dataset_video import hash_of, making_of, record_of, state_of, write_record
     from gst_eventcamera.recipe import uniform_number
     from plugins import find_plugins
 except ImportError as missing:

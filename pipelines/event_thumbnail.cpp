@@ -29,7 +29,7 @@ namespace {
 using eventcamera::SensorSize;
 using eventcamera::Thumbnail;
 
-/// Time for reading. Then the picture shows what has been read.
+/// Reading time limit. The picture shows the events that were read by then.
 constexpr gint64 time_limit = gint64{10} * G_USEC_PER_SEC;
 
 /// Maximum length of a window in the middle of a recording.
@@ -46,7 +46,7 @@ struct Free {
 template <class Type>
 using Owned = std::unique_ptr<Type, Free>;
 
-/// The message of an error, and its cause: the debug text after the code location.
+/// The message of an error, and its cause, which is the debug text after the code location.
 std::string text_of(GstMessage* message) {
   GError* error = nullptr;
   gchar* debug = nullptr;
@@ -57,7 +57,7 @@ std::string text_of(GstMessage* message) {
   return std::string(error->message) + (cause != nullptr ? std::string("\n  ") + (cause + 1) : "");
 }
 
-/// Events of a recording, from any time on.
+/// Reads the events of a recording, from any time.
 class Recording {
  public:
   /// Opens a file. Throws std::runtime_error, as does next().
@@ -88,14 +88,14 @@ class Recording {
     return static_cast<GstClockTime>(duration);
   }
 
-  /// Continues at `start`, until `stop` if it is valid. Returns false if the file cannot be sought.
+  /// Seeks to `start`, and plays until `stop` if it is valid. Returns false if that fails.
   bool seek(GstClockTime start, GstClockTime stop) {
     return gst_element_seek(pipeline(), 1, GST_FORMAT_TIME, flags, GST_SEEK_TYPE_SET,
                             static_cast<gint64>(start), GST_SEEK_TYPE_SET,
                             static_cast<gint64>(stop)) != FALSE;
   }
 
-  /// The next events. Null at the end, and when the time is up.
+  /// Returns the next events, or null at the end and after the time limit.
   Owned<GstSample> next() {
     auto* sink = GST_APP_SINK(sink_.get());
     while (g_get_monotonic_time() < deadline_) {
@@ -131,7 +131,7 @@ std::optional<Thumbnail> draw_window(Recording& recording, int max_side) {
     GstEventCameraInfo info{};
     if (!sample || !gst_event_camera_info_from_caps(&info, gst_sample_get_caps(sample.get())))
       break;
-    // The size of a sensor that the file does not state may grow.
+    // If the file does not state the size of the sensor, it may grow.
     const SensorSize sensor{info.width, info.height};
     if (!picture || picture->sensor() != sensor) picture.emplace(sensor, max_side);
     if (const MappedEvents events(gst_sample_get_buffer(sample.get())); events)
@@ -145,7 +145,7 @@ void keep(std::optional<Thumbnail>& best, std::optional<Thumbnail> other) {
   if (other && (!best || other->is_better_than(*best))) best = std::move(other);
 }
 
-/// Draws the busiest of three moments, or else, from the start, as many events as are needed.
+/// Draws the busiest of three moments. If none fills the picture, draws from the start.
 /// Throws std::runtime_error.
 Thumbnail draw_recording(const char* path, int max_side) {
   Recording recording(path);
@@ -216,7 +216,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "%s is not a regular file; save it to a file first\n", in);
     return 1;
   }
-  const char* file = in;  // that fails
+  const char* file = in;  // named in errors
   try {
     const std::string png = draw_recording(in, options.size).draw().png();
     file = out;

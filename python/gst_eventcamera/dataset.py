@@ -179,7 +179,7 @@ def _moving_window(picture: np.ndarray, window: Window) -> Iterator[np.ndarray]:
 
 
 def _feed(pipeline: Pipeline, frames: Iterator[np.ndarray], recipe: Recipe) -> None:
-    """Gives the pipeline a frame whenever it asks for one."""
+    """Pushes a frame whenever the pipeline needs one."""
     assert recipe.window and recipe.framerate
     width, height, duration = recipe.window.width, recipe.window.height, Gst.SECOND / recipe.framerate
     numbered = enumerate(frames)

@@ -30,15 +30,15 @@ LABEL = np.dtype([("object_class", "<u2"), ("cause", "u1"), ("reserved", "u1")])
 # Python handles Ctrl-C only between calls, so none waits longer.
 MAX_WAIT = Gst.SECOND // 10
 
-# The process that plays pipelines. One that it forks has GStreamer's state without its threads.
+# ID of the process that plays pipelines. A fork of it has GStreamer's state without its threads.
 _playing_process: Optional[int] = None
 
-# Those that the end of the program stops.
+# Pipelines that the end of the program stops.
 _open: set[Pipeline] = set()
 
 
 class PipelineError(RuntimeError):
-    """A pipeline failed; the text is that of the element: what failed, on what, what to do.
+    """A pipeline failed; the text comes from the element: what failed, on what, what to do.
 
     element: the name of the element, empty if the pipeline could not be made.
     error: the element's error, with its domain and code, if it posted one."""
@@ -50,7 +50,7 @@ class PipelineError(RuntimeError):
 
 
 class PipelineWarning(UserWarning):
-    """An element goes on after a failure, such as a reader that skips corrupt data; the text is that of the
+    """An element continues after a failure, such as a reader that skips corrupt data; the text comes from the
     element."""
 
 
@@ -68,7 +68,7 @@ def utf8_path(path: str | os.PathLike[str]) -> str:
 
 
 def quoted(path: str | os.PathLike[str]) -> str:
-    """The same in a pipeline description."""
+    """A path as a quoted value in a pipeline description. Raises PipelineError if it is not UTF-8."""
     return '"' + utf8_path(path).replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
@@ -77,7 +77,7 @@ def _text_of(message: Gst.Message, error: GLib.Error, cause: Optional[str]) -> s
 
 
 def _warn(text: str) -> None:
-    """Of the line that calls the package, be it through a cached property."""
+    """Warns at the line that calls the package, also through a cached property."""
     level, frame = 1, sys._getframe()
     while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in (__package__, "functools"):
         level, frame = level + 1, frame.f_back
@@ -90,7 +90,7 @@ class Pipeline:
 
     def __init__(self, description: str) -> None:
         try:
-            # Without the flag, what could be made of a wrong description would leak.
+            # Without the flag, a wrong description leaks the elements that could be created.
             self._pipeline = Gst.parse_launch_full(description, None, Gst.ParseFlags.FATAL_ERRORS)
         except GLib.Error as error:
             raise PipelineError(error.message) from None
@@ -105,7 +105,7 @@ class Pipeline:
 
     def __exit__(self, *_: object) -> None:
         _open.discard(self)
-        if _playing_process == os.getpid():  # else there is no thread that could stop
+        if _playing_process == os.getpid():  # a fork has no threads to stop
             self._pipeline.set_state(Gst.State.NULL)
 
     def element(self, name: str) -> Gst.Element:
@@ -116,7 +116,7 @@ class Pipeline:
         self._pipeline.connect("deep-element-added", lambda _, __, element: configure(element))
 
     def gaps_as_buffers(self) -> None:
-        """Intervals without events reach the appsink as empty buffers, too."""
+        """Replaces GAP events at the appsink by empty buffers."""
         pad = self._sink.get_static_pad("sink")
 
         def replace(_: Gst.Pad, info: Gst.PadProbeInfo) -> Gst.PadProbeReturn:
@@ -131,13 +131,13 @@ class Pipeline:
         pad.add_probe(Gst.PadProbeType.EVENT_DOWNSTREAM, replace)
 
     def raise_error(self, wait: int = 0) -> None:
-        """Raises what an element has reported, or reports within `wait` nanoseconds, if anything."""
-        self._take_messages(wait)
+        """Raises the first error that an element has posted, or posts within `wait` nanoseconds."""
+        self._handle_messages(wait)
         if self._error:
             raise self._error
 
-    def _take_messages(self, wait: int = 0) -> None:
-        """Keeps the first error and that the end is reached, warns of warnings, and forgets all other messages."""
+    def _handle_messages(self, wait: int = 0) -> None:
+        """Keeps the first error and EOS, issues warnings, and drops all other messages."""
         kinds = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
         while message := self._bus.timed_pop_filtered(wait, kinds):
             if message.type == Gst.MessageType.WARNING:
@@ -151,7 +151,7 @@ class Pipeline:
                 self._error = PipelineError(_text_of(message, error, cause), message.src.get_name(), error)
 
     def set_state(self, state: Gst.State) -> None:
-        """Returns when it is reached; at once for PLAYING. Raises PipelineError in a process that was forked from
+        """Sets a state, and waits for it unless it is PLAYING. Raises PipelineError in a process that was forked from
         one that has played pipelines."""
         global _playing_process
         if _playing_process not in (None, os.getpid()):
@@ -168,7 +168,7 @@ class Pipeline:
             raise PipelineError("the pipeline does not start")
 
     def seek(self, start: float, end: Optional[float]) -> None:
-        """To `start` seconds of stream time, exactly. The pipeline must be paused."""
+        """Seeks to `start` seconds of stream time, exactly. The pipeline must be paused."""
         stop = Gst.SeekType.NONE if end is None else Gst.SeekType.SET
         if not self._pipeline.seek(1, Gst.Format.TIME, Gst.SeekFlags.FLUSH | Gst.SeekFlags.ACCURATE,
                                    Gst.SeekType.SET, round(start * 1e9), stop, round((end or 0) * 1e9)):
@@ -176,51 +176,51 @@ class Pipeline:
         self.set_state(Gst.State.PAUSED)
 
     def duration(self) -> float:
-        """In seconds; the pipeline must be paused."""
+        """Duration in seconds; the pipeline must be paused."""
         known, duration = self._pipeline.query_duration(Gst.Format.TIME)
         if not known:
-            raise PipelineError("the source does not tell its duration")
+            raise PipelineError("the duration of the source is unknown")
         return duration / 1e9
 
     def caps(self) -> Gst.Caps:
-        """Of the output; the pipeline must be paused."""
+        """Caps of the output; the pipeline must be paused."""
         return self._sink.get_static_pad("sink").get_current_caps()
 
     def samples(self, sink: str = "out") -> Iterator[Gst.Sample]:
-        """Plays to the end; of the appsink of this name."""
+        """Plays to the end, and yields the samples of an appsink."""
         source = self.element(sink)
         self.set_state(Gst.State.PLAYING)
         while not source.is_eos():
             if sample := source.try_pull_sample(MAX_WAIT):
-                self._take_messages()
+                self._handle_messages()
                 yield sample
             else:
                 self.raise_error()
         self.raise_error()
 
     def wait(self) -> None:
-        """Returns when all sinks of a playing pipeline have reached the end."""
+        """Waits until all sinks of a playing pipeline have reached the end."""
         while not self._ended:
             self.raise_error(MAX_WAIT)
 
 
 @atexit.register
 def _stop_all() -> None:
-    """Later, Python ends threads while they hold the lock of the pad whose probe they run."""
+    """Stops pipelines before Python ends threads, which may hold the lock of a pad in a probe."""
     for pipeline in list(_open):
         pipeline.__exit__()
 
 
 def duration_of(pipeline: Pipeline) -> float:
-    """In seconds; 0 if not known."""
+    """Duration in seconds; 0 if unknown."""
     with contextlib.suppress(PipelineError):
         return pipeline.duration()
     return 0.0
 
 
 def property_limits(element: str) -> dict[str, tuple[float, float]]:
-    """The minimum and maximum of each property of an element, which its properties may follow, integers if it
-    takes only these; infinite for those that have none. Raises PipelineError if there is no such element."""
+    """Minimum and maximum of each property of an element, infinite without limits; integers for integer properties.
+    Properties may follow the element's name. Raises PipelineError if the element does not exist."""
     name = element.split()[0]
     made = Gst.ElementFactory.make(name)
     if made is None:
@@ -230,7 +230,7 @@ def property_limits(element: str) -> dict[str, tuple[float, float]]:
 
 
 def expect_limits(elements: str) -> None:
-    """Raises PipelineError if a property is set to a number beyond its limits, which GStreamer ignores."""
+    """Raises PipelineError if a number exceeds the limits of its property, which GStreamer ignores."""
     element = ""
     limits: dict[str, tuple[float, float]] = {}
     for word in elements.split():
@@ -255,8 +255,8 @@ def sensor_size(caps: Gst.Caps) -> tuple[int, int]:
 
 
 def given_size(events: np.ndarray, width: int, height: int) -> tuple[int, int]:
-    """Width and height of the sensor; those of Events where they are 0. Raises ValueError unless they are integers
-    from 1 to 16384."""
+    """Width and height of the sensor, by default of the Events. Raises ValueError unless they are integers from 1 to
+    16384."""
     sides = width or getattr(events, "width", 0), height or getattr(events, "height", 0)
     if not all(isinstance(side, (int, np.integer)) and 1 <= side <= GstEventCamera.MAX_SIDE for side in sides):
         raise ValueError(f"the sensor has {sides[0]}x{sides[1]} pixels; give a width and height from 1 to"

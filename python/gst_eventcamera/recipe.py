@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Recipes of data sets: which videos, which simulator, and parameters that are drawn for each video."""
+"""Recipes of data sets: videos, simulator, and parameters drawn for each video."""
 from __future__ import annotations
 
 import dataclasses
@@ -37,11 +37,11 @@ DISTRIBUTIONS = {"uniform": "[minimum, maximum]", "log-uniform": "[minimum, maxi
 
 
 class RecipeError(ValueError):
-    """A recipe has an error; the text says where, what, and what is allowed."""
+    """An error in a recipe; the text says where, what, and what is allowed."""
 
 
 class _Loader(yaml.SafeLoader):
-    """Refuses keys that are given twice, and numbers that are too large to calculate with."""
+    """Refuses duplicate keys and excessively long numbers."""
 
     def construct_scalar(self, node: yaml.ScalarNode) -> Any:
         if node.tag in NUMBERS and len(node.value) > MAX_NUMBER:
@@ -61,26 +61,26 @@ _Loader.add_implicit_resolver(FLOAT, re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]
 
 
 def uniform_number(*key: str | int) -> float:
-    """A number between 0 and 1, both excluded, that is the hash of the key."""
+    """A number between 0 and 1, both excluded, from the hash of the key."""
     digest = hashlib.sha256("\0".join(map(str, key)).encode()).digest()
     return (int.from_bytes(digest[:8], "big") // 2**11 + 0.5) / 2**53
 
 
 def rounded(value: float) -> float:
-    """To six significant digits, so that the last bits of a machine's logarithm make no difference."""
+    """Rounds to six significant digits, since the last bits of a logarithm depend on the machine."""
     return float(f"{value:.6g}")
 
 
 @dataclasses.dataclass(frozen=True)
 class Distribution:
-    """What a parameter is drawn from, relative to the value of another one if that is named."""
+    """Distribution of a parameter; its draws are factors of the parameter `relative_to`, if given."""
 
     kind: str
     values: tuple[Value, ...]
     relative_to: Optional[str] = None
 
     def at(self, share: float) -> Value:
-        """The value that this share of all draws is below; of a choice, the one there."""
+        """The quantile of this share; for a choice, the value at this share of the list."""
         if self.kind == "choice":
             return self.values[int(share * len(self.values))]
         first, second = (float(value) for value in self.values)
@@ -93,14 +93,14 @@ class Distribution:
 
 @dataclasses.dataclass(frozen=True)
 class Window:
-    """A window that moves over a picture: right, down, left and up again, a pixel each frame."""
+    """A window that moves over a picture: right, down, left and up again, one pixel a frame."""
 
     width: int
     height: int
     distance: int
 
     def corners(self) -> Iterator[tuple[int, int]]:
-        """The left and upper edge of the window in each frame."""
+        """Left and upper edge of the window in each frame."""
         end = self.distance
         yield from ((i, 0) for i in range(end))
         yield from ((end, i) for i in range(end))
@@ -110,7 +110,7 @@ class Window:
 
 @dataclasses.dataclass(frozen=True)
 class Recipe:
-    """A recipe, checked; Recipe.load() reads one. Raises RecipeError."""
+    """A checked recipe; Recipe.load() reads one. Raises RecipeError."""
 
     path: str
     seed: int
@@ -161,7 +161,7 @@ class Recipe:
         return dict(sorted(found.items()))
 
     def drawn(self, name: str) -> dict[str, Value]:
-        """The parameters of a video. The same for the same seed and name, whatever else the recipe has."""
+        """The parameters of a video. They only depend on seed, name and their own distributions."""
         drawn: dict[str, Value] = {}
         limits = property_limits(self.simulator)
         for parameter in _in_order(self.parameters):
@@ -174,7 +174,7 @@ class Recipe:
 
     def _draw(self, name: str, parameter: str, distribution: Distribution, drawn: Mapping[str, Value],
               limits: Mapping[str, tuple[float, float]]) -> Value:
-        """Draws again what is outside the limits of the property, which a normal distribution may be."""
+        """Draws a value, again if it is outside the limits of the property, as of a normal distribution."""
         low, high = limits[parameter]
         for attempt in range(MAX_DRAWS):
             value = distribution.at(uniform_number(self.seed, name, parameter, attempt))
@@ -222,7 +222,7 @@ def _text_of(error: Exception) -> str:
 
 
 def _fixed_folder(pattern: str) -> str:
-    """The folders of a pattern before the first that has a wildcard."""
+    """The folders of a pattern before the first wildcard."""
     folders = os.path.dirname(pattern).split("/")
     fixed = next((i for i, folder in enumerate(folders) if glob.has_magic(folder)), len(folders))
     return "/".join(folders[:fixed]) or ("/" if pattern.startswith("/") else "")
@@ -237,7 +237,7 @@ def _check_name(name: str, path: str) -> None:
 
 
 def _in_order(parameters: Mapping[str, Value | Distribution]) -> list[str]:
-    """Those that others are relative to come first."""
+    """Parameter names; relative parameters come last."""
     return sorted(parameters, key=lambda name: (getattr(parameters[name], "relative_to", None) is not None, name))
 
 
@@ -356,7 +356,7 @@ def _parameters(recipe: Mapping[str, Any], simulator: str) -> dict[str, Value | 
 
 
 def _is_number(limits: tuple[float, float]) -> bool:
-    """Whether a property of these limits is one."""
+    """Whether a property with these limits is a number."""
     return math.isfinite(limits[0])
 
 
@@ -403,7 +403,7 @@ def _split(recipe: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _check_elements(recipe: Recipe) -> None:
-    """All elements and properties exist, and values can be read."""
+    """Raises RecipeError unless all elements and properties exist, and values can be parsed."""
     drawn = recipe.drawn("")
     lines = [recipe.line(drawn)] + [recipe.line({**drawn, name: value}) for name, given in recipe.parameters.items()
                                     if isinstance(given, Distribution) and given.kind == "choice"

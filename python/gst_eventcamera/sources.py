@@ -10,7 +10,7 @@ from .pipeline import EVENT_CAPS, Pipeline, events_of, expect_limits, quoted
 
 SINK = "appsink name=out sync=false max-buffers=4"
 
-# What simulators read without conversion, so that a decoder's luma stays as it is.
+# Formats that simulators read directly, so that a decoder's luma is unchanged.
 LUMA = "video/x-raw,format=(string){GRAY8,I420,YV12,NV12,NV21,Y42B,Y444,GRAY16_LE}"
 
 
@@ -37,6 +37,6 @@ def simulate(video: str | os.PathLike[str], simulator: str = "eventsim-dvs denoi
 def live(pipeline: str) -> Iterator[Events]:
     """Yields the events at the end of a pipeline, such as "v4l2src ! eventsim-diff", an array a buffer.
 
-    Leaving the loop, by break, an exception or Ctrl-C, stops the pipeline. It waits while the loop is busy,
-    except for a live source, which drops what is not taken in time. Raises PipelineError."""
+    Leaving the loop, by break, an exception or Ctrl-C, stops the pipeline. The pipeline waits while the loop is
+    busy, but live sources drop events that are not read in time. Raises PipelineError."""
     return _chunks(pipeline)

@@ -28,7 +28,7 @@ def voxel_grid(events: np.ndarray, bins: int = 5, width: int = 0, height: int = 
     bins: 1 to 256.
     width, height: of the sensor, in pixels, 1 to 16384; may be left out for Events of a known sensor.
 
-    Returns float32 of shape (bins, height, width), the same as eventtensor makes of a window of these
+    Returns float32 of shape (bins, height, width), equal to the tensor of eventtensor for a window of these
     events. Raises ValueError for events that are not sorted or outside the sensor, and for fields that are not whole
     numbers."""
     width, height = given_size(events, width, height)

@@ -236,6 +236,8 @@ class DataSets(unittest.TestCase):
         self.assertIn("1 videos: 1 made", event_dataset(recipe))
         self.assertIn("choose another folder", event_dataset(recipe, "--output", os.path.dirname(video), status=1))
         record, = glob.glob(path_of("odd/recipe/records/*"))
+        event_dataset(recipe, "--video", "one", "--file", video, "--output", path_of("odd/alone"))
+        self.assertEqual(os.listdir(path_of("odd/alone/data")), ["one.npz"])
         for text in ("5", "{}", '{"written": {}}'):
             with open(record, "w", encoding="utf-8") as file:
                 file.write(text)

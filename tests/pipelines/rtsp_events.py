@@ -139,9 +139,9 @@ def pauses():
         client.pause()
         time.sleep(1)
         before = server.memory()
-        time.sleep(8)
+        time.sleep(4)
         growth = server.memory() - before
-        assert growth < 10, f"{growth:.0f} MB more in 8 s"
+        assert growth < 7, f"{growth:.0f} MB more in 4 s"
 
 
 def passwords():
