@@ -283,7 +283,9 @@ void Simulation::interrupt() {
   stream_.discontinuous = true;
 }
 
-void Simulation::skip_frame() {
+void Simulation::skip_frame(GstClockTime pts) {
+  GST_DEBUG_OBJECT(element_, "downstream is late: skipped the frame at %" GST_TIME_FORMAT,
+                   GST_TIME_ARGS(pts));
   stream_.motion.reset();  // it ends at the frame that was skipped
   ++stats.lock()->skipped_frames;
 }

@@ -3,6 +3,7 @@
 #include <set>
 #include <tuple>
 
+#include "gst/base/buffer_map.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -130,6 +131,21 @@ TEST(EventBuffers, AreTheReadersOwnForAsLongAsItWants) {
     kept = rows.change(2);
   }
   EXPECT_EQ(events_of(kept.get()).size(), 2000U);
+}
+
+/// A buffer that stays mapped must not return to its pool.
+TEST(EventBuffers, AreUnmappedWhereWritingFails) {
+  gst_init(nullptr, nullptr);
+  const Buffer buffer(gst_buffer_new_allocate(nullptr, 8, nullptr));
+  const auto* memory = GST_MINI_OBJECT_CAST(gst_buffer_peek_memory(buffer.get(), 0));
+  const int unmapped = memory->lockstate;
+  try {
+    const WriteMap map(buffer.get());
+    EXPECT_NE(memory->lockstate, unmapped);
+    throw std::bad_alloc();
+  } catch (const std::bad_alloc&) {
+    EXPECT_EQ(memory->lockstate, unmapped);
+  }
 }
 
 }  // namespace
