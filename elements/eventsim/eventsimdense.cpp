@@ -9,7 +9,7 @@
  * the contrast thresholds fire, at the time of the later frame (Ziegler et al., Real-time event
  * simulation with frame-based cameras, ICRA 2023, section III-A).
  *
- * For scenes in which everything moves, such as those of a moving camera.
+ * For scenes in which everything moves, as in front of a moving camera.
  *
  * Where a frame has a #GstEventCameraFlowMeta, its optical flow up to the next frame is used
  * instead of estimating it, unless frames were skipped in between.

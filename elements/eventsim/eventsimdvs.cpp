@@ -7,7 +7,7 @@
  * Turns video into the events that an event camera would have reported, by simulating its pixels:
  * response to light, photoreceptor bandwidth, a reference level stored across frames, threshold
  * mismatch, leak, shot noise, hot and dead pixels, refractory period, latency, and the limits of
- * the readout. The time of an event is that of the pixel's threshold crossing, to the microsecond.
+ * the readout. An event has the time of its pixel's threshold crossing, to the microsecond.
  *
  * A preset sets all of these. A profile overrides some: a small file that event-calibrate fits to a
  * camera. Properties that are set explicitly, before or after, override both. Times are
@@ -247,7 +247,7 @@ struct Overrides {
   DvsSettings settings;
   std::bitset<std::size(pixel_properties)> is_set;
 
-  void take(std::size_t i, const GValue* value) {
+  void set(std::size_t i, const GValue* value) {
     std::visit([&](auto member) { read_value(value, settings.*member); },
                pixel_properties[i].member);
     is_set[i] = true;
@@ -260,21 +260,21 @@ struct Overrides {
   }
 };
 
-/// An error in a camera profile: what is wrong with a setting.
+/// A setting in a camera profile that is not valid.
 std::runtime_error error_in(const std::string& profile, const std::string& setting,
                             const std::string& fault) {
   return std::runtime_error("The camera profile \"" + profile + "\" sets " + setting + fault);
 }
 
 /// Takes a setting from text. Returns false if it has no such value.
-bool take_text(Overrides& overrides, const PixelProperty& property, const std::string& text,
-               GObjectClass* klass) {
+bool set_from_text(Overrides& overrides, const PixelProperty& property, const std::string& text,
+                   GObjectClass* klass) {
   GParamSpec* spec = g_object_class_find_property(klass, property.name);
   GValue value = G_VALUE_INIT;
   g_value_init(&value, spec->value_type);
   const bool is_valid = !text.empty() && gst_value_deserialize(&value, text.c_str()) != FALSE &&
                         g_param_value_validate(spec, &value) == FALSE;
-  if (is_valid) overrides.take(static_cast<std::size_t>(&property - pixel_properties), &value);
+  if (is_valid) overrides.set(static_cast<std::size_t>(&property - pixel_properties), &value);
   g_value_unset(&value);
   return is_valid;
 }
@@ -286,7 +286,7 @@ Overrides read_profile(const std::string& path, GObjectClass* klass) {
     const auto* property = std::ranges::find(pixel_properties, name, &PixelProperty::name);
     if (property == std::end(pixel_properties))
       throw error_in(path, name, ", which eventsim-dvs does not have.");
-    if (!take_text(overrides, *property, text, klass))
+    if (!set_from_text(overrides, *property, text, klass))
       throw error_in(path, name,
                      " to a value that it cannot have; see gst-inspect-1.0 eventsim-dvs.");
   }
@@ -308,7 +308,7 @@ struct Settings {
     return settings;
   }
 
-  void take_profile(const GValue* value, GObjectClass* klass) {
+  void set_profile(const GValue* value, GObjectClass* klass) {
     read_value(value, profile);
     of_profile = {};
     profile_error = {};
@@ -356,7 +356,7 @@ static void install_properties(GObjectClass* klass) {
                         "explicitly, before or after",
                         preset_type(), static_cast<int>(defaults.preset), mutable_playing_flags));
   properties.add(
-      [klass](Settings& settings, const GValue* value) { settings.take_profile(value, klass); },
+      [klass](Settings& settings, const GValue* value) { settings.set_profile(value, klass); },
       [](Settings& settings, GValue* value) { write_value(settings.profile, value); },
       g_param_spec_string(
           "profile", "Camera profile",
@@ -367,7 +367,7 @@ static void install_properties(GObjectClass* klass) {
   for (std::size_t i = 0; i < std::size(pixel_properties); ++i) {
     const auto add = [&](auto member) {
       properties.add(
-          [i](Settings& settings, const GValue* value) { settings.of_properties.take(i, value); },
+          [i](Settings& settings, const GValue* value) { settings.of_properties.set(i, value); },
           [member](Settings& settings, GValue* value) {
             write_value(settings.dvs_settings().*member, value);
           },

@@ -77,7 +77,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventsim_sparse, "eventsim-sparse", GST_RANK_NONE,
  * frame-based cameras, ICRA 2023, section III-C).
  *
  * For objects with steady motion and appearance in front of a static background. The second frame
- * of a stream has no earlier difference frame: its events are those of eventsim-frame.
+ * of a stream has no earlier difference frame, so it gives the same events as eventsim-frame.
  *
  * ## Example launch line
  * |[

@@ -3,8 +3,8 @@
 
 #include <gst/gl/gl.h>
 
-/// Returns a new reference to a display with an OpenGL context: that of the screen or, without a
-/// screen, that of a GPU or a software renderer. nullptr if there is none.
+/// Returns a new reference to a display with an OpenGL context: the screen or, without a screen, a
+/// GPU or a software renderer. nullptr if there is none.
 GstGLDisplay* gl_display();
 
 /// Returns a new reference to the context of a display, creating it if needed; nullptr on failure.

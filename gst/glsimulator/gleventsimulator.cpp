@@ -31,7 +31,7 @@ std::unique_ptr<VideoSimulator> in_gl_memory(GObject* element, const GstVideoInf
 }
 
 static void set_context(GstElement* self, GstContext* context) {
-  context_of(self).take(context);
+  context_of(self).set_context(context);
   PARENT_ELEMENT_CLASS->set_context(self, context);
 }
 

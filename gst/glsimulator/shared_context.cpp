@@ -12,8 +12,8 @@ std::string advice_of(GstElement* element) {
   return std::string(" Use ") + (GST_OBJECT_NAME(factory) + 2) + ", which runs on the CPU.";
 }
 
-/// Asks the neighbours and the application for an object, which take() then stores. Returns true if
-/// there is one. Must be called without the lock: neighbours may query this element.
+/// Asks the neighbours and the application for an object, which set_context() then stores. Returns
+/// true if there is one. Must be called without the lock: neighbours may query this element.
 template <class Object>
 bool SharedContext::ask_for(const char* type, Object* SharedContext::*object) {
   const auto is_known = [this, object] {
@@ -68,7 +68,7 @@ void SharedContext::close() {
   gst_clear_object(&display_);
 }
 
-void SharedContext::take(GstContext* context) {
+void SharedContext::set_context(GstContext* context) {
   const std::lock_guard lock(mutex_);
   const auto* const last = display_;
   gst_gl_handle_set_context(element_, context, &display_, &other_);

@@ -25,13 +25,13 @@ class SharedContext {
   bool open();
   void close();
 
-  /// Takes what a neighbour or the application shares.
-  void take(GstContext* context);
+  /// Adopts a display or a context that a neighbour or the application shares.
+  void set_context(GstContext* context);
   /// Answers a context query. False if it asks for something else.
   bool answer(GstQuery* query);
 
-  /// Returns the context shared with the neighbours, or else that of the display; null with an
-  /// error if there is none.
+  /// Returns the context shared with the neighbours, or else the context of the display; null with
+  /// an error if there is none.
   GstGLContext* find(GError** error);
   /// Makes find() replace this context, which is lost.
   void forget(GstGLContext* context);

@@ -67,7 +67,7 @@ void find_weights(const GstVideoInfo& video, int (&weights)[4]) {
 /// until its fence has been reached.
 class TextureVideoSimulator final : public VideoSimulator {
  public:
-  /// `context` is that of `shared`, which must outlive this object.
+  /// `context` belongs to `shared`, which must outlive this object.
   TextureVideoSimulator(GstElement* element, SharedContext& shared, GstGLContext* context,
                         const GstVideoInfo& video, MakeGlSimulator make)
       : element_(element),

@@ -9,7 +9,7 @@
 
 namespace {
 
-/// Returns a structure `name` with a copy of those of `fields` that `from` has.
+/// Returns a structure `name` with copies of the `fields` that `from` has.
 GstStructure* with_fields_of(const GstStructure* from, const char* name,
                              std::initializer_list<const char*> fields) {
   GstStructure* to = gst_structure_new_empty(name);

@@ -140,10 +140,11 @@ GstFlowReturn event_simulator_prepare_buffer(GstBaseTransform* element, GstBuffe
 static GstFlowReturn submit_input_buffer(GstBaseTransform* transform, gboolean is_discont,
                                          GstBuffer* frame) {
   auto& simulation = simulation_of(transform);
+  const GstClockTime pts = GST_BUFFER_PTS(frame);
   if (GST_BUFFER_IS_DISCONT(frame)) simulation.interrupt();
   const GstFlowReturn result =
       PARENT_TRANSFORM_CLASS->submit_input_buffer(transform, is_discont, frame);
-  if (result == GST_BASE_TRANSFORM_FLOW_DROPPED) simulation.skip_frame();
+  if (result == GST_BASE_TRANSFORM_FLOW_DROPPED) simulation.skip_frame(pts);
   return result;
 }
 

@@ -21,7 +21,7 @@
 /// on the last interval of a stream that is not live; then it is pushed with the next frame, or
 /// before any serialized event or query is handled. In an event stream, an interval without events
 /// is a GAP. In drawn video, an interval is a picture that replaces its last frame, with that
-/// frame's timestamps and those of its metas that remain valid, so the latency is the processing
+/// frame's timestamps and its metas that remain valid, so the latency is the processing
 /// time. A first frame gives an empty picture.
 struct EventSimulatorMethod {
   const char* type_name;

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "gst/base/buffer_map.hpp"
+#include "gst/base/buffer_bytes.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_pool.hpp"
 #include "gst/base/pads.hpp"
@@ -269,7 +269,9 @@ void Simulation::interrupt() {
   stream_.discontinuous = true;
 }
 
-void Simulation::skip_frame() {
+void Simulation::skip_frame(GstClockTime pts) {
+  GST_DEBUG_OBJECT(element_, "downstream is late: skipped the frame at %" GST_TIME_FORMAT,
+                   GST_TIME_ARGS(pts));
   stream_.motion.reset();  // it ends at the frame that was skipped
   ++stats.lock()->skipped_frames;
 }
@@ -523,8 +525,8 @@ GstFlowReturn Simulation::write_events(const EventBuckets& events, GstBuffer* fr
   auto& simulator = state_->simulator();
   event_pool_reserve(prepared, events.size() * sizeof(Event));
   {
-    const WriteMap map(prepared);
-    const std::span written(reinterpret_cast<Event*>(map.data()), events.size());
+    const WritableBytes map(prepared);
+    const std::span<Event> written = map.events();
     events.write_to(written.data(), simulator.threads());
     if (simulator.has_labels()) simulator.label({written, add_labels(prepared, written.size())});
   }

@@ -70,8 +70,8 @@ class Simulation {
 
   /// Simulates the interval that a frame ends, if any, and pushes what is finished.
   GstFlowReturn push_frame(OwnedBuffer frame);
-  /// The next interval is longer, because a frame was skipped.
-  void skip_frame();
+  /// The next interval is longer, because the frame at `pts` was skipped.
+  void skip_frame(GstClockTime pts);
   /// The next frame does not continue from the last one.
   void interrupt();
   /// Handles a GAP of the video: the last frame is held through it once a frame follows that is not

@@ -21,13 +21,13 @@ class InterpolatingSimulator final : public DenseSimulator {
         frames_{{gl, format}, {gl, format}} {}
 
  private:
-  void start(const TextureFrame& frame) override { take(frame); }
+  void start(const TextureFrame& frame) override { store(frame); }
 
   void mark(const TextureFrame& frame, const StepTimes& steps, const Settings& settings,
             EventList& list) override {
     const auto thresholds = Thresholds::of(settings, format().bits);
     const auto& last = frames_[now_];
-    take(frame);
+    store(frame);
     const auto& now = frames_[now_];
     const Buffer& flow = farneback_.find();
     region_.limit(last, now, std::min(thresholds.positive, thresholds.negative), flow);
@@ -35,7 +35,7 @@ class InterpolatingSimulator final : public DenseSimulator {
     kernel_.run(last, now, flow, interpolation_, thresholds, list);
   }
 
-  void take(const TextureFrame& frame) {
+  void store(const TextureFrame& frame) {
     now_ = 1 - now_;
     luma_.run(frame, frames_[now_]);
     farneback_.push(frames_[now_]);

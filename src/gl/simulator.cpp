@@ -5,8 +5,8 @@
 
 namespace eventcamera::gl {
 
-bool Simulator::take(const TextureFrame& frame, Nanoseconds time, const Settings& settings,
-                     EventList& list) {
+bool Simulator::process(const TextureFrame& frame, Nanoseconds time, const Settings& settings,
+                        EventList& list) {
   assert(frame.format == format());
   const auto steps = steps_to(time, settings);
   if (steps)
@@ -19,7 +19,7 @@ bool Simulator::take(const TextureFrame& frame, Nanoseconds time, const Settings
 
 void Simulator::queue(const TextureFrame& frame, Nanoseconds time, const Settings& settings) {
   auto& [list, is_sorted, done] = next();
-  is_sorted = take(frame, time, settings, list);
+  is_sorted = process(frame, time, settings, list);
   if (is_sorted) list.sort();
   done.set();
   gl_.check();
@@ -30,7 +30,7 @@ void Simulator::draw(const TextureFrame& frame, Nanoseconds time, const Settings
   auto& [list, is_sorted, done] = next();
   is_sorted = false;
   list.clear();
-  take(frame, time, settings, list);
+  process(frame, time, settings, list);
   draw_.run(list, picture);
   done.set();
   gl_.check();

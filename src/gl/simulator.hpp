@@ -26,7 +26,7 @@ class Simulator : public IntervalSimulator {
   static constexpr int max_queued = 2;  ///< maximum number of queued frames
 
   /// Queues the work on the next frame, whose `format` must be the simulator's. The texture must
-  /// not change until the events have been read(). `time` must be later than that of the last
+  /// not change until the events have been read(). `time` must be later than the last
   /// frame, by at most max_interval.
   void queue(const TextureFrame& frame, Nanoseconds time, const Settings& settings);
 
@@ -66,7 +66,8 @@ class Simulator : public IntervalSimulator {
   };
 
   /// Queues all work on a frame except sorting. Returns true if the frame ends an interval.
-  bool take(const TextureFrame& frame, Nanoseconds time, const Settings& settings, EventList& list);
+  bool process(const TextureFrame& frame, Nanoseconds time, const Settings& settings,
+               EventList& list);
 
   /// Adds a frame to the queue.
   Queued& next();

@@ -29,13 +29,13 @@ class SparseSimulator final : public Simulator {
   }
 
  private:
-  void start(const TextureFrame& frame) override { take(frame); }
+  void start(const TextureFrame& frame) override { store(frame); }
 
   void mark(const TextureFrame& frame, const StepTimes& steps, const Settings& settings,
             EventList& list) override {
     const auto thresholds = Thresholds::of(settings, format().bits);
     const auto& last = frames_[now_];
-    take(frame);
+    store(frame);
     const auto& now = frames_[now_];
     const int width = format().width;
     const Groups groups{groups_of(64, width), format().height};
@@ -55,7 +55,7 @@ class SparseSimulator final : public Simulator {
     }
   }
 
-  void take(const TextureFrame& frame) {
+  void store(const TextureFrame& frame) {
     now_ = 1 - now_;
     luma_.run(frame, frames_[now_].picture());
     tracker_.build(frames_[now_]);

@@ -16,7 +16,7 @@ namespace eventcamera {
 /// A track is dropped if it is lost, leaves the frame, or ends more than a pixel away from all kept
 /// pixels of its polarity in D(i): a pixel that has stopped moving does not fire.
 ///
-/// The first interval has only one difference frame, so all its events are those of D(1). Width and
+/// The first interval has only one difference frame, so all its events come from D(1). Width and
 /// height of `format` must not exceed max_side.
 std::unique_ptr<Simulator> make_diff_simulator(const LumaFormat& format);
 

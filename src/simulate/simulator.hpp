@@ -121,7 +121,7 @@ class IntervalSimulator {
 class Simulator : public IntervalSimulator {
  public:
   /// Processes the next frame, whose `format` must be the simulator's. `time` must be later than
-  /// that of the last frame, by at most max_interval. Returns the sorted events of (time of the
+  /// the last frame, by at most max_interval. Returns the sorted events of (time of the
   /// last frame, time], valid until the next call; nullptr for the first frame. `known_flow`, a
   /// view of an Image, is the motion from the last frame to this one. Throws std::bad_alloc or an
   /// exception of the implementation (cv::Exception); after that the simulator may only be
