@@ -34,7 +34,7 @@ static gboolean print_version;
 
 static const GOptionEntry options[] = {
     {"format", 'f', 0, G_OPTION_ARG_STRING, &element_options.values[OPTION_FORMAT],
-     "Encoding of a .raw or .mcap file, or dialect of a .csv or .txt file", "NAME"},
+     "Encoding of a .raw or .mcap file, dialect of text, or layout of HDF5", "NAME"},
     {"compression", 'c', 0, G_OPTION_ARG_STRING, &element_options.values[OPTION_COMPRESSION],
      "Compression of an .aedat4, .h5 or .mcap file", "NAME"},
     {"time-unit", 'u', 0, G_OPTION_ARG_STRING, &element_options.values[OPTION_TIME_UNIT],

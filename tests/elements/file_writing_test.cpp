@@ -2,7 +2,9 @@
 // What writers of event files of every format write, leave out and report.
 #include <ctime>
 
+#include "src/formats/file_formats.hpp"
 #include "tests/elements/event_files.hpp"
+#include "tests/elements/recording_files.hpp"
 
 namespace {
 
@@ -28,13 +30,29 @@ TEST_P(EveryFormat, IsWrittenWithoutWhatLiesOutsideTheSensor) {
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
 }
 
-TEST_P(EveryFormat, EndsInAnErrorOnAFullDisk) {
-  Pipeline pipeline(
-      "videotestsrc pattern=snow num-buffers=20 ! "
-      "video/x-raw,format=GRAY8,width=64,height=48 ! eventsim-frame ! " +
-      format().writer + " ! filesink location=/dev/full");
-  EXPECT_FALSE(pipeline.play());
-  EXPECT_EQ(pipeline.error, "No space left on the resource.");
+TEST(Writers, EndInAnErrorOnAFullDisk) {
+  for (const auto& [extension, writer] : recording_files::elements_with("output-extensions")) {
+    if (writer.starts_with("eventhdf5sink")) continue;  // it writes the file itself
+    Pipeline pipeline(
+        "videotestsrc pattern=snow num-buffers=20 ! video/x-raw,format=GRAY8,width=64,height=48 ! "
+        "eventsim-frame ! application/x-event-camera ! " +
+        writer + " ! filesink location=/dev/full");
+    EXPECT_FALSE(pipeline.play()) << writer;
+    EXPECT_EQ(pipeline.error, "No space left on the resource.") << writer;
+  }
+}
+
+/// All formats of the table have a reader, and their extensions one element each.
+TEST(Readers, ReadAllFormats) {
+  const auto readers = recording_files::elements_with("input-extensions");
+  for (const auto& format : eventcamera::file_formats()) {
+    const Owned<GstCaps> caps(gst_caps_new_empty_simple(format.media_type));
+    const std::string extensions = format.extensions;
+    const auto reader = readers.at(extensions.substr(0, extensions.find(',')));
+    GstElementFactory* const factory = gst_element_factory_find(reader.c_str());
+    EXPECT_TRUE(gst_element_factory_can_sink_any_caps(factory, caps.get())) << format.media_type;
+    gst_object_unref(factory);
+  }
 }
 
 TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
