@@ -22,7 +22,7 @@ const EventBuckets* IntervalSimulator::hold_until(Nanoseconds time, const Settin
   const bool has_noise =
       duration > 0 && duration <= max_interval && hold(StepTimes(duration, 1), settings, events_);
   last_time_ = time;
-  return has_noise ? &events_ : nullptr;
+  return has_noise ? &events() : nullptr;
 }
 
 void IntervalSimulator::reset() {
@@ -39,7 +39,7 @@ const EventBuckets* Simulator::push(const LumaView& frame, Nanoseconds time,
     start(frame);
   given_flow_.reset();
   last_time_ = time;
-  return steps ? &events_ : nullptr;
+  return steps ? &events() : nullptr;
 }
 
 }  // namespace eventcamera

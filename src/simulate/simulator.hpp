@@ -103,11 +103,14 @@ class IntervalSimulator {
   std::optional<StepTimes> steps_to(Nanoseconds time, const Settings& settings);
 
   /// Fills `events` with noise events of an unchanged frame; false if the simulator has no noise.
-  virtual bool hold(const StepTimes&, const Settings&, EventBuckets&) { return false; }
+  virtual bool hold(const StepTimes&, const Settings&, StepBuckets&) { return false; }
+
+  /// Events of the last interval.
+  virtual const EventBuckets& events() const { return events_; }
 
   std::optional<Nanoseconds> last_time_;       ///< of the last frame, where an interval begins
   std::optional<ImageView<Flow>> given_flow_;  ///< of the next interval
-  EventBuckets events_;
+  StepBuckets events_;
 
  private:
   LumaFormat format_;
@@ -133,7 +136,7 @@ class Simulator : public IntervalSimulator {
   virtual void start(const LumaView& frame) = 0;
   /// Fills `events` with the events between the last frame and this one, and stores this one.
   virtual void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
-                        EventBuckets& events) = 0;
+                        StepBuckets& events) = 0;
 };
 
 }  // namespace eventcamera
