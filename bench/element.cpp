@@ -263,11 +263,11 @@ void register_element(const Scene& scene, const Method& method, const std::strin
 }
 
 /// About `count` random events of an interval, evenly distributed over pixels and steps.
-EventBuckets random_events(int count, int width, int height) {
+StepBuckets random_events(int count, int width, int height) {
   std::minstd_rand random;
   constexpr int steps = interpolated_frames + 1;
   std::bernoulli_distribution fires(static_cast<double>(count) / (steps * width * height));
-  EventBuckets events;
+  StepBuckets events;
   events.reset(steps, band_count(height));
   for (int step = 1; step <= steps; ++step) {
     for (int y = 0; y < height; ++y) {

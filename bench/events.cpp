@@ -11,7 +11,7 @@ namespace {
 
 /// Events of an interval, in buckets from a simulator and as the content of a buffer.
 struct Interval {
-  EventBuckets buckets;
+  StepBuckets buckets;
   std::vector<Event> buffer;
 };
 
@@ -30,7 +30,7 @@ Intervals intervals_of(const Scene& scene) {
     };
     push(clip[0], 0);
     auto& [buckets, buffer] = intervals.emplace_back();
-    buckets = *push(clip[1], frame_time);
+    buckets = dynamic_cast<const StepBuckets&>(*push(clip[1], frame_time));
     buffer.resize(buckets.size());
     buckets.write_to(buffer.data(), simulator->threads());
   }

@@ -67,10 +67,10 @@ TEST_P(Naive, DenseAfterTheFlowEqualsTheKernel) {
   for (const auto method : {FlowMethod::dis_lq, FlowMethod::dis_hq, FlowMethod::farneback}) {
     naive::OpenCvFlow finder(method, format.width, format.height);
     const auto flow = finder.find(last.view(), now.view(), 1);
-    EventBuckets naive_events;
+    StepBuckets naive_events;
     naive::DenseInterpolation(format.width, format.height)
         .fire(last.view(), now.view(), flow, steps, {3, 3}, threads, naive_events);
-    EventBuckets events;
+    StepBuckets events;
     InterpolationKernel().fire(
         InterpolatedInterval<std::uint8_t>{
             {last.view(), now.view(), steps.count()}, flow, Interpolation::forward, steps, {3, 3}},

@@ -41,7 +41,7 @@ template <class Fire>
 void time_pairs(benchmark::State& state, const Pairs& pairs, int threads, const Fire& fire) {
   ThreadPool pool;
   pool.set_threads(threads);
-  EventBuckets events;
+  StepBuckets events;
   EventMemory memory;
   fire(pairs.front(), pool, events);
   double sum = 0;
@@ -58,7 +58,7 @@ void time_naive_after_flow(benchmark::State& state, const Pairs& pairs, const St
                            const Thresholds& thresholds, int threads) {
   const auto& frame = *pairs.front().now;
   naive::DenseInterpolation interpolation(frame.width(), frame.height());
-  time_pairs(state, pairs, threads, [&](const Pair& pair, ThreadPool& pool, EventBuckets& events) {
+  time_pairs(state, pairs, threads, [&](const Pair& pair, ThreadPool& pool, StepBuckets& events) {
     interpolation.fire(pair.last->view(), pair.now->view(), pair.flow_view(), steps, thresholds,
                        pool, events);
   });
@@ -67,7 +67,7 @@ void time_naive_after_flow(benchmark::State& state, const Pairs& pairs, const St
 void time_our_after_flow(benchmark::State& state, const Pairs& pairs, const StepTimes& steps,
                          const Thresholds& thresholds, int threads) {
   InterpolationKernel kernel;
-  time_pairs(state, pairs, threads, [&](const Pair& pair, ThreadPool& pool, EventBuckets& events) {
+  time_pairs(state, pairs, threads, [&](const Pair& pair, ThreadPool& pool, StepBuckets& events) {
     kernel.fire(
         InterpolatedInterval<std::uint8_t>{{pair.last->view(), pair.now->view(), steps.count()},
                                            pair.flow_view(),

@@ -17,7 +17,7 @@ class DenseInterpolation {
 
   void fire(const FrameView& last, const FrameView& now, const ImageView<Flow>& flow,
             const StepTimes& steps, const Thresholds& thresholds, ThreadPool& threads,
-            EventBuckets& events) {
+            StepBuckets& events) {
     const int m = steps.count();
     const Warp<std::uint8_t> warp{last, now, m};
     threads.for_each(now.height, [&](int y, int) {
@@ -59,7 +59,7 @@ class DenseSimulator final : public Simulator {
   void start(const LumaView& frame) override { last_.assign(frame.as<std::uint8_t>()); }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
-                EventBuckets& events) override {
+                StepBuckets& events) override {
     const auto now = frame.as<std::uint8_t>();
     interpolation_.fire(last_.view(), now, flow_.find(last_.view(), now, threads().threads()),
                         steps, Thresholds::of(settings, 8), threads(), events);

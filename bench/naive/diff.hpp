@@ -35,7 +35,7 @@ class DiffSimulator final : public Simulator {
   }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
-                EventBuckets& events) override {
+                StepBuckets& events) override {
     const auto now = frame.as<std::uint8_t>();
     const int m = steps.count();
     const auto thresholds = Thresholds::of(settings, 8);
@@ -85,7 +85,7 @@ class DiffSimulator final : public Simulator {
   }
 
   /// Fires the largest difference at each pixel of an interpolated frame.
-  void fire_between(const StepTimes& steps, EventBuckets& events) {
+  void fire_between(const StepTimes& steps, StepBuckets& events) {
     while (static_cast<int>(frames_.size()) < threads().threads())
       frames_.emplace_back(format().width, format().height);
     threads().for_each(steps.count() - 1, [&](int i, int thread) {

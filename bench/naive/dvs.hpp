@@ -70,7 +70,7 @@ class DvsPixels {
 
   /// Advances the pixels from `begin` to `end`, seconds; events go to the buckets of `step`.
   void advance(const FrameView& frame, double begin, double end, int step, ThreadPool& threads,
-               EventBuckets& events) {
+               StepBuckets& events) {
     const auto duration = static_cast<float>(end - begin);
     max_counts_.assign(random_.size(), 0);
     threads.for_each(band_count(frame.height),
@@ -186,7 +186,7 @@ class DvsSimulator final : public Simulator {
   }
 
   void simulate(const LumaView& frame, const StepTimes& interval, const Settings&,
-                EventBuckets& events) override {
+                StepBuckets& events) override {
     const auto now = seen(frame);
     const double duration = static_cast<double>(interval.duration()) * 1e-9;
     ImageView<Flow> flow;

@@ -18,7 +18,7 @@ using FrameView = ImageView<std::uint8_t>;
 
 /// Fires where the difference of two frames exceeds the thresholds.
 inline void fire(const FrameView& before, const FrameView& now, int step, std::uint32_t t,
-                 const Thresholds& thresholds, ThreadPool& threads, EventBuckets& events) {
+                 const Thresholds& thresholds, ThreadPool& threads, StepBuckets& events) {
   threads.for_each(band_count(now.height), [&](int band, int) {
     auto& out = events.bucket(step, band);
     const BandRows rows(band, now.height);
@@ -55,7 +55,7 @@ class FrameSimulator final : public Simulator {
   void start(const LumaView& frame) override { last_.assign(frame.as<std::uint8_t>()); }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
-                EventBuckets& events) override {
+                StepBuckets& events) override {
     const auto now = frame.as<std::uint8_t>();
     events.reset(1, band_count(now.height));
     fire(last_.view(), now, 1, steps.microseconds(steps.count()), Thresholds::of(settings, 8),

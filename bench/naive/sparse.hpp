@@ -26,7 +26,7 @@ class SparseSimulator final : public Simulator {
   }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
-                EventBuckets& events) override {
+                StepBuckets& events) override {
     const auto now = frame.as<std::uint8_t>();
     const int m = steps.count();
     const auto thresholds = Thresholds::of(settings, 8);

@@ -57,7 +57,7 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   void simulate(const LumaView& frame, const StepTimes& interval, const Settings&,
-                EventBuckets& events) override {
+                StepBuckets& events) override {
     see(frame, now_);
     change_settings();
     const double gain = response_.compensate(last_.view(), now_.view(), threads());
@@ -66,23 +66,25 @@ class PixelSimulator final : public DvsSimulator {
       expose(last_, format().bits, settings_.linear_light, gain, threads());
       frame_flow_.forget();  // its copy has the old exposure
     }
-    begin(interval, true, events);
+    begin(interval, true);
     if (moves)
       advance_along_motion();
     else
       advance_straight();
-    end();
+    end(events);
     std::swap(last_, now_);
   }
 
-  bool hold(const StepTimes& interval, const Settings&, EventBuckets& events) override {
+  bool hold(const StepTimes& interval, const Settings&, StepBuckets& events) override {
     now_.assign(last_.view());
     change_settings();
-    begin(interval, false, events);
+    begin(interval, false);
     advance_straight();
-    end();
+    end(events);
     return true;
   }
+
+  const EventBuckets& events() const override { return *made_; }
 
   void label(const LabelledEvents& events) override { separate_causes(events); }
 
@@ -115,15 +117,15 @@ class PixelSimulator final : public DvsSimulator {
     pixels_.settle(last_, response_, threads());
   }
 
-  void begin(const StepTimes& interval, bool is_exposed, EventBuckets& events) {
+  void begin(const StepTimes& interval, bool is_exposed) {
     timeline_.begin(settings_, response_.gain(), *last_time_, interval.duration(), is_exposed);
-    fired_.begin(timeline_.duration(), settings_.max_rate, events);
+    fired_.begin(timeline_.duration(), settings_.max_rate);
     scratch_.resize(static_cast<std::size_t>(threads().threads()));
   }
 
-  void end() {
+  void end(StepBuckets& read) {
     timeline_.end();
-    fired_.end(threads());
+    made_ = &fired_.end(read, threads());
   }
 
   /// Advances all pixels with linear interpolation.
@@ -239,6 +241,7 @@ class PixelSimulator final : public DvsSimulator {
   PixelArray pixels_{format().width, format().height};
   Timeline timeline_;
   IntervalEvents fired_{format().width, format().height};
+  const EventBuckets* made_ = nullptr;  ///< by the last interval
   FrameFlow frame_flow_;
   MotionTiles tiles_;
   std::vector<Scratch> scratch_;  ///< by thread

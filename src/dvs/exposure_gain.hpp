@@ -28,7 +28,7 @@ class ExposureGain {
   static constexpr double min_gain = 1.01;
   static constexpr double max_gain = 1.25;
 
-  /// For luma of 8 to 16 bits; light_of() tells its light.
+  /// For luma of 8 to 16 bits, whose light is light_of().
   ExposureGain(int bits, bool linear_light);
 
   /// Returns the gain of the light from one frame to the next; 1 if there is none that counts. The

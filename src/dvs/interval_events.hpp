@@ -9,6 +9,7 @@
 #include "src/core/event_buckets.hpp"
 #include "src/core/label.hpp"
 #include "src/core/thread_pool.hpp"
+#include "src/core/time_slices.hpp"
 #include "src/dvs/readout.hpp"
 
 namespace eventcamera {
@@ -26,24 +27,24 @@ class IntervalEvents {
   IntervalEvents(int width, int height)
       : width_(width), height_(height), deferred_(static_cast<std::size_t>(band_count(height))) {}
 
-  /// Begins an interval of `duration` microseconds, whose events are written to `out`,
-  /// with_cause(). `max_rate` is in events per second; 0 = no limit.
-  void begin(double duration, double max_rate, EventBuckets& out) {
+  /// Begins an interval of `duration` microseconds. `max_rate` is in events per second; 0 = no
+  /// limit.
+  void begin(double duration, double max_rate) {
     duration_ = duration;
     max_rate_ = max_rate;
     if (max_rate > 0 && !readout_) readout_.emplace(width_, height_);
-    out_ = &out;
-    fired_ = readout_ ? &unread_ : &out;
-    fired_->reset_slices(static_cast<std::uint32_t>(duration), band_count(height_));
+    fired_.reset(static_cast<std::uint32_t>(duration), band_count(height_));
   }
 
-  /// Ends the interval, after the last event.
-  void end(ThreadPool& threads) {
-    if (!readout_) return;
-    sorted_.resize(unread_.size());
-    unread_.write_to(sorted_.data(), threads);
-    readout_->read(sorted_, duration_, max_rate_ > 0 ? max_rate_ : unlimited, *out_);
+  /// Ends the interval, after the last event. Returns its events, with_cause(): its own slices, or
+  /// in `read` those that were read out.
+  const EventBuckets& end(StepBuckets& read, ThreadPool& threads) {
+    if (!readout_) return fired_;
+    sorted_.resize(fired_.size());
+    fired_.write_to(sorted_.data(), threads);
+    readout_->read(sorted_, duration_, max_rate_ > 0 ? max_rate_ : unlimited, read);
     if (max_rate_ == 0) readout_.reset();  // no events are waiting any more
+    return read;
   }
 
   /// Drops the causes of the deferred and waiting events.
@@ -66,7 +67,7 @@ class IntervalEvents {
     /// Begins with the deferred events of the last interval.
     void begin(IntervalEvents& events, int band) {
       duration_ = events.duration_;
-      fired_ = events.fired_;
+      fired_ = &events.fired_;
       band_ = band;
       deferred_ = &events.deferred_[static_cast<std::size_t>(band)];
       added_.clear();
@@ -97,7 +98,7 @@ class IntervalEvents {
     }
 
     /// Must be called after the last event.
-    void end() { fired_->add_slices(band_, added_); }
+    void end() { fired_->add(band_, added_); }
 
    private:
     void add_within(double t, Event event) {
@@ -106,7 +107,7 @@ class IntervalEvents {
     }
 
     double duration_ = 0;
-    EventBuckets* fired_ = nullptr;
+    TimeSlices* fired_ = nullptr;
     int band_ = 0;
     Deferred* deferred_ = nullptr;
     std::vector<Event> added_;
@@ -120,11 +121,9 @@ class IntervalEvents {
   int height_;
   double duration_ = 0;
   double max_rate_ = 0;
-  EventBuckets* out_ = nullptr;
-  EventBuckets* fired_ = nullptr;   ///< out_, or unread_
+  TimeSlices fired_;
   std::vector<Deferred> deferred_;  ///< by band
-  EventBuckets unread_;             ///< events that go to the readout
-  std::vector<Event> sorted_;       ///< the same, sorted
+  std::vector<Event> sorted_;       ///< for the readout
   std::optional<Readout> readout_;
 };
 

@@ -46,7 +46,7 @@ class LightResponse {
   template <class Pixel>
   double compensate(const ImageView<Pixel>& last, const ImageView<Pixel>& now, ThreadPool& threads);
 
-  /// Exposure of the last frame; that of the first one is 1.
+  /// Exposure of the last frame; the first frame has 1.
   double gain() const { return gain_; }
 
   /// Bit depth of the luma that pixels see: frames of 8 bits have 16 while they move.

@@ -64,7 +64,7 @@ struct AxisMotion {
     return max_difference * steps <= (block - 1) << 16;
   }
 
-  /// Whether those of the first block are less than a block apart after k steps.
+  /// Whether the pixels of the first block are less than a block apart after k steps.
   bool are_close(int k) const {
     const auto pixel = [&](Motion motion) { return (k * motion + 512) >> 16; };
     return std::abs(pixel(max[0]) - pixel(min[0])) < block;
@@ -140,8 +140,8 @@ void blend_blocks(const Warp<std::uint8_t>& warp, const BlockMotions& motions, i
 
 #else
 
-/// Bilinear samples, the same as those of sample() in warp.hpp, of blocks whose pixels are close
-/// together: those of a block are in the same 16 bytes of a few rows.
+/// Bilinear samples, equal to sample() in warp.hpp, of blocks whose pixels are close together: all
+/// samples of a block are in the same 16 bytes of a few rows.
 template <int blocks>
 class Sampler {
  public:

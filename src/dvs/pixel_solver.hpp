@@ -61,7 +61,7 @@ class UnsolvedPixels {
 };
 
 /// Candidates of a row, and what they are advanced through a sub-interval with. One per thread: it
-/// keeps its memory; model and events are those of a band.
+/// keeps its memory. Model and events are set for each band.
 struct RowToSolve {
   const PixelModel* model = nullptr;
   IntervalEvents::Band events;
@@ -73,7 +73,7 @@ struct RowToSolve {
   bool has_labels() const { return pixels.last_cause != nullptr; }
 
   /// Rest of the refractory period at the end of the sub-interval. A rest of less than min_gap
-  /// comes after an event in the last microsecond, which must not be that of the next one.
+  /// comes after an event in the last microsecond, in which the pixel must not fire again.
   double refractory_left(double ready) const {
     const double left = std::max(0.0, ready - sub_interval->duration);
     return left > 0 && left < min_gap ? left + sub_interval->next_rounding : left;

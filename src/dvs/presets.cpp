@@ -10,7 +10,7 @@ namespace {
 using enum Response;
 using enum RefractoryReset;
 
-// What is not listed is that of DvsSettings. Sources:
+// Settings that are not listed have the defaults of DvsSettings. Sources:
 //
 // esim: Rebecq et al., ESIM, CoRL 2018; thresholds of rpg_vid2e, offset of esim_py.
 // v2e: Hu, Liu, Delbruck, CVPRW 2021; set_dvs_params("clean") and, for dim light, ("noisy").

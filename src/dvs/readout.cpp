@@ -20,7 +20,7 @@ void Readout::reset() {
 }
 
 void Readout::read(std::span<const Event> in, double duration, double events_per_second,
-                   EventBuckets& out) {
+                   StepBuckets& out) {
   constexpr double min_rate = 1e-9;  // an event in 30 years; a lower one makes no difference
   const double time_per_event = 1e6 / std::max(events_per_second, min_rate);
   double idle_from = unfinished_ * time_per_event;  // microseconds after the start of the interval

@@ -27,11 +27,10 @@ class Readout {
 
   /// Admits the sorted events of an interval of `duration` microseconds, with_cause(), and fills
   /// `out` with those read out within it; the others wait for the next interval.
-  void read(std::span<const Event> in, double duration, double events_per_second,
-            EventBuckets& out);
+  void read(std::span<const Event> in, double duration, double events_per_second, StepBuckets& out);
 
  private:
-  /// Event of a pixel that waits; 0 if none. The time is that of the readout, and not kept.
+  /// Event of a pixel that waits; 0 if none. It has no time, but gets the time of its readout.
   using Waiting = std::uint8_t;
   static constexpr Waiting waits_bit = 1;
   static constexpr Waiting on_bit = 2;

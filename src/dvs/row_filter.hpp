@@ -18,7 +18,7 @@ inline constexpr int max_lanes = 16;
 /// Pixels of a row in which an event may fire or a refractory period end.
 class Candidates {
  public:
-  /// Values of each of them: of the sub-interval, and, like those of PixelRow, at its start.
+  /// Values of each of them, at the start of the sub-interval unless noted.
   enum Column : std::size_t {
     target,  ///< at the end of the sub-interval
     signal,  ///< with bandwidth only, otherwise the target

@@ -48,7 +48,7 @@ struct Trajectories {
     return hn::Sub(slope, hn::Mul(bandwidth, lag_at(points)));
   }
 
-  /// Value at a time after that of `points`.
+  /// Value at a time after `points`.
   HWY_INLINE Values at(Values t, const Points& points) const {
     return hn::Add(hn::Add(offset, hn::Mul(slope, t)),
                    hn::Mul(lag_at(points), decays(hn::Mul(bandwidth, hn::Sub(t, points.t)))));
@@ -380,7 +380,7 @@ class RowSolver {
     row_.add_event(x, emitted, polarity, cause);
   }
 
-  /// Slope of a signal relative to its reference, at a time after that of its columns.
+  /// Slope of a signal relative to its reference, at a time after its columns.
   double slope_at(std::size_t i, double t) {
     const auto at = [&](Column column) { return unsolved_.column(column)[i]; };
     const double lag = at(Column::value) - at(Column::offset) - at(Column::slope) * at(Column::t);

@@ -56,7 +56,7 @@ void EventList::sort() {
   write();
 }
 
-void EventList::read(EventBuckets& events) {
+void EventList::read(StepBuckets& events) {
   std::uint32_t total = 0;
   total_.read(std::as_writable_bytes(std::span(&total, 1)));
   if (total > times_.size() * static_cast<std::size_t>(marks_a_step()) * 32)

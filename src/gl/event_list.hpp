@@ -44,7 +44,7 @@ class EventList {
   void sort();
 
   /// Waits until the GPU has sorted the marks, and replaces the contents of `events`. Throws Error.
-  void read(EventBuckets& events);
+  void read(StepBuckets& events);
 
  private:
   void write() const;

@@ -28,7 +28,7 @@ class InterpolatingSimulator final : public DenseSimulator {
   }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
-                EventBuckets& events) override {
+                StepBuckets& events) override {
     now_.assign(frame.as<Pixel>());
     const auto thresholds = Thresholds::of(settings, format().bits);
     const InterpolatedInterval<Pixel> interval{{last_.view(), now_.view(), steps.count()},

@@ -111,7 +111,7 @@ class DifferenceFrame {
   }
 
   /// Emits the pixels that fire and clears them.
-  void fire(int step, std::uint32_t t, EventBuckets& events) {
+  void fire(int step, std::uint32_t t, StepBuckets& events) {
     for (int band = 0; band < events.bands(); ++band) {
       const BandRows rows(band, height_);
       auto* touched = touched_.data() + std::ptrdiff_t{rows.first} * words_;
@@ -157,7 +157,7 @@ class DiffSimulator final : public Simulator {
   }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
-                EventBuckets& events) override {
+                StepBuckets& events) override {
     const auto now = frame.as<Pixel>();
     const auto thresholds = Thresholds::of(settings, format().bits);
     const int m = steps.count();
@@ -179,7 +179,7 @@ class DiffSimulator final : public Simulator {
   }
 
   /// Keeps D(i) = I(i) - I(i-1) at pixels that fired, separately for each polarity, and then I(i).
-  void keep_difference(const ImageView<Pixel>& now, int last_step, EventBuckets& events) {
+  void keep_difference(const ImageView<Pixel>& now, int last_step, StepBuckets& events) {
     on_.begin_next();
     off_.begin_next();
     const int bands = band_count(now.height);
@@ -232,7 +232,7 @@ class DiffSimulator final : public Simulator {
     });
   }
 
-  void fire_between(const StepTimes& steps, EventBuckets& events) {
+  void fire_between(const StepTimes& steps, StepBuckets& events) {
     while (static_cast<int>(frames_.size()) < threads().threads())
       frames_.emplace_back(format().width, format().height);
     threads().for_each(steps.count() - 1, [&](int i, int thread) {

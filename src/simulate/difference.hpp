@@ -53,7 +53,7 @@ Box changed_box(const ImageView<Pixel>& before, const ImageView<Pixel>& now, int
 template <class Pixel>
 void fire_differences(const ImageView<Pixel>& before, const ImageView<Pixel>& now, int step,
                       std::uint32_t t, const Thresholds& thresholds, ThreadPool& threads,
-                      EventBuckets& events) {
+                      StepBuckets& events) {
   threads.for_each(band_count(now.height), [&](int band, int) {
     auto& fired = events.pixels(step, band);
     fired.begin(t);

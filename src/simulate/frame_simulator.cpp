@@ -17,7 +17,7 @@ class FrameSimulator final : public Simulator {
   void start(const LumaView& frame) override { last_.assign(frame.as<Pixel>()); }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
-                EventBuckets& events) override {
+                StepBuckets& events) override {
     const auto now = frame.as<Pixel>();
     const auto thresholds = Thresholds::of(settings, format().bits);
     const auto t = steps.microseconds(steps.count());

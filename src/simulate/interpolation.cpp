@@ -14,7 +14,7 @@ namespace {
 
 /// Empties the pixels of each step, in a band of rows.
 template <class Pixel>
-void begin_steps(const InterpolatedInterval<Pixel>& interval, int band, EventBuckets& events) {
+void begin_steps(const InterpolatedInterval<Pixel>& interval, int band, StepBuckets& events) {
   for (int j = 1; j <= interval.steps.count(); ++j)
     events.pixels(j, band).begin(interval.steps.microseconds(j));
 }
@@ -207,7 +207,7 @@ void pair_rows(const ImageView<std::uint8_t>& frame, int first, int last,
 
 template <Interpolation interpolation, class LastSampler>
 void fire_row(const InterpolatedInterval<std::uint8_t>& interval, const LastSampler& last, int y,
-              int band, const FirstSteps& first_steps, EventBuckets& events) {
+              int band, const FirstSteps& first_steps, StepBuckets& events) {
   const Words words;
   const int lanes = static_cast<int>(hn::Lanes(words));
   const int width = interval.flow.width;
@@ -300,7 +300,7 @@ int first_step(const InterpolatedInterval<std::uint8_t>& interval,
 
 void fire_band_forward(const InterpolatedInterval<std::uint8_t>& interval,
                        const ImageView<std::uint16_t>& last_pairs,
-                       const GradientBound& gradient_bound, int band, EventBuckets& events) {
+                       const GradientBound& gradient_bound, int band, StepBuckets& events) {
   const PairSampler last(last_pairs);
   begin_steps(interval, band, events);
   const BandRows rows(band, interval.flow.height);
@@ -317,7 +317,7 @@ void fire_band_forward(const InterpolatedInterval<std::uint8_t>& interval,
 }
 
 void fire_band_blend(const InterpolatedInterval<std::uint8_t>& interval, int band,
-                     EventBuckets& events) {
+                     StepBuckets& events) {
   const Sampler last(interval.warp.last);
   const BandRows rows(band, interval.flow.height);
   begin_steps(interval, band, events);
@@ -342,7 +342,7 @@ namespace {
 
 template <Interpolation interpolation>
 void fire_row_16(const InterpolatedInterval<std::uint16_t>& interval, int y, int band,
-                 EventBuckets& events) {
+                 StepBuckets& events) {
   const int steps = interval.steps.count();
   for (int x = 0; x < interval.flow.width; ++x) {
     const Flow& flow = interval.flow.row(y)[x];
@@ -362,7 +362,7 @@ void fire_row_16(const InterpolatedInterval<std::uint16_t>& interval, int y, int
 
 template <Interpolation interpolation>
 void fire_band_16(const InterpolatedInterval<std::uint16_t>& interval, int band,
-                  EventBuckets& events) {
+                  StepBuckets& events) {
   begin_steps(interval, band, events);
   const BandRows rows(band, interval.flow.height);
   for (int y = rows.first; y < rows.last; ++y)
@@ -372,7 +372,7 @@ void fire_band_16(const InterpolatedInterval<std::uint16_t>& interval, int band,
 }  // namespace
 
 void InterpolationKernel::fire(const InterpolatedInterval<std::uint8_t>& interval,
-                               ThreadPool& threads, EventBuckets& events) {
+                               ThreadPool& threads, StepBuckets& events) {
   const int bands = band_count(interval.flow.height);
   events.reset(interval.steps.count(), bands);
   if (interval.interpolation == Interpolation::forward) {
@@ -395,7 +395,7 @@ void InterpolationKernel::fire(const InterpolatedInterval<std::uint8_t>& interva
 }
 
 void InterpolationKernel::fire(const InterpolatedInterval<std::uint16_t>& interval,
-                               ThreadPool& threads, EventBuckets& events) {
+                               ThreadPool& threads, StepBuckets& events) {
   const int bands = band_count(interval.flow.height);
   events.reset(interval.steps.count(), bands);
   threads.for_each(bands, [&](int band, int) {

@@ -33,9 +33,9 @@ class InterpolationKernel {
  public:
   /// Replaces the contents of `events`.
   void fire(const InterpolatedInterval<std::uint8_t>& interval, ThreadPool& threads,
-            EventBuckets& events);
+            StepBuckets& events);
   void fire(const InterpolatedInterval<std::uint16_t>& interval, ThreadPool& threads,
-            EventBuckets& events);
+            StepBuckets& events);
 
  private:
   GradientBound gradient_bound_;

@@ -23,7 +23,7 @@ const EventBuckets* IntervalSimulator::hold_until(Nanoseconds time, const Settin
   const bool has_noise =
       duration > 0 && duration <= max_interval && hold(StepTimes(duration, 1), settings, events_);
   last_time_ = time;
-  return has_noise ? &events_ : nullptr;
+  return has_noise ? &events() : nullptr;
 }
 
 void IntervalSimulator::reset() {
@@ -41,7 +41,7 @@ const EventBuckets* Simulator::push(const LumaView& frame, Nanoseconds time,
   else
     start(frame);
   last_time_ = time;
-  return steps ? &events_ : nullptr;
+  return steps ? &events() : nullptr;
 }
 
 }  // namespace eventcamera

@@ -104,11 +104,14 @@ class IntervalSimulator {
   std::optional<StepTimes> steps_to(Nanoseconds time, const Settings& settings);
 
   /// Fills `events` with noise events of an unchanged frame; false if the simulator has no noise.
-  virtual bool hold(const StepTimes&, const Settings&, EventBuckets&) { return false; }
+  virtual bool hold(const StepTimes&, const Settings&, StepBuckets&) { return false; }
+
+  /// Events of the last interval.
+  virtual const EventBuckets& events() const { return events_; }
 
   std::optional<Nanoseconds> last_time_;  ///< of the last frame, where an interval begins
   std::optional<ImageView<Flow>> flow_;   ///< of the interval
-  EventBuckets events_;
+  StepBuckets events_;
 
  private:
   LumaFormat format_;
@@ -137,7 +140,7 @@ class Simulator : public IntervalSimulator {
   /// Fills `events` with the events between the last frame and this one, and stores this one. Sets
   /// flow_ if it needs flow that is not known.
   virtual void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
-                        EventBuckets& events) = 0;
+                        StepBuckets& events) = 0;
 };
 
 }  // namespace eventcamera

@@ -41,7 +41,7 @@ class Painter {
 
   /// Appends the events of steps first ... last to their buckets.
   void fire(const Interval<Pixel>& interval, int first, int last, const StepTimes& steps,
-            const Thresholds& thresholds, EventBuckets& events) {
+            const Thresholds& thresholds, StepBuckets& events) {
     paint(interval, first - 1);
     for (int j = first; j <= last; ++j) {
       std::swap(before_, between_);
@@ -102,7 +102,7 @@ class SparseSimulator final : public Simulator {
   }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
-                EventBuckets& events) override {
+                StepBuckets& events) override {
     const auto now = frame.as<Pixel>();
     const auto thresholds = Thresholds::of(settings, format().bits);
     find_changed(now, std::min(thresholds.positive, thresholds.negative));
@@ -172,7 +172,7 @@ class SparseSimulator final : public Simulator {
   Image<Pixel> last_;
   PointTracker tracker_{2};
   Grey8 grey_;
-  EventBuckets changes_;
+  StepBuckets changes_;
   std::vector<Point> changed_;
   std::vector<std::size_t> first_;  ///< index of the first changed pixel of each band, and the end
   std::vector<MovingBand<Pixel>> bands_;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "src/core/event_buckets.hpp"
+#include "src/core/time_slices.hpp"
 #include "src/simulate/simulator.hpp"
 
 namespace {
@@ -27,8 +28,8 @@ TEST(Event, LiesInMemoryAsXytpHasIt) {
   EXPECT_EQ(Event::at(0, 32767, 0, Polarity::off).y_p, 0x7fff);
 }
 
-TEST(EventBuckets, ReadStepByStepAndBandByBand) {
-  EventBuckets buckets;
+TEST(StepBuckets, ReadStepByStepAndBandByBand) {
+  StepBuckets buckets;
   buckets.reset(2, 3);
   buckets.bucket(2, 0).push_back(Event::at(3, 0, 2, Polarity::on));
   buckets.bucket(1, 2).push_back(Event::at(2, 0, 1, Polarity::on));
@@ -45,8 +46,8 @@ TEST(EventBuckets, ReadStepByStepAndBandByBand) {
   EXPECT_EQ(visits, 1);
 }
 
-TEST(EventBuckets, AreCopiedAlikeByAnyNumberOfThreads) {
-  EventBuckets buckets;
+TEST(StepBuckets, AreCopiedAlikeByAnyNumberOfThreads) {
+  StepBuckets buckets;
   buckets.reset(3, 4);
   int x = 0;
   for (int step = 1; step <= 3; ++step)
@@ -68,8 +69,8 @@ TEST(EventBuckets, AreCopiedAlikeByAnyNumberOfThreads) {
   buckets.write_to(nullptr, threads);
 }
 
-TEST(EventBuckets, OfPixelsAreWrittenOnceByAnyNumberOfThreads) {
-  EventBuckets buckets;
+TEST(StepBuckets, OfPixelsAreWrittenOnceByAnyNumberOfThreads) {
+  StepBuckets buckets;
   buckets.reset(3, 4);
   std::vector<Event> expected;
   std::mt19937_64 random;
@@ -100,17 +101,17 @@ TEST(EventBuckets, OfPixelsAreWrittenOnceByAnyNumberOfThreads) {
   }
 }
 
-TEST(EventBuckets, OfTimeSlicesAreSortedByAnyNumberOfThreads) {
+TEST(TimeSlices, AreSortedByAnyNumberOfThreads) {
   constexpr int bands = 3;
   constexpr int rows = 5;  // of a band
   constexpr int width = 8;
   std::minstd_rand random;
-  EventBuckets buckets;
+  TimeSlices slices;
   ThreadPool threads;
   for (const std::uint32_t duration : {0U, 1U, 63U, 64U, 1000U, 33'333U, 3'000'000U, 0xffffffffU}) {
     for (const int count : {0, 1, 10, 1000, 100'000}) {
-      buckets.reset_slices(duration, bands);
-      EXPECT_EQ(buckets.size(), 0U);
+      slices.reset(duration, bands);
+      EXPECT_EQ(slices.size(), 0U);
       std::vector<Event> expected;
       std::array<std::vector<Event>, bands> added;
       std::uniform_int_distribution<std::uint32_t> time(0, duration);
@@ -122,14 +123,14 @@ TEST(EventBuckets, OfTimeSlicesAreSortedByAnyNumberOfThreads) {
         added.at(static_cast<std::size_t>(band)).push_back(expected.back());
       }
       for (int band = 0; band < bands; ++band)
-        buckets.add_slices(band, added.at(static_cast<std::size_t>(band)));
-      ASSERT_EQ(buckets.size(), expected.size());
+        slices.add(band, added.at(static_cast<std::size_t>(band)));
+      ASSERT_EQ(slices.size(), expected.size());
       std::ranges::sort(expected, {},
                         [](const Event& event) { return std::tuple(event.t, event.y(), event.x); });
       for (const int max_threads : {1, 2, 0}) {
         threads.set_threads(max_threads);
         std::vector<Event> events(expected.size());
-        buckets.write_to(events.data(), threads);
+        slices.write_to(events.data(), threads);
         EXPECT_TRUE(events == expected) << count << " in " << duration << ", " << max_threads;
       }
     }

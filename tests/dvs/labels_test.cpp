@@ -7,7 +7,6 @@
 #include <numeric>
 #include <vector>
 
-#include "src/dvs/dvs_simulator.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/dvs/playback.hpp"
 #include "tests/simulate/scene.hpp"
@@ -36,28 +35,6 @@ Image<std::uint8_t> moving(int width, int height, int i) {
   return scene::texture<std::uint8_t>(width, height, 8, 2.3 * i, 1.1 * i);
 }
 
-/// Every stage but noise, leak and pulses.
-DvsSettings without_noise() {
-  auto settings = everything();
-  settings.leak_rate = settings.shot_noise_rate = settings.hot_pixels = 0;
-  settings.exposure_pulse = 0;
-  return settings;
-}
-
-TEST(Labels, AreAllLightWithoutNoise) {
-  auto along_motion = without_noise();
-  along_motion.upsampling = Upsampling::motion;
-  for (const auto& settings :
-       {without_noise(), along_motion, settings_of(DvsPreset::ideal),
-        DvsSettings{.cutoff_frequency = 50}, DvsSettings{.adaptation = 0.4}}) {
-    Playback playback({60, 40, 8}, settings, labelled);
-    for (int i = 0; i < 6; ++i) playback.push(moving(60, 40, i), 8, i * 40'000'000LL);
-    const Counts counts(playback.events);
-    EXPECT_GT(counts.all(), 1000);
-    EXPECT_EQ(counts[Cause::light], counts.all());
-  }
-}
-
 TEST(Labels, AreNeverLightWhereLightIsConstant) {
   auto slow = everything();
   slow.max_rate = 1e5;
@@ -77,12 +54,7 @@ TEST(Labels, AreNeverLightWhereLightIsConstant) {
   }
 }
 
-/// Expects a number of events within three standard errors, of which each event has a standard
-/// deviation of 1 at most.
-void expect_count(double found, double expected, double deviation) {
-  EXPECT_NEAR(found, expected, 3 * deviation);
-}
-
+// Within three standard errors.
 TEST(Labels, MeetTheRatesThatAreSet) {
   constexpr int pixels = 100 * 90;
   constexpr double seconds = 10;
@@ -93,98 +65,30 @@ TEST(Labels, MeetTheRatesThatAreSet) {
   };
   // A pixel's leak fires at regular times, of which one more or less lies in the recording.
   const auto leak = counts_with({.threshold_sigma = 0.03, .leak_rate = 5});
-  expect_count(leak[Cause::leak], 5 * pixels * seconds, std::sqrt(pixels / 4.0));
+  EXPECT_NEAR(leak[Cause::leak], 5 * pixels * seconds, 3 * std::sqrt(pixels / 4.0));
   EXPECT_EQ(leak[Cause::leak], leak.all());
 
   const auto noise = counts_with({.threshold_sigma = 0.03, .shot_noise_rate = 6});
   const double noise_rate = 6 * (1 - 0.75 * 20 / 275);
   const double expected_noise = noise_rate * pixels * seconds;
-  expect_count(noise[Cause::shot_noise], expected_noise, std::sqrt(expected_noise));
+  EXPECT_NEAR(noise[Cause::shot_noise], expected_noise, 3 * std::sqrt(expected_noise));
   EXPECT_EQ(noise[Cause::shot_noise], noise.all());
 
   // Log-uniform between 10 and 1000 Hz.
   const auto hot = counts_with({.hot_pixels = 0.02});
   const double hot_rate = 0.02 * 990 / std::log(100);
   const double squared_rate = 0.02 * (1e6 - 100) / (2 * std::log(100));
-  expect_count(hot[Cause::hot_pixel], hot_rate * pixels * seconds,
-               std::sqrt((squared_rate - hot_rate * hot_rate) * pixels) * seconds);
+  EXPECT_NEAR(hot[Cause::hot_pixel], hot_rate * pixels * seconds,
+              3 * std::sqrt((squared_rate - hot_rate * hot_rate) * pixels) * seconds);
   EXPECT_EQ(hot[Cause::hot_pixel], hot.all());
 
   // Noise resets a pixel, so its leak fires only if there is none for 1/5 of a second.
   const auto both = counts_with({.leak_rate = 5, .shot_noise_rate = 6});
-  expect_count(both[Cause::shot_noise], expected_noise, std::sqrt(expected_noise));
+  EXPECT_NEAR(both[Cause::shot_noise], expected_noise, 3 * std::sqrt(expected_noise));
   const double undisturbed = std::exp(-noise_rate / 5);
   const double expected_leak = noise_rate * undisturbed / (1 - undisturbed) * pixels * seconds;
-  expect_count(both[Cause::leak], expected_leak, std::sqrt(expected_leak));
+  EXPECT_NEAR(both[Cause::leak], expected_leak, 3 * std::sqrt(expected_leak));
   EXPECT_EQ(both[Cause::leak] + both[Cause::shot_noise], both.all());
-}
-
-TEST(Labels, CountShotNoiseWhileLightChanges) {
-  constexpr double rate = 40;
-  Playback playback({90, 70, 8}, DvsSettings{.cutoff_frequency = 80, .shot_noise_rate = rate},
-                    labelled);
-  double expected = 0;
-  for (int i = 0; i < 25; ++i) {
-    const auto frame = moving(90, 70, i);
-    playback.push(frame, 8, i * 40'000'000LL);
-    if (i == 0) continue;
-    for (int y = 0; y < 70; ++y)
-      for (int x = 0; x < 90; ++x)
-        expected += 0.04 * rate * (1 - 0.75 * (frame.at(x, y) + 20) / 275.0);
-  }
-  const Counts counts(playback.events);
-  expect_count(counts[Cause::shot_noise], expected, std::sqrt(expected));
-  EXPECT_GT(counts[Cause::light], 50'000);
-  EXPECT_EQ(counts[Cause::light] + counts[Cause::shot_noise], counts.all());
-}
-
-TEST(Labels, TellAPulse) {
-  // In each of three pulses, a pixel passes 0.2 and 0.4 going up, and 0.1 going down.
-  Playback playback({9, 3, 8},
-                    {.negative_threshold = 0.3, .exposure_pulse = 0.45, .exposure_lead = 7'000'000},
-                    labelled);
-  stand(playback, flat(9, 3, 90), 1, 40'000'000);
-  const Counts counts(playback.events);
-  EXPECT_EQ(counts[Cause::exposure_pulse], 9 * 3 * 3);
-  EXPECT_EQ(counts[Cause::exposure_pulse], counts.all());
-}
-
-TEST(Labels, TellLightFromTheLeakBeforeAndAfterIt) {
-  // Light rises by nine thresholds, when the leak has come to half of one in the mean, then stands.
-  for (const auto reset : {RefractoryReset::level, RefractoryReset::signal}) {
-    Playback playback({90, 30, 8},
-                      {.leak_rate = 10, .refractory_period = 3'000'000, .refractory_reset = reset},
-                      labelled);
-    playback.push(flat(90, 30, 40), 8, 0);
-    playback.push(flat(90, 30, 240), 8, 20'000'000);
-    playback.push(flat(90, 30, 240), 8, 500'000'000);
-    for (const auto& event : playback.events)
-      EXPECT_EQ(event.cause, event.t <= 20'000 ? Cause::light : Cause::leak) << event.t;
-    EXPECT_GT(Counts(playback.events)[Cause::leak], 4 * 2700);
-  }
-}
-
-TEST(Labels, KeepTheCauseOfAThresholdThatFalls) {
-  // Light rises by 2.5 thresholds and stands. The first event doubles the threshold, which is met
-  // once it has fallen to 1.5 times its value.
-  DvsSettings settings{
-      .response = Response::linear, .adaptation = 1, .adaptation_time = 1'000'000'000};
-  Playback playback({9, 3, 16}, settings, labelled);
-  const auto grey = [](double thresholds) {
-    const double luma = thresholds * 0.2 / std::log(255);
-    return scene::flat<std::uint16_t>(9, 3, static_cast<int>(65535 * luma));
-  };
-  playback.push(grey(5), 16, 0);
-  settings.leak_rate = 0.01;  // has not begun before
-  playback.set(settings);
-  playback.push(grey(7.5), 16, 40'000'000);
-  playback.push(grey(7.5), 16, 2'000'000'000);
-  for (const auto& [place, events] : by_pixel(playback.events)) {
-    ASSERT_EQ(events.size(), 2U);
-    EXPECT_LT(events[0].t, 40'000);
-    EXPECT_GT(events[1].t, 400'000);
-    EXPECT_EQ(events[1].cause, Cause::light);
-  }
 }
 
 /// A short video with labels, and the same without.

@@ -16,6 +16,11 @@ namespace {
 
 using namespace eventcamera;
 
+struct Case {
+  int width, height;
+  float max_length;
+};
+
 /// Smooth flow of up to about `max_length` pixels, with a few pixels that move elsewhere.
 Image<Flow> flow_of(int width, int height, float max_length) {
   Image<Flow> flow(width, height);
@@ -54,10 +59,6 @@ void move_rows(const Warp<Pixel>& warp, const Image<Flow>& flow, const Check& ch
 }
 
 TEST(MovingLight, IsItsDefinitionOnAllTargets) {
-  struct Case {
-    int width, height;
-    float max_length;
-  };
   for (const Case& size : {Case{1, 1, 1}, Case{3, 5, 2}, Case{17, 9, 40}, Case{61, 33, 0.4F},
                            Case{90, 40, 6}, Case{130, 20, 30}}) {
     const int width = size.width;
@@ -94,10 +95,6 @@ TEST(MovingLight, KeepsTheDepthOfDeepFrames) {
 
 TEST(MotionTiles, HaveTheirStepsOfTheReference) {
   constexpr int max_steps = 20;
-  struct Case {
-    int width, height;
-    float max_length;
-  };
   for (const Case& size :
        {Case{1, 1, 1}, Case{70, 45, 0.01F}, Case{131, 45, 7}, Case{90, 37, 40}}) {
     const auto flow = flow_of(size.width, size.height, size.max_length);

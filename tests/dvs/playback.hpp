@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <utility>
@@ -23,6 +25,25 @@ inline Pixels by_pixel(const std::vector<TimedEvent>& events) {
   Pixels pixels;
   for (const auto& event : events) pixels[{event.x, event.y}].push_back(event);
   return pixels;
+}
+
+/// Expects the same number of events, up to a fraction `tolerance` (or one event), and a fraction
+/// of at least `equal_share` with the expected polarity and cause and a time that differs by at
+/// most `precision` microseconds.
+inline void expect_near(const std::vector<TimedEvent>& found,
+                        const std::vector<TimedEvent>& expected, double tolerance,
+                        double equal_share, double precision) {
+  const auto count = static_cast<double>(expected.size());
+  EXPECT_NEAR(static_cast<double>(found.size()), count, std::max(1.0, tolerance * count));
+  auto found_pixels = by_pixel(found);
+  double equal = 0;
+  for (const auto& [place, events] : by_pixel(expected)) {
+    const auto& ours = found_pixels[place];
+    for (std::size_t i = 0; i < std::min(events.size(), ours.size()); ++i)
+      equal += ours[i].polarity == events[i].polarity && ours[i].cause == events[i].cause &&
+               std::abs(ours[i].t - events[i].t) <= precision;
+  }
+  EXPECT_GT(equal, equal_share * count);
 }
 
 /// Pushes frames to a simulator and collects its events.
@@ -53,7 +74,6 @@ class Playback {
 
   void set(const DvsSettings& settings) { simulator_->set(settings); }
   void set_labels(bool are_made) { common_.labels = are_made; }
-  DvsSimulator& simulator() { return *simulator_; }
 
   std::vector<TimedEvent> events;
 

@@ -170,14 +170,14 @@ Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
         {Candidates::refractory_left, pixels.refractory_left[x]}};
     for (const auto& [column, value] : values) candidates.column(column)[i] = value;
   }
-  EventBuckets buckets;
   IntervalEvents events(width, 1);
-  events.begin(sub_interval.duration, 0, buckets);
+  events.begin(sub_interval.duration, 0);
   row.events.begin(events, 0);
   solve(row);
   row.events.end();
   Solved result;
-  for (const auto& event : scene::copy(buckets)) {
+  StepBuckets read;
+  for (const auto& event : scene::copy(events.end(read, threads))) {
     const int x = without_cause(event).x;
     result.events[{x, 0}].push_back(
         {static_cast<double>(event.t), x, 0, event.polarity(), cause_of(event)});

@@ -83,10 +83,10 @@ TEST_P(EveryApi, InterpolatesAlongAFlowBitForBit) {
           const StepTimes steps(scene::frame_time, count);
           list.begin(steps);
           kernel.run(frames[0], frames[1], flows, interpolation, thresholds, list);
-          EventBuckets made;
+          StepBuckets made;
           list.sort();
           list.read(made);
-          EventBuckets expected;
+          StepBuckets expected;
           InterpolationKernel reference;
           reference.fire(
               InterpolatedInterval<std::uint8_t>{

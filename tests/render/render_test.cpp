@@ -62,11 +62,11 @@ TEST(Accumulator, BeginsAnewAfterDrawing) {
 }
 
 /// Random events in buckets by step and band; a fraction `share` of the pixels fires per step.
-EventBuckets events_by_chance(int width, int height, double share) {
+StepBuckets events_by_chance(int width, int height, double share) {
   std::minstd_rand random(static_cast<unsigned>(width));
   std::bernoulli_distribution fires(share);
   std::bernoulli_distribution is_on(0.5);
-  EventBuckets buckets;
+  StepBuckets buckets;
   buckets.reset(3, 2);
   for (int step = 1; step <= 3; ++step)
     for (int y = 0; y < height; ++y)
@@ -129,7 +129,7 @@ void expect_pictures_as_drawn_plainly() {
         ASSERT_EQ(out, plainly_drawn(events, width, height, stride, colours, layout))
             << width << " pixels of " << layout.bytes << " bytes, share " << share;
         accumulator.draw(colours, layout, out.data(), stride, threads);
-        ASSERT_EQ(out, plainly_drawn({}, width, height, stride, colours, layout))
+        ASSERT_EQ(out, plainly_drawn(StepBuckets(), width, height, stride, colours, layout))
             << "the second of " << width << " pixels of " << layout.bytes << " bytes";
       }
     }
@@ -139,7 +139,7 @@ void expect_pictures_as_drawn_plainly() {
 TEST(Accumulator, DrawsTheSameWithAnyNumberOfThreads) {
   constexpr int width = 70;
   constexpr int height = 5 * rows_per_band + 3;
-  EventBuckets events;
+  StepBuckets events;
   events.reset(3, band_count(height));
   for (int step = 1; step <= 3; ++step)
     for (int y = 0; y < height; ++y)

@@ -125,7 +125,7 @@ int allocations_of_interpolation(int bits, Interpolation interpolation) {
   ThreadPool pool;
   pool.set_threads(threads);
   InterpolationKernel kernel;
-  EventBuckets events;
+  StepBuckets events;
   return allocations_in_steady_state([&](int i) {
     const auto& last = frames[static_cast<std::size_t>(i)];
     const auto& now = frames[static_cast<std::size_t>((i + 1) % frames_a_round)];
