@@ -18,12 +18,12 @@ GstFlowReturn EventReader::chain(GstBuffer* buffer) {
   const OwnedBuffer owner(buffer);
   if (is_timed() && GST_BUFFER_IS_DISCONT(buffer)) {
     const GstFlowReturn drained = drain();
-    if (drained != GST_FLOW_OK) return drained;
     if (recording_) recording_->interrupt();
     for (auto& pad : pads_) {
       pad->interrupt();
       pad->need_segment(false);
     }
+    if (drained != GST_FLOW_OK) return drained;
   }
   if (flow_ != GST_FLOW_OK) return flow_;
   flow_ = guard([&] { return handle_buffer(buffer); });
