@@ -13,7 +13,7 @@ struct Corruption {
   std::string first;           ///< description of the first, for users
   std::uint64_t last_at = 0;   ///< byte offset of the last that was found
   std::uint64_t outside = 0;   ///< events outside the sensor, dropped
-  std::uint64_t skipped = 0;   ///< what is valid, but no change of a pixel, such as exposures
+  std::uint64_t skipped = 0;   ///< valid items that are no pixel events, such as exposures
 
   /// Records one more place.
   void note(std::uint64_t at, const char* what) {

@@ -15,7 +15,7 @@
 
 namespace eventcamera {
 
-/// Columns of a table of events: those of every event, and those of its label.
+/// Columns of a table of events: of the event, and of its label.
 enum class EventColumn : std::uint8_t { t, x, y, p, cause, object_class };
 
 constexpr std::size_t event_columns = 4;  ///< without labels

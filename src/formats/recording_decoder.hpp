@@ -34,7 +34,7 @@ struct StreamInfo {
   bool labelled = false;  ///< its events carry labels
 };
 
-/// Pixel format of a frame; the values are those of AEDAT4.
+/// Pixel format of a frame, with AEDAT4's values.
 enum class PixelFormat : std::uint8_t { grey8 = 0, grey16 = 2, bgr = 16, bgra = 24 };
 
 constexpr int bytes_per_pixel(PixelFormat format) {
@@ -149,7 +149,7 @@ class RecordingDecoder {
     return std::nullopt;
   }
 
-  /// Position of what is read next, if the file states where streams end.
+  /// Position of the next read, if the file states where streams end.
   virtual std::uint64_t position() const { return 0; }
 
   /// False if the next items may belong to further streams.

@@ -184,7 +184,7 @@ void RecordingReader::show(std::size_t index) {
   start_chunker(index);
 }
 
-/// Chunks begin at the start of the segment, except that those of words, and of the stream that
+/// Chunks begin at the start of the segment, except that chunks of words, and of the stream that
 /// defines the origin, begin at the first event.
 void RecordingReader::start_chunker(std::size_t index) {
   const bool from_first_event =

@@ -31,7 +31,7 @@ class RecordingReader {
  public:
   using MakeDecoder = RecordingInput::MakeDecoder;
 
-  /// Source of output times: the file's own times, or those of the buffers that carry encoded
+  /// Source of output times: the file's own times, or the PTS of the buffers that carry encoded
   /// words.
   enum class Clock : std::uint8_t { file, stream };
 
@@ -140,7 +140,7 @@ class RecordingReader {
 
   std::string format_name() const { return input_.decoder().format_name(); }
 
-  /// What the file has and is not read; see RecordingDecoder.
+  /// Content that was ignored; see RecordingDecoder.
   std::string left_out() const { return input_.decoder().left_out(); }
 
   /// True if no events and frames were found before the Start.
@@ -164,7 +164,7 @@ class RecordingReader {
     std::uint64_t imu_samples = 0;
     std::uint64_t corrupt_places = 0;
     std::uint64_t outside = 0;  ///< events outside the sensor
-    std::uint64_t skipped = 0;  ///< what is no change of a pixel
+    std::uint64_t skipped = 0;  ///< valid items that are no pixel events
     std::uint64_t late = 0;     ///< events and frames of an interval already returned
     std::uint64_t stray = 0;    ///< events and frames with an erroneous time
   };
@@ -217,7 +217,7 @@ class RecordingReader {
   bool duration_is_exact_ = false;
 
   std::optional<Interval> interval_;   ///< interval of the words being read
-  std::optional<Microseconds> shift_;  ///< offset from the clock of words to that of the stream
+  std::optional<Microseconds> shift_;  ///< offset from the words' clock to stream time
   std::vector<AbsoluteEvent> within_;  ///< events within a size not stated in the file
   std::optional<Output> output_due_;   ///< a frame or a chunk
   WaitingItems<Trigger> triggers_;     ///< with times of the file

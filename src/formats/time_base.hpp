@@ -7,7 +7,7 @@
 
 namespace eventcamera {
 
-/// Unwraps a counter of `bits` bits in units of 2^`shift` microseconds: that of TIME_HIGH words.
+/// Unwraps a counter of `bits` bits in units of 2^`shift` microseconds, as in TIME_HIGH words.
 ///
 /// Counts rise in small steps, in which they may wrap. Any other count is a leap, after a pause or
 /// a flipped bit, and wraps only if it is of 12 bits and falls by half of its range or more, as in

@@ -20,7 +20,7 @@ class Batch {
  public:
   /// Maximum number of events in one unit.
   static constexpr std::size_t events_per_unit = 32;
-  /// Maximum number of events per byte, that of EVT3 vectors.
+  /// Maximum number of events per byte; EVT3 vectors reach it.
   static constexpr std::size_t events_per_byte = 6;
 
   explicit Batch(Corruption& corruption) : corruption_(corruption) {}

@@ -93,6 +93,40 @@ TEST_P(EveryWord, FollowsACameraThatStartsAgain) {
   }
 }
 
+/// The camera starts again although downstream refused the events before.
+TEST_P(EveryWord, FollowsADiscontinuityAfterAnError) {
+  Writer before("evtenc", caps);
+  Writer after("evtenc", caps);
+  Reader reader("evtdec", caps);
+  const auto push = [&](Writer& writer, Microseconds clock, GstClockTime pts, bool is_discont) {
+    // In rows that differ, because EVT3 states a row only where it changes.
+    const int row = clock % 20'000 == 0 ? 4 : 5;
+    writer.write(AbsoluteEvent::at(3, row, clock + 5, Polarity::on), clock);
+    GstBuffer* const words = writer.pull().release();
+    GST_BUFFER_PTS(words) = pts;
+    if (is_discont) GST_BUFFER_FLAG_SET(words, GST_BUFFER_FLAG_DISCONT);
+    return gst_harness_push(reader.get(), words);
+  };
+  EXPECT_EQ(push(before, 9'000'000, 10 * GST_MSECOND, false), GST_FLOW_OK);
+  const auto refuse = [](GstPad*, GstPadProbeInfo* info, gpointer) {
+    gst_buffer_unref(GST_PAD_PROBE_INFO_BUFFER(info));
+    info->data = nullptr;
+    GST_PAD_PROBE_INFO_FLOW_RETURN(info) = GST_FLOW_ERROR;
+    return GST_PAD_PROBE_HANDLED;
+  };
+  const auto probe =
+      gst_pad_add_probe(reader.get()->sinkpad, GST_PAD_PROBE_TYPE_BUFFER, refuse, nullptr, nullptr);
+  EXPECT_EQ(push(before, 9'010'000, 20 * GST_MSECOND, false), GST_FLOW_ERROR);
+  gst_pad_remove_probe(reader.get()->sinkpad, probe);
+  EXPECT_EQ(push(after, 2'000'000, 30 * GST_MSECOND, true),
+            GST_FLOW_ERROR);  // the error of the last buffer
+  EXPECT_EQ(push(after, 2'010'000, 40 * GST_MSECOND, false), GST_FLOW_OK);
+  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  EXPECT_EQ(pull_events(reader), (Events{AbsoluteEvent::at(3, 4, 10'000, Polarity::on),
+                                         AbsoluteEvent::at(3, 5, 40'000, Polarity::on)}));
+  EXPECT_EQ(reader.warning(), "");
+}
+
 /// As of evtparse, which corrects its times so.
 TEST_P(EveryWord, ContinuesInANewSegment) {
   Writer writer("evtenc", caps);

@@ -2,6 +2,7 @@
 // Event files of every format are read as they were written, however they come.
 #include <gst/base/gsttypefindhelper.h>
 
+#include <stdexcept>
 #include <tuple>
 
 #include "tests/elements/event_files.hpp"
@@ -189,6 +190,22 @@ TEST_P(EveryFormat, IsFreedWhileInUse) {
     }
     EXPECT_TRUE(freed);
   }
+}
+
+/// Subtitles and letters have the extensions of text files, too.
+TEST(Typefinders, DoNotKnowTextByItsExtension) {
+  gst_init(nullptr, nullptr);
+  const auto has_extensions = [](const char* typefinder) {
+    GstPluginFeature* const feature =
+        gst_registry_find_feature(gst_registry_get(), typefinder, GST_TYPE_TYPE_FIND_FACTORY);
+    if (feature == nullptr) throw std::runtime_error(typefinder);
+    const bool has =
+        gst_type_find_factory_get_extensions(GST_TYPE_FIND_FACTORY(feature)) != nullptr;
+    gst_object_unref(feature);
+    return has;
+  };
+  EXPECT_TRUE(has_extensions("application/x-npy"));
+  EXPECT_FALSE(has_extensions("application/x-event-csv"));
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ void EventReader::reset() {
   flow_ = GST_FLOW_OK;
   warn_of_corruption_.reset();
   warn_of_assumption_.reset();
-  posted_left_out_.clear();
+  posted_skipped_.clear();
   dropped_level_.reset();
   for (auto& pad : pads_) {
     pad->reset();
@@ -124,7 +124,7 @@ void wait_until_added(GstElement* element) {
   for (int i = 0; i < max_milliseconds && gst_element_is_locked_state(element); ++i) g_usleep(1000);
 }
 
-/// Within decodebin, eventrender took the events, and the application wanted something else.
+/// decodebin plugs eventrender unless its caps ask for events: the message says how.
 Report not_linked() {
   return {GST_STREAM_ERROR_FAILED,
           "Nothing is linked downstream. decodebin draws events as video; for the events "

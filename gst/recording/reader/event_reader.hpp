@@ -104,16 +104,16 @@ class EventReader {
   bool is_timed() { return shared_.lock()->is_timed; }
 
   GstFlowReturn pull();
-  GstFlowReturn take_buffer(GstBuffer* buffer);
-  GstFlowReturn take_interval_end(eventcamera::Microseconds end);
-  gboolean take_caps(GstEvent* event);
-  gboolean take_segment(GstEvent* event);
-  void take_gap(GstEvent* event);
-  void take_end();
+  GstFlowReturn handle_buffer(GstBuffer* buffer);
+  GstFlowReturn handle_interval_end(eventcamera::Microseconds end);
+  gboolean handle_caps(GstEvent* event);
+  gboolean handle_segment(GstEvent* event);
+  void handle_gap(GstEvent* event);
+  void finish_input();
   GstFlowReturn drain();
 
   GstFlowReturn step();
-  GstFlowReturn hand_out();
+  GstFlowReturn push_pending();
   GstFlowReturn push(const eventcamera::RecordingReader::Start& start);
   GstFlowReturn push(const eventcamera::RecordingReader::Chunk& chunk);
   GstFlowReturn push(const eventcamera::RecordingReader::TimedFrame& item);
@@ -128,21 +128,21 @@ class EventReader {
   void start_streams();
   bool find_size(std::size_t stream);
   bool send_caps(std::size_t stream);
-  GstFlowReturn refused_size(std::size_t stream);
+  GstFlowReturn handle_refused_size(std::size_t stream);
   void send_segment(ReaderPad& pad);
   void interrupt_output();
-  void post_of_seek(GstMessage* message);
-  void tell_segment_start();
+  void post_with_seqnum(GstMessage* message);
+  void post_segment_start();
   void end_output(bool failed);
   gboolean forward(GstEvent* event);
   void push_to_pads(GstEvent* event);
 
-  void note_progress();
+  void update_progress();
   void log_dropped(guint64 outside, guint64 late, guint64 stray, GstClockTime position);
-  void learn_duration();
+  void update_duration();
   GstClockTime duration();
-  void post_left_out();
-  void warn_of_nothing();
+  void post_skipped();
+  void warn_if_empty();
   void warn_of_dropped();
 
   bool can_seek();
@@ -168,7 +168,7 @@ class EventReader {
   guint64 corrupt_places_ = 0;        ///< already signalled by DISCONT and a warning
   WarnOnce warn_of_corruption_{event_reader_debug};
   WarnOnce warn_of_assumption_{event_reader_debug};
-  std::string posted_left_out_;  ///< that of the last message
+  std::string posted_skipped_;  ///< topics in the last message
   RepeatLevel dropped_level_;
 
   std::vector<std::unique_ptr<ReaderPad>> pads_;
@@ -185,12 +185,13 @@ class EventReader {
 /// The reader of an element.
 EventReader& event_reader_of(GstObject* element);
 
-/// Waits while decodebin adds the element, which it shows by a locked state: it would drop errors,
-/// and then wait for the element's pads forever. Gives up after a second, since an application may
-/// lock the state for longer.
+/// Waits while decodebin adds the element, up to a second. connect_pad() in upstream's
+/// gstdecodebin2.c and gstparsebin.c locks the state of a new element and filters its errors
+/// (add_error_filter) until its state change to PAUSED has returned, but the streaming thread in
+/// pull mode runs before that: an error posted then is lost, and decodebin waits for pads forever.
 void wait_until_added(GstElement* element);
 
-/// Report of source pads that no element is linked to.
+/// Report for source pads that are not linked.
 Report not_linked();
 
 /// Runs `work`; reports any exception. If the cause is a failed pull, returns its flow instead.

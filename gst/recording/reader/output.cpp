@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-/// Output: streams, their pads, and what is pushed from them.
+/// Output: streams, their pads, and the data pushed from them.
 #include <algorithm>
 #include <utility>
 
@@ -17,20 +17,20 @@ using eventcamera::StreamKind;
 GstFlowReturn EventReader::step() {
   const auto output = recording_->next();
   if (bytes_ && bytes_->failed()) return bytes_->flow();
-  note_progress();
+  update_progress();
   if (!output) return nothing_ready;
   return std::visit([this](const auto& item) { return push(item); }, *output);
 }
 
 /// New streams are known.
 GstFlowReturn EventReader::push(const RecordingReader::Start& /*start*/) {
-  learn_duration();
+  update_duration();
   GST_DEBUG_OBJECT(element_,
                    "%" G_GSIZE_FORMAT " streams, origin %" GST_TIME_FORMAT
                    ", duration %" GST_TIME_FORMAT,
                    recording_->streams().size(), GST_TIME_ARGS(nanoseconds(recording_->origin())),
                    GST_TIME_ARGS(duration()));
-  post_left_out();
+  post_skipped();
   return begin_output();
 }
 
@@ -38,7 +38,7 @@ GstFlowReturn EventReader::push(const RecordingReader::Chunk& chunk) {
   if (output_due_)
     if (const GstFlowReturn begun = begin_output(); begun != GST_FLOW_OK) return begun;
   auto& pad = *pad_of_stream_.at(chunk.stream);
-  if (!send_caps(chunk.stream)) return refused_size(chunk.stream);
+  if (!send_caps(chunk.stream)) return handle_refused_size(chunk.stream);
   const GstClockTime pts = nanoseconds(recording_->origin()) + nanoseconds(chunk.start);
   const GstClockTime duration = nanoseconds(chunk.duration);
   GST_LOG_OBJECT(pad.get(),
@@ -242,7 +242,7 @@ bool EventReader::send_caps(std::size_t index) {
 }
 
 /// Handles downstream's refusal of a sensor size that has grown.
-GstFlowReturn EventReader::refused_size(std::size_t index) {
+GstFlowReturn EventReader::handle_refused_size(std::size_t index) {
   const GstFlowReturn refusal = pad_of(index).refusal();
   if (refusal == GST_FLOW_FLUSHING) return refusal;
   const auto text = in_pixels(recording_->streams()[index].info.size);
@@ -275,19 +275,19 @@ void EventReader::interrupt_output() {
   output_due_ = true;
 }
 
-/// Posts a message of the seek that output follows.
-void EventReader::post_of_seek(GstMessage* message) {
+/// Posts a message with the seqnum of the current seek.
+void EventReader::post_with_seqnum(GstMessage* message) {
   if (seqnum_ != GST_SEQNUM_INVALID) gst_message_set_seqnum(message, seqnum_);
   gst_element_post_message(element_, message);
 }
 
 /// Posts SEGMENT_START if a segment seek was requested: a bin posts SEGMENT_DONE once all elements
 /// that posted this have ended.
-void EventReader::tell_segment_start() {
+void EventReader::post_segment_start() {
   const auto segment = shared_.lock()->segment;
   if ((segment.flags & GST_SEGMENT_FLAG_SEGMENT) != 0)
-    post_of_seek(gst_message_new_segment_start(GST_OBJECT(element_), GST_FORMAT_TIME,
-                                               static_cast<gint64>(segment.position)));
+    post_with_seqnum(gst_message_new_segment_start(GST_OBJECT(element_), GST_FORMAT_TIME,
+                                                   static_cast<gint64>(segment.position)));
 }
 
 /// Ends the streams with EOS, or the segment with SEGMENT_DONE if a segment seek was requested.
@@ -299,7 +299,7 @@ void EventReader::end_output(bool failed) {
   }
   const auto position =
       static_cast<gint64>(GST_CLOCK_TIME_IS_VALID(segment.stop) ? segment.stop : segment.position);
-  post_of_seek(gst_message_new_segment_done(GST_OBJECT(element_), GST_FORMAT_TIME, position));
+  post_with_seqnum(gst_message_new_segment_done(GST_OBJECT(element_), GST_FORMAT_TIME, position));
   push_to_pads(with_seqnum(gst_event_new_segment_done(GST_FORMAT_TIME, position), seqnum_));
 }
 

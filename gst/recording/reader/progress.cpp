@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-/// What applications may ask: position, duration, counts; and warnings.
+/// Queries, statistics and warnings.
 #include <algorithm>
 #include <utility>
 
@@ -19,7 +19,7 @@ void EventReader::log_dropped(guint64 outside, guint64 late, guint64 stray, GstC
 }
 
 /// Updates position and counts, and reports new corruption.
-void EventReader::note_progress() {
+void EventReader::update_progress() {
   const auto counts = recording_->counts();
   const auto position = nanoseconds(recording_->position());
   auto before = counts;
@@ -61,19 +61,19 @@ GstStructure* EventReader::stats() {
   return stats;
 }
 
-/// Posts what another setting would read.
-void EventReader::post_left_out() {
-  const auto left_out = recording_->left_out();
-  if (left_out.empty() || left_out == posted_left_out_) return;
-  posted_left_out_ = left_out;
+/// Posts an info message listing the skipped topics.
+void EventReader::post_skipped() {
+  const auto skipped = recording_->left_out();
+  if (skipped.empty() || skipped == posted_skipped_) return;
+  posted_skipped_ = skipped;
   post_message(element_, GST_MESSAGE_INFO,
                {GST_STREAM_ERROR_DEMUX,
-                "The file also has " + left_out + ", which are not read. Set topics to read them."},
+                "The file also has " + skipped + ", which are not read. Set topics to read them."},
                recording_->format_name());
 }
 
 /// Posts a warning at the end of a file without events and frames.
-void EventReader::warn_of_nothing() {
+void EventReader::warn_if_empty() {
   if (!recording_->is_empty() || is_timed()) return;
   post_message(element_, GST_MESSAGE_WARNING, {GST_STREAM_ERROR_DECODE, "The file has no events."},
                recording_->format_name());
@@ -101,7 +101,7 @@ void EventReader::warn_of_dropped() {
                text_of(counts.late) + " late, " + text_of(counts.stray) + " at stray times");
 }
 
-void EventReader::learn_duration() {
+void EventReader::update_duration() {
   const auto length = recording_->duration();
   if (!length) return;
   const auto duration = nanoseconds(*length);
@@ -115,8 +115,8 @@ void EventReader::learn_duration() {
     gst_element_post_message(element_, gst_message_new_duration_changed(GST_OBJECT(element_)));
 }
 
-/// In push mode the duration is extrapolated from the bytes received so far. Once all are, the
-/// position says nothing: formats that are read as a whole have hardly begun.
+/// In push mode, extrapolates the duration from the bytes received so far. None once all bytes are
+/// received: formats that are decoded as a whole have output little by then.
 GstClockTime EventReader::duration() {
   guint64 pushed = 0;
   GstClockTime position = 0;

@@ -48,9 +48,9 @@ GstFlowReturn EventReader::pull() {
   if (result != nothing_ready) return result;
   result = output_due_ ? begin_output() : GST_FLOW_OK;
   if (recording_->at_end()) {
-    warn_of_nothing();
+    warn_if_empty();
     warn_of_dropped();
-    learn_duration();
+    update_duration();
   }
   return result == GST_FLOW_OK ? GST_FLOW_EOS : result;
 }

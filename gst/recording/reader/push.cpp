@@ -18,20 +18,22 @@ GstFlowReturn EventReader::chain(GstBuffer* buffer) {
   const OwnedBuffer owner(buffer);
   if (is_timed() && GST_BUFFER_IS_DISCONT(buffer)) {
     const GstFlowReturn drained = drain();
-    if (drained != GST_FLOW_OK) return drained;
     if (recording_) recording_->interrupt();
-    for (auto& pad : pads_) pad->interrupt();
-    for (auto& pad : pads_) pad->need_segment(false);
+    for (auto& pad : pads_) {
+      pad->interrupt();
+      pad->need_segment(false);
+    }
+    if (drained != GST_FLOW_OK) return drained;
   }
   if (flow_ != GST_FLOW_OK) return flow_;
-  flow_ = guard([&] { return take_buffer(buffer); });
+  flow_ = guard([&] { return handle_buffer(buffer); });
   if (flow_ == GST_FLOW_NOT_LINKED)  // upstream may have others to feed
     post_message(element_, GST_MESSAGE_WARNING, not_linked(), "all source pads are not linked");
   return flow_;
 }
 
 /// May throw.
-GstFlowReturn EventReader::take_buffer(GstBuffer* buffer) {
+GstFlowReturn EventReader::handle_buffer(GstBuffer* buffer) {
   const MappedBytes bytes(element_, OwnedBuffer(gst_buffer_ref(buffer)));
   if (!bytes.is_mapped()) return GST_FLOW_ERROR;
   if (!recording_) open_recording();
@@ -42,9 +44,9 @@ GstFlowReturn EventReader::take_buffer(GstBuffer* buffer) {
     interval = {static_cast<Microseconds>(GST_BUFFER_PTS(buffer) / GST_USECOND),
                 has_end ? static_cast<Microseconds>(GST_BUFFER_DURATION(buffer) / GST_USECOND) : 0};
   recording_->push(bytes.get(), interval);
-  GstFlowReturn result = hand_out();
+  GstFlowReturn result = push_pending();
   if (result == GST_FLOW_OK && interval && has_end)
-    result = take_interval_end(static_cast<Microseconds>(
+    result = handle_interval_end(static_cast<Microseconds>(
         (GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer)) / GST_USECOND));
   if (result != GST_FLOW_OK) {
     try {
@@ -58,13 +60,13 @@ GstFlowReturn EventReader::take_buffer(GstBuffer* buffer) {
 }
 
 /// Handles the end of an upstream interval: nothing earlier will follow. May throw.
-GstFlowReturn EventReader::take_interval_end(Microseconds end) {
+GstFlowReturn EventReader::handle_interval_end(Microseconds end) {
   recording_->reach(end);
-  return hand_out();
+  return push_pending();
 }
 
 /// Pushes all available output. May throw.
-GstFlowReturn EventReader::hand_out() {
+GstFlowReturn EventReader::push_pending() {
   GstFlowReturn result = GST_FLOW_OK;
   while (result == GST_FLOW_OK) result = step();
   if (result != nothing_ready) return result;
@@ -85,16 +87,16 @@ gboolean EventReader::sink_event(GstEvent* event) {
       output_due_ = true;
       return TRUE;
     case GST_EVENT_CAPS:
-      return take_caps(event);
+      return handle_caps(event);
     case GST_EVENT_SEGMENT:
-      return take_segment(event);
+      return handle_segment(event);
     case GST_EVENT_GAP:
-      take_gap(event);
+      handle_gap(event);
       return TRUE;
     case GST_EVENT_EOS:
       seqnum_ = gst_event_get_seqnum(event);
       gst_event_unref(event);
-      take_end();
+      finish_input();
       is_consuming_ = false;
       end_output(flow_ != GST_FLOW_OK && flow_ != GST_FLOW_EOS);
       return TRUE;
@@ -123,27 +125,27 @@ gboolean EventReader::forward(GstEvent* event) {
 
 /// Pushes all pending output before a discontinuity.
 GstFlowReturn EventReader::drain() {
-  if (is_consuming_) take_end();
+  if (is_consuming_) finish_input();
   if (recording_) recording_->begin_times();
   is_consuming_ = false;
   return std::exchange(flow_, GST_FLOW_OK);
 }
 
-void EventReader::take_end() {
+void EventReader::finish_input() {
   if (flow_ != GST_FLOW_OK) return;
   flow_ = guard([&] {
     if (!recording_) open_recording();
     recording_->finish();
-    GstFlowReturn result = hand_out();
+    GstFlowReturn result = push_pending();
     if (result == GST_FLOW_OK && output_due_) result = begin_output();
-    if (!is_timed()) learn_duration();
-    warn_of_nothing();
+    if (!is_timed()) update_duration();
+    warn_if_empty();
     warn_of_dropped();
     return result;
   });
 }
 
-gboolean EventReader::take_caps(GstEvent* event) {
+gboolean EventReader::handle_caps(GstEvent* event) {
   GstCaps* caps = nullptr;
   gst_event_parse_caps(event, &caps);
   const bool is_new = !caps_ || !gst_caps_is_equal(caps_.get(), caps);
@@ -163,7 +165,7 @@ bool EventReader::carries_words() const {
 }
 
 /// Takes ownership of `event`.
-gboolean EventReader::take_segment(GstEvent* event) {
+gboolean EventReader::handle_segment(GstEvent* event) {
   drain();
   if (!plays_forwards(element_, event, "read")) return FALSE;
   const GstSegment segment = segment_of(event);
@@ -208,7 +210,7 @@ gboolean EventReader::take_segment(GstEvent* event) {
     shared->counts = {};
   }
   seqnum_ = restart->seqnum;
-  tell_segment_start();
+  post_segment_start();
   corrupt_places_ = 0;
   return guard([&] {
            if (!recording_) open_recording();
@@ -219,7 +221,7 @@ gboolean EventReader::take_segment(GstEvent* event) {
 }
 
 /// Takes ownership of `event`.
-void EventReader::take_gap(GstEvent* event) {
+void EventReader::handle_gap(GstEvent* event) {
   GstClockTime pts = GST_CLOCK_TIME_NONE;
   GstClockTime duration = GST_CLOCK_TIME_NONE;
   gst_event_parse_gap(event, &pts, &duration);
@@ -228,8 +230,8 @@ void EventReader::take_gap(GstEvent* event) {
     flow_ = guard([&] {
       if (!recording_) open_recording();
       if (recording_->reach(static_cast<Microseconds>((pts + duration) / GST_USECOND)))
-        return hand_out();
-      GstFlowReturn result = hand_out();
+        return push_pending();
+      GstFlowReturn result = push_pending();
       if (result == GST_FLOW_OK && output_due_) result = begin_output();
       if (result == GST_FLOW_OK) push_to_pads(gst_event_ref(event));
       return result;

@@ -105,7 +105,7 @@ bool EventReader::seek_pulling(const SeekRequest& request) {
     if (recording_) recording_->seek(position_of(segment), stop_of(segment));
     return GST_FLOW_OK;
   });
-  if (result == GST_FLOW_OK) tell_segment_start();
+  if (result == GST_FLOW_OK) post_segment_start();
   if (shared_.lock()->is_pulling) gst_pad_start_task(sink_, loop, this, nullptr);
   GST_PAD_STREAM_UNLOCK(sink_);
   return result == GST_FLOW_OK;

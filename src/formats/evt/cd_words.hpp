@@ -32,7 +32,7 @@ struct CdWord {
   constexpr std::uint32_t x() const { return bits >> 11 & 0x7ff; }
   constexpr std::uint32_t y() const { return bits & 0x7ff; }
 
-  /// `time` is that of the last TIME_HIGH. The polarity is the lowest bit of the type.
+  /// `time`: the last TIME_HIGH. The polarity is the lowest bit of the type.
   constexpr AbsoluteEvent event(std::uint64_t time) const {
     return {static_cast<Microseconds>(time + time_low()), static_cast<std::uint16_t>(x()),
             static_cast<std::uint16_t>(y() | (type() & 1) << 15)};

@@ -39,7 +39,7 @@ std::string option(const std::string& format, const std::string& key) {
 EvtFormat format_of(const PropheseeHeader& header) {
   const auto format = header.value("format");
   const auto name = format.substr(0, format.find(';'));
-  // Older headers, and those of some other writers, have only the version.
+  // Older headers, and headers of some other writers, have only the version.
   const auto* const known = name.empty()
                                 ? std::ranges::find(names, header.value("evt"), &Name::version)
                                 : std::ranges::find(names, name, &Name::name);

@@ -16,7 +16,7 @@ using Kind = ScannedWord::Kind;
 /// Limit of a stretch, in bytes.
 constexpr std::ptrdiff_t max_stretch = std::ptrdiff_t{1} << 20;
 
-/// Range of the shortest clock, that of EVT3.
+/// Range of the shortest clock, EVT3's.
 constexpr Microseconds clock_range = Microseconds{1} << 24;
 
 /// Unwraps the counts of TIME_HIGH words.

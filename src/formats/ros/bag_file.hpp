@@ -69,7 +69,7 @@ class BagFile {
   /// Time of the last message, if the file states it.
   virtual std::optional<Microseconds> last_logged() const = 0;
 
-  /// Corruption of the file, to which decoders add that of its messages.
+  /// Corruption of the file, to which decoders add corrupt messages.
   Corruption& corruption() { return corruption_; }
 
  protected:

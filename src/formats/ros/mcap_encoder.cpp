@@ -368,7 +368,7 @@ class McapEncoder final : public Encoder {
   std::optional<FrameCompressor> compressor_;
 
   std::vector<std::uint8_t> chunk_;  ///< records of the chunk being written
-  std::vector<Message> messages_;    ///< those of the chunk
+  std::vector<Message> messages_;    ///< messages of the chunk
   std::uint64_t events_in_chunk_ = 0;
   std::optional<std::size_t> packet_at_;  ///< message being written, in the chunk
   std::size_t events_at_ = 0;             ///< its events

@@ -13,7 +13,7 @@
 
 namespace eventcamera {
 
-/// Decodes the messages of one topic. Times are those of ROS: the stamps of the headers.
+/// Decodes the messages of one topic. Times are ROS times: the stamps of the headers.
 class TopicDecoder {
  public:
   virtual ~TopicDecoder() = default;
@@ -37,7 +37,7 @@ class TopicDecoder {
   /// Sensor size that the messages state; 0x0 if unknown.
   SensorSize size() const { return size_; }
 
-  /// Offset from the clock of the sensor to that of ROS, nanoseconds; nothing if they are the same,
+  /// Offset from the sensor's clock to the ROS clock, nanoseconds; nothing if they are the same,
   /// or before the first message. It is kept until the camera is started again.
   virtual std::optional<std::uint64_t> clock_offset() const { return std::nullopt; }
   virtual void set_clock_offset(std::uint64_t /*offset*/) {}

@@ -74,7 +74,7 @@ class CsvDecoder final : public Decoder {
 
   Columns columns_;
   bool has_names_ = false;                 ///< the header has column names
-  bool has_geometry_ = false;              ///< the header is that of OpenEB's x,y,p,t
+  bool has_geometry_ = false;              ///< the header is OpenEB's for x,y,p,t
   std::optional<TimeUnit> unit_;           ///< time unit in the names
   char separator_ = ',';                   ///< separator in the first line
   int power_ = 0;                          ///< power of ten from the time unit to microseconds
