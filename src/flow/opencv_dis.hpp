@@ -10,7 +10,7 @@ namespace eventcamera {
 /// FlowMethod::opencv_dis, in builds with OpenCV.
 std::unique_ptr<DenseFlow> make_opencv_dis();
 
-/// Sets the regularisation of the variational refinement to that of the published method. Since
+/// Sets the regularisation of the variational refinement as published. Since
 /// OpenCV 4.10 it is a parameter of cv::DISOpticalFlow, with another default.
 template <class Dis>
 void regularise(Dis& dis) {

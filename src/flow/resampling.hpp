@@ -39,7 +39,7 @@ void resample_row(const Flow* row, const Resampling& resampling, float factor, F
 void resample_columns(const Flow* row, const Resampling& resampling, int first, int last,
                       float factor, Flow* out);
 
-/// Interpolates between two rows of a flow; `weight` is that of the lower one. Reads and writes up
+/// Interpolates between two rows of a flow; `weight` applies to the lower row. Reads and writes up
 /// to a vector past the ends.
 void blend_rows(const Flow* upper, const Flow* lower, float weight, int width, Flow* out);
 

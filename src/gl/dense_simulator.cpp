@@ -3,12 +3,41 @@
 
 #include <algorithm>
 
+#include "src/flow/region_of_interest_flow.hpp"
 #include "src/gl/farneback.hpp"
 #include "src/gl/interpolation.hpp"
-#include "src/gl/region_of_interest.hpp"
+#include "src/gl/shaders.hpp"
 
 namespace eventcamera::gl {
 namespace {
+
+/// Limits flow to the surroundings of changed pixels, like RegionOfInterestFlow.
+class RegionOfInterest {
+ public:
+  RegionOfInterest(const Context& gl, const LumaFormat& format)
+      : format_(format),
+        changed_box_(gl, "changed_box", shaders::changed_box),
+        stop_outside_(gl, "stop_outside", shaders::stop_outside),
+        box_(gl) {}
+
+  /// Sets the flow between two frames to 0 outside the region around all pixels that changed by
+  /// more than `threshold`.
+  void limit(const GreyFrame& before, const GreyFrame& now, int threshold, const Buffer& flow) {
+    const auto [width, height, bits] = format_;
+    box_.assign_zeros(4 * sizeof(int));
+    changed_box_.run({groups_of(64, GreyFrame::words_across(width)), height},
+                     {&before.buffer(), &now.buffer(), &box_}, {width, height, threshold});
+    stop_outside_.run(
+        {groups_of(64, width), height}, {&box_, &flow},
+        {width, height, RegionOfInterestFlow::surroundings, RegionOfInterestFlow::side_step});
+  }
+
+ private:
+  LumaFormat format_;
+  Kernel changed_box_;
+  Kernel stop_outside_;
+  Buffer box_;
+};
 
 class InterpolatingSimulator final : public DenseSimulator {
  public:

@@ -28,7 +28,7 @@ class DrawKernel {
   LumaFormat format_;
   Kernel kernel_;
   /// Output of the shader, copied to the texture on the GPU: in OpenGL ES 3.1, shaders can only
-  /// write to immutable textures, but those of GStreamer are mutable.
+  /// write to immutable textures, but GStreamer's textures are mutable.
   Buffer pixels_;
 };
 

@@ -33,7 +33,7 @@ class DatagramUnpacker {
   DatagramUnpacker(const DatagramUnpacker&) = delete;
   DatagramUnpacker& operator=(const DatagramUnpacker&) = delete;
 
-  /// Replaces `events` by those of the datagram, sorted by time and not earlier than all before, or
+  /// Replaces `events` by the datagram's, sorted by time and not earlier than all before, or
   /// by none. `arrival` is the receiver's time, if known; it is the time of events without a
   /// timestamp, and reveals wraps during pauses of hours.
   virtual Reception unpack(std::span<const std::uint8_t> bytes, std::optional<Microseconds> arrival,

@@ -13,7 +13,7 @@
 
 namespace eventcamera {
 
-/// Events to be sent: those of an interval, or of several consecutive intervals, joined.
+/// Events to be sent: one interval, or several consecutive intervals joined.
 class PendingInterval {
  public:
   explicit PendingInterval(SensorSize sensor) : sensor_(sensor) {}
@@ -31,7 +31,7 @@ class PendingInterval {
 
   /// Adds an interval, which must start at the end of the pending one and not after max_rtp_start,
   /// with events relative to its start. Calls flush(), which must clear, whenever there are
-  /// max_rtp_interval_events. Returns what cannot be sent.
+  /// max_rtp_interval_events. Returns the events that cannot be sent.
   template <class Flush>
   InvalidEvents add(Nanoseconds start, Nanoseconds end, std::span<const Event> events,
                     const Flush& flush) {
@@ -39,7 +39,7 @@ class PendingInterval {
     is_open_ = true;
     end_ = std::clamp(end, start, start_ + max_interval);
     InvalidEvents rejected;
-    // What is added to the times of events, and their maximum.
+    // Offset of event times, and their maximum.
     auto shift = microseconds(start) - microseconds(start_);
     const auto latest = microseconds(end_) - microseconds(start);
     std::uint32_t earliest = 0;

@@ -16,7 +16,7 @@ namespace eventcamera {
 /// two senders, and the new one is rejected until the other has been silent for a second.
 class RtpSenderTracker {
  public:
-  /// What is missing before a packet.
+  /// Packets and events missing before a packet.
   struct Loss {
     std::uint32_t packets = 0;  ///< by sequence number
     std::uint32_t events = 0;   ///< by event number

@@ -268,7 +268,7 @@ done
 refused "EVT words support sensors of 1x1 to 2048x2048 pixels" videotestsrc num-buffers=3 ! video/x-raw,width=2049,height=16 ! eventsim-frame ! evtenc ! fakesink
 launch videotestsrc num-buffers=3 ! video/x-raw,width=2049,height=16 ! videoscale ! eventsim-frame ! evtenc ! fakesink
 
-refused "Set width and height to those of the sender" udpsrc port=0 ! eventdatagramdepay ! fakesink
+refused "Set width and height to match the sender" udpsrc port=0 ! eventdatagramdepay ! fakesink
 refused "up to 1024x512 pixels" videotestsrc num-buffers=3 ! video/x-raw,width=1280,height=720 ! eventsim-frame ! eventdatagrampay format=jaer ! fakesink
 
 # Other refusals.

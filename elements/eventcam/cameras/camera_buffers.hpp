@@ -55,7 +55,7 @@ class CameraBuffers {
     return arrival <= max ? arrival : GST_CLOCK_TIME_NONE;
   }
 
-  /// Buffers of cameras are numbered; those of files have offsets in bytes.
+  /// Offsets of camera buffers are numbers; offsets of file buffers are in bytes.
   guint64 lost_before(GstBuffer* buffer, const GstSegment& segment) {
     if (framing_ != eventcamera::Framing::padded || segment.format != GST_FORMAT_TIME) return 0;
     const auto offset = GST_BUFFER_OFFSET(buffer);

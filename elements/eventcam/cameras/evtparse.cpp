@@ -81,11 +81,11 @@ namespace {
 
 constexpr int max_side = 2048;
 
-/// Value of `format`: that of the caps.
+/// Value of `format`: as in the caps.
 constexpr int format_of_caps = -1;
 
 const GEnumValue word_formats[] = {
-    {format_of_caps, "That of the caps", "auto"},
+    {format_of_caps, "As in the caps", "auto"},
     {static_cast<int>(EvtFormat::evt2), "32-bit words, one event each", "EVT2"},
     {static_cast<int>(EvtFormat::evt21), "64-bit words, up to 32 events each", "EVT21"},
     {static_cast<int>(EvtFormat::evt21_legacy), "EVT21 with the upper half first", "EVT21-legacy"},
@@ -290,11 +290,11 @@ static void note_losses(GstEvtParse* self, const WordScanner::Counts& before, gu
         self,
         {GST_STREAM_ERROR_DECODE,
          "Most of the camera's data is not valid in this format. Set format, width "
-         "and height to those of the camera."},
+         "and height to match the camera."},
         std::to_string(counts.lost_bytes) + " bytes are not valid");
 }
 
-/// Widens the latency to that of the longest transfer.
+/// Raises the latency to the duration of the longest transfer.
 static void note_transfer(GstEvtParse* self, GstClockTime arrival) {
   auto& priv = *self->priv;
   const auto& state = *priv.state;
@@ -319,8 +319,8 @@ static void note_transfer(GstEvtParse* self, GstClockTime arrival) {
 }
 
 /// May throw.
-static GstFlowReturn take_transfer(GstEvtParse* self, GstBuffer* buffer,
-                                   std::span<const guint8> bytes) {
+static GstFlowReturn handle_transfer(GstEvtParse* self, GstBuffer* buffer,
+                                     std::span<const guint8> bytes) {
   auto& priv = *self->priv;
   auto& state = *priv.state;
   const auto before = state.scanner->counts();
@@ -353,7 +353,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   if (!self->priv->state && !start_stream(self)) return GST_FLOW_ERROR;
   const MappedBytes bytes(GST_ELEMENT(self), OwnedBuffer(gst_buffer_ref(taken)));
   if (!bytes.is_mapped()) return GST_FLOW_ERROR;
-  return reported(self, [&] { return take_transfer(self, taken, bytes.get()); });
+  return reported(self, [&] { return handle_transfer(self, taken, bytes.get()); });
 }
 
 /// Pushes the last words before the stream ends or changes.
@@ -470,12 +470,12 @@ static void gst_evt_parse_class_init(GstEvtParseClass* klass) {
                                    mutable_ready_flags));
   properties.add(
       &Settings::width,
-      g_param_spec_uint("width", "Width", "Width of the sensor (pixels); 0 = that of the caps", 0,
+      g_param_spec_uint("width", "Width", "Width of the sensor (pixels); 0 = as in the caps", 0,
                         max_side, 0, mutable_ready_flags));
   properties.add(
       &Settings::height,
-      g_param_spec_uint("height", "Height", "Height of the sensor (pixels); 0 = that of the caps",
-                        0, max_side, 0, mutable_ready_flags));
+      g_param_spec_uint("height", "Height", "Height of the sensor (pixels); 0 = as in the caps", 0,
+                        max_side, 0, mutable_ready_flags));
   properties.add(
       &Settings::latency,
       g_param_spec_uint64("latency", "Latency",

@@ -5,19 +5,19 @@
 
 #include "gst/base/owned.hpp"
 
-/// The one of several senders that is received: the first, until it has been silent for a second.
-/// Datagrams without the address that udpsrc adds are taken for those of one sender.
+/// Keeps the first of several senders until it has been silent for a second. Datagrams without an
+/// address, which udpsrc adds, count as one sender's.
 class CurrentSender {
  public:
-  /// False if a datagram that arrived at this running time is of another sender.
+  /// Whether a datagram that arrived at this running time may be from the current sender.
   bool may_have_sent(GstBuffer* datagram, GstClockTime arrival) const {
     const GstNetAddressMeta* meta = gst_buffer_get_net_address_meta(datagram);
     return meta == nullptr || !GST_CLOCK_TIME_IS_VALID(arrival) || !address_ || is_of(meta->addr) ||
            arrival >= last_ + max_silence;
   }
 
-  /// A valid datagram was received: its sender is the current one.
-  void has_sent(GstBuffer* datagram, GstClockTime arrival) {
+  /// Makes the sender of a valid datagram the current one.
+  void follow(GstBuffer* datagram, GstClockTime arrival) {
     const GstNetAddressMeta* meta = gst_buffer_get_net_address_meta(datagram);
     if (meta == nullptr || !GST_CLOCK_TIME_IS_VALID(arrival)) return;
     if (!is_of(meta->addr)) address_.reset(G_SOCKET_ADDRESS(g_object_ref(meta->addr)));

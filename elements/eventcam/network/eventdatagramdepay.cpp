@@ -20,10 +20,10 @@
  * A datagram that is malformed, or has an event outside the sensor, is rejected as a whole. One
  * that is older than an earlier one is dropped, so events are sorted. After a loss, which only the
  * sequence number of jAER reveals, the next buffer is flagged DISCONT.
- * #GstEventDatagramDepay:stats counts all of these, and those of a second sender as rejected.
+ * #GstEventDatagramDepay:stats counts all of these; datagrams of a second sender count as rejected.
  *
- * jAER's addresses are read as those of a DVS128 if the sensor has 128x128 pixels, else as those of
- * a DAVIS. Samples of frames and of the IMU are skipped.
+ * jAER's addresses are read as a DVS128's if the sensor has 128x128 pixels, else as a
+ * DAVIS's. Samples of frames and of the IMU are skipped.
  *
  * ## Example launch lines
  * |[
@@ -203,13 +203,13 @@ static void reject(GstEventDatagramDepay* self, const char* fault, gsize size,
       self,
       {GST_STREAM_ERROR_DECODE,
        std::string("Rejected a datagram: ") + fault +
-           ". Set format, width and height to those of the sender; stats counts the rejected "
+           ". Set format, width and height to match the sender; stats counts the rejected "
            "datagrams."},
       cause);
   g_free(cause);
 }
 
-/// Counts a datagram of another sender, whose times and pixels are not those of the current one.
+/// Counts a datagram of another sender, whose clock and sensor differ.
 static void reject_second_sender(GstEventDatagramDepay* self, GstClockTime arrival) {
   ++self->priv->counts.lock()->rejected;
   gchar* cause =
@@ -253,7 +253,7 @@ static GstFlowReturn receive(GstEventDatagramDepay* self, GstBuffer* datagram,
   if (reception.fault != nullptr)
     reject(self, reception.fault, bytes.size(), arrival);
   else
-    state.sender.has_sent(datagram, arrival);
+    state.sender.follow(datagram, arrival);
   if (reception.late) log_late(self, arrival);
   if (reception.lost > 0)
     GST_DEBUG_OBJECT(
@@ -355,7 +355,7 @@ static bool start(GstEventDatagramDepay* self) {
   if (settings.width > 0 && settings.height > 0) return start_stream(self, settings);
   GST_ELEMENT_ERROR(self, RESOURCE, SETTINGS,
                     ("Cannot receive events: their datagrams do not contain the sensor size. Set "
-                     "width and height to those of the sender."),
+                     "width and height to match the sender."),
                     ("width=%d height=%d", settings.width, settings.height));
   return false;
 }

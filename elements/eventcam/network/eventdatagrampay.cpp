@@ -13,7 +13,7 @@
  * events that are further apart share no datagram. If this is 0, each buffer is sent at once, in
  * as few datagrams as possible.
  *
- * jAER's addresses are those of a DVS128 if the sensor has 128x128 pixels, else those of a DAVIS,
+ * jAER's addresses are a DVS128's if the sensor has 128x128 pixels, else a DAVIS's,
  * with up to 1024x512 pixels: select that camera in jAER.
  *
  * ## Example launch line
@@ -238,7 +238,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   });
 }
 
-static void take_gap(GstEventDatagramPay* self, GstEvent* event) {
+static void handle_gap(GstEventDatagramPay* self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
@@ -248,7 +248,7 @@ static void take_gap(GstEventDatagramPay* self, GstEvent* event) {
     flush(self);
 }
 
-static gboolean take_caps(GstEventDatagramPay* self, GstEvent* event) {
+static gboolean handle_caps(GstEventDatagramPay* self, GstEvent* event) {
   auto& priv = *self->priv;
   GstCaps* caps = nullptr;
   gst_event_parse_caps(event, &caps);
@@ -273,14 +273,14 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   auto* self = GST_EVENT_DATAGRAM_PAY(parent);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CAPS: {
-      const gboolean taken = take_caps(self, event);
+      const gboolean taken = handle_caps(self, event);
       gst_event_unref(event);
       return taken;
     }
     case GST_EVENT_GAP:
-      take_gap(self, event);
+      handle_gap(self, event);
       break;
-    case GST_EVENT_SEGMENT:  // the times of waiting events are those of the last one
+    case GST_EVENT_SEGMENT:  // waiting events belong to the previous segment
     case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_EOS:
       GST_DEBUG_OBJECT(pad, "sending what waits before %s", GST_EVENT_TYPE_NAME(event));

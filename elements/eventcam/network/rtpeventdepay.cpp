@@ -22,7 +22,7 @@
  * arrive, there are two senders: the new one is rejected, with a warning, until the other has been
  * silent for a second.
  *
- * #GstRtpEventDepay:stats has these fields besides those of #GstRTPBaseDepayload, all #guint64:
+ * #GstRtpEventDepay:stats has the fields of #GstRTPBaseDepayload, and these, all #guint64:
  *
  * - `packets`, `bytes`: packets received, and the size of their payloads;
  * - `events`: events received;
@@ -165,7 +165,7 @@ static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
   }
   GstBuffer* buffer = copied_buffer(std::as_bytes(interval.events));
   GST_BUFFER_PTS(buffer) = start;
-  GST_BUFFER_DTS(buffer) = start;  // else the base class sets that of a packet, in receiver's time
+  GST_BUFFER_DTS(buffer) = start;  // else the base class sets the packet's, in receiver time
   GST_BUFFER_DURATION(buffer) = duration;
   if (std::exchange(state.is_discontinuous, false))
     GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
@@ -186,7 +186,7 @@ static void warn_of_rejected(GstRtpEventDepay* self, guint number) {
       self,
       {GST_STREAM_ERROR_DECODE,
        "Rejected a packet: it is corrupt, or of another sensor or format. Set width, height and "
-       "format in the caps to those of the sender; stats counts the rejected packets."},
+       "format in the caps to match the sender; stats counts the rejected packets."},
       "packet number " + std::to_string(number));
 }
 
@@ -270,7 +270,7 @@ static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
       break;
   }
   const gboolean handled = PARENT_DEPAYLOAD_CLASS->handle_event(depayload, event);
-  depayload->need_newsegment = FALSE;  // that of the base class has other times
+  depayload->need_newsegment = FALSE;  // the base class would push one in receiver time
   return handled;
 }
 
@@ -322,7 +322,7 @@ static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
                  {GST_STREAM_ERROR_FORMAT,
                   "Cannot receive events without the size of the sensor, or in another format than "
                   "EVT3 and XYTP; set width, height and format in the RTP caps, for example on "
-                  "udpsrc, to those of the sender."},
+                  "udpsrc, to match the sender."},
                  cause);
     g_free(cause);
     return FALSE;

@@ -12,12 +12,12 @@
  * Events outside the sensor or their buffer's interval, or earlier than the previous event, are
  * dropped with a warning.
  *
- * #GstRtpEventPay:stats has these fields besides those of #GstRTPBasePayload:
+ * #GstRtpEventPay:stats has the fields of #GstRTPBasePayload, and these:
  *
  * - `packets`, `bytes` (#guint64): packets sent, and the size of their payloads;
- * - `events` (#guint64): events sent: those received plus those that a receiver counts as lost;
- * - `rejected-events` (#guint64): events not sent: those above, those of a buffer without a PTS,
- *   with a PTS of more than 292 years or with a partial event, and those dropped by a flush.
+ * - `events` (#guint64): events sent;
+ * - `rejected-events` (#guint64): events dropped as above, by a flush, or with an invalid
+ *   buffer: no PTS, a PTS of more than 292 years, or a partial event.
  *
  * ## Example launch line
  * |[
@@ -222,9 +222,10 @@ static bool is_due(GstRtpEventPay* self, Nanoseconds last_duration) {
          waiting >= self->priv->settings.copy().max_latency;
 }
 
-/// Takes an interval, and sends what is due; returns what cannot be sent. May throw.
-static InvalidEvents take(GstRtpEventPay* self, EventInterval interval,
-                          std::span<const Event> events) {
+/// Adds an interval, and sends the pending events if they are due. Returns the events that cannot
+/// be sent. May throw.
+static InvalidEvents add_interval(GstRtpEventPay* self, EventInterval interval,
+                                  std::span<const Event> events) {
   auto& priv = *self->priv;
   auto& pending = priv.state->pending;
   const auto start = static_cast<Nanoseconds>(interval.start);
@@ -265,14 +266,14 @@ static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken)
   GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, mapped.events().size(),
                  GST_TIME_ARGS(interval->start));
   return reported(self, [&] {
-    const auto rejected = take(self, *interval, mapped.events());
+    const auto rejected = add_interval(self, *interval, mapped.events());
     priv.sent.lock()->rejected += rejected.outside + rejected.unsorted;
     priv.faults.warn(self, rejected, taken);
   });
 }
 
 /// Sends a GAP event as an interval without events; at once if its duration is unknown.
-static void take_gap(GstRtpEventPay* self, GstEvent* event) {
+static void handle_gap(GstRtpEventPay* self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
@@ -281,7 +282,7 @@ static void take_gap(GstRtpEventPay* self, GstEvent* event) {
   const GstClockTime end =
       is_known ? start + std::min(duration, GstClockTime{eventcamera::max_interval}) : start;
   reported(self, [&] {
-    take(self, {start, end}, {});
+    add_interval(self, {start, end}, {});
     if (!is_known) send(self);
   });
 }
@@ -291,7 +292,7 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
   auto& priv = *self->priv;
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_GAP:
-      take_gap(self, event);
+      handle_gap(self, event);
       gst_event_unref(event);
       return TRUE;
     case GST_EVENT_FLUSH_STOP:

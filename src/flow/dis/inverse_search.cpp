@@ -48,7 +48,7 @@ HWY_INLINE hn::Vec<Quarters> quarters(Sum sum) {
 
 /// Sums at one of the four pixels of a patch's cell, of the differences there.
 struct Corner {
-  // Not defaulted, like that of ProductSum.
+  // Not defaulted: see ProductSum.
   Corner() {}  // NOLINT(modernize-use-equals-default)
   HWY_INLINE void add(Word d) {
     square.add(d, d);
@@ -116,7 +116,7 @@ class Search {
 
   /// Starts patches from the best of their neighbours' flows, and stops those whose own is hardly
   /// worse.
-  void take_over(const Image<Flow>& found, int row) {
+  void start_from(const Image<Flow>& found, int row) {
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
     move_to(flow_x_, flow_y_);
@@ -467,7 +467,7 @@ void search(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradie
   for (int first = 0; first < grid.columns; first += Search<side>::capacity) {
     const int count = std::min(grid.columns - first, Search<side>::capacity);
     Search<side> patches(grid, from, gradients, to, row, first, count, starts + first);
-    if (found != nullptr) patches.take_over(*found, row);
+    if (found != nullptr) patches.start_from(*found, row);
     patches.run(iterations);
     patches.store(flows + first);
   }

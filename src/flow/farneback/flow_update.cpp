@@ -156,8 +156,7 @@ void complete_block(RowSums& sums) {
 template <int width>
 using EquationRows = float[equations][width + 2 * row_padding];
 
-/// Sums over the rows of a window: those of a strip, preceded by the last ones of the strip to the
-/// left.
+/// Sums over the rows of a window: a strip's, preceded by the last sums of the strip to the left.
 struct Window {
   static constexpr int before = row_padding;
   HWY_ALIGN EquationRows<before + strip> sums = {};
@@ -184,7 +183,7 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
     for (int k = 0; k < coefficients; ++k) hwy::Prefetch(next + k * group);
     const auto here = [&](int k) { return hn::Load(floats, polynomials + k * group); };
     const auto weight = hn::Mul(hn::Set(floats, row_weight), hn::LoadU(floats, column_weights + x));
-    // Outside the image, a is that of the earlier polynomial alone.
+    // Outside the image, the earlier polynomial alone gives a.
     const auto a_weight = hn::IfThenElse(hn::RebindMask(floats, targets.inside), half, one);
     auto a_yy = hn::Mul(hn::Add(here(2), there[2]), a_weight);
     auto a_xx = hn::Mul(hn::Add(here(3), there[3]), a_weight);
@@ -270,7 +269,7 @@ void solve(const EquationRows<strip>& sums, int width, Flow* flow) {
 
 /// Solves columns [first, last) of a row from the sums of columns [left, right), a strip; the
 /// border of the image is replicated. `edge` holds the last sums of the strip to the left, and is
-/// overwritten with those of this one.
+/// overwritten with the last sums of this strip.
 void solve_strip(Window& window, int left, int right, int first, int last, int width, float* edge,
                  Flow* flow) {
   constexpr int before = Window::before;

@@ -62,7 +62,7 @@ class PointTracker {
     /// Removes all blocks.
     void clear();
     void add(int x, int y) { rows_[static_cast<std::size_t>(y)] |= std::uint64_t{1} << x; }
-    /// Adds the blocks that contain those of the next finer level.
+    /// Adds the blocks that contain blocks of the next finer level.
     void add_coarser(const Blocks& finer);
     /// Blocks of a row: bit x.
     std::uint64_t row(int y) const { return rows_[static_cast<std::size_t>(y)]; }

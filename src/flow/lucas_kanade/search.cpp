@@ -387,8 +387,8 @@ class Blocks {
   /// Updates the sums of gradient * there of blocks that entered another pixel.
   void update_sums() {
     if (shared_) {
-      take_shared();
-      if (shared_->share(moved(), displacement_)) take_shared();
+      use_shared_sums();
+      if (shared_->share(moved(), displacement_)) use_shared_sums();
     }
     for (const auto i : moved()) sum_around(i);
     moved_count_ = 0;
@@ -398,8 +398,8 @@ class Blocks {
     return std::span(moved_).first(static_cast<std::size_t>(moved_count_));
   }
 
-  /// Takes blocks whose displacement has shared sums out of moved_, and copies their sums.
-  void take_shared() {
+  /// Removes blocks whose displacement has shared sums from moved_, and copies their sums.
+  void use_shared_sums() {
     std::int32_t taken[capacity];
     int taken_count = 0;
     int left = 0;
