@@ -85,6 +85,9 @@ std::vector<std::string> seekable_consumers() {
   return names;
 }
 
+/// An aggregator may block one input until another has data, so a single thread would deadlock.
+constexpr const char* one_thread = "several inputs need several threads";
+
 /// A playing element whose inputs a test pushes.
 class EveryConsumer : public testing::TestWithParam<std::string> {
  protected:
@@ -205,6 +208,7 @@ TEST_P(EveryConsumer, EndsAfterGaps) {
 }
 
 TEST_P(EveryConsumer, ForwardsCustomEvents) {
+  if (inputs_.size() > 1) GTEST_SKIP() << one_thread;
   push_segment();
   for (guint i = 0; i < 3; ++i) push_interval(i);
   push([] {
@@ -215,6 +219,7 @@ TEST_P(EveryConsumer, ForwardsCustomEvents) {
 }
 
 TEST_P(EveryConsumer, StartsOverAfterAFlush) {
+  if (inputs_.size() > 1) GTEST_SKIP() << one_thread;
   push_segment();
   for (guint i = 0; i < 3; ++i) push_interval(i);
   push(gst_event_new_flush_start);
@@ -238,6 +243,7 @@ bool continues_through_discontinuities(const std::string& name) {
 }
 
 TEST_P(EveryConsumer, MarksADiscontinuity) {
+  if (inputs_.size() > 1) GTEST_SKIP() << one_thread;
   if (continues_through_discontinuities(GetParam())) GTEST_SKIP();
   push_segment();
   for (guint i = 0; i < 3; ++i) push_interval(i);
