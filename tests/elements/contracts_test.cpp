@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Contracts of every element that takes events or frames: segments, flushes, DISCONT, GAP, custom
+// events and EOS.
+#include <mutex>
+
+#include "tests/elements/element_lines.hpp"
+
+namespace {
+
+using namespace harness;
+using namespace element_lines;
+
+/// What leaves a source pad, in order.
+class Output {
+ public:
+  struct Item {
+    std::string name;            ///< of an event; or "buffer"
+    GstClockTime base;           ///< of the segment that it belongs to; none before the first
+    GstClockTime discontinuity;  ///< PTS of a buffer that is flagged DISCONT; else none
+  };
+
+  explicit Output(GstPad* pad) {
+    gst_pad_add_probe(
+        pad,
+        static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM |
+                                     GST_PAD_PROBE_TYPE_EVENT_FLUSH),
+        +[](GstPad*, GstPadProbeInfo* info, gpointer self) {
+          auto& output = *static_cast<Output*>(self);
+          if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0)
+            output.add(GST_PAD_PROBE_INFO_BUFFER(info));
+          else if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER_LIST) != 0)
+            output.add("buffer");
+          else
+            output.add(GST_PAD_PROBE_INFO_EVENT(info));
+          return GST_PAD_PROBE_OK;
+        },
+        this, nullptr);
+  }
+
+  /// Items of this name.
+  std::vector<Item> named(const std::string& name) const {
+    auto items = all();
+    std::erase_if(items, [&](const Item& item) { return item.name != name; });
+    return items;
+  }
+  std::vector<Item> all() const {
+    const std::lock_guard lock(mutex_);
+    return items_;
+  }
+
+ private:
+  void add(GstEvent* event) {
+    if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT) {
+      const GstSegment* segment = nullptr;
+      gst_event_parse_segment(event, &segment);
+      base_ = segment->base;
+    }
+    if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP) base_ = GST_CLOCK_TIME_NONE;
+    const GstStructure* structure = gst_event_get_structure(event);
+    const bool is_custom = GST_EVENT_TYPE(event) == GST_EVENT_CUSTOM_DOWNSTREAM;
+    add(is_custom ? gst_structure_get_name(structure) : GST_EVENT_TYPE_NAME(event));
+  }
+  void add(GstBuffer* buffer) {
+    add("buffer", GST_BUFFER_IS_DISCONT(buffer) ? GST_BUFFER_PTS(buffer) : GST_CLOCK_TIME_NONE);
+  }
+  void add(const std::string& name, GstClockTime discontinuity = GST_CLOCK_TIME_NONE) {
+    const std::lock_guard lock(mutex_);
+    items_.push_back({name, base_, discontinuity});
+  }
+
+  mutable std::mutex mutex_;
+  GstClockTime base_ = GST_CLOCK_TIME_NONE;
+  std::vector<Item> items_;
+};
+
+/// Elements that send a segment only with their first output: it has the times of that, and their
+/// inputs are no recordings; GStreamer's base class of RTP payloaders does the same.
+bool has_own_segment(const std::string& name) {
+  return name == "evtparse" || name == "eventdatagramdepay" || name == "rtpeventpay";
+}
+
+std::vector<std::string> seekable_consumers() {
+  auto names = consumers();
+  std::erase_if(names, has_own_segment);
+  return names;
+}
+
+/// An aggregator may block one input until another has data, so a single thread would deadlock.
+constexpr const char* one_thread = "several inputs need several threads";
+
+/// A playing element whose inputs a test pushes.
+class EveryConsumer : public testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    element_.reset(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "it"));
+    for (GList* item = element_->srcpads; item != nullptr; item = item->next)
+      outputs_.push_back(std::make_unique<Output>(GST_PAD(item->data)));
+    for (auto& pad : kind_.pads(GST_PAD_SINK)) {
+      const Owned<GstPad> sink(
+          pad.presence == GST_PAD_REQUEST
+              ? gst_element_request_pad_simple(element_.get(), pad.name.c_str())
+              : gst_element_get_static_pad(element_.get(), pad.name.c_str()));
+      inputs_.push_back({Owned<GstPad>(gst_pad_new(nullptr, GST_PAD_SRC)), pad.takes_frames()});
+      ASSERT_EQ(gst_pad_link(inputs_.back().pad.get(), sink.get()), GST_PAD_LINK_OK) << pad.name;
+    }
+    gst_element_set_state(pipeline_.get(), GST_STATE_PLAYING);
+    for (const auto& input : inputs_) {
+      gst_pad_set_active(input.pad.get(), TRUE);
+      gst_pad_push_event(input.pad.get(), gst_event_new_stream_start("stream"));
+      const Owned<GstCaps> caps(gst_caps_from_string(input.takes_frames ? frame_caps : event_caps));
+      gst_pad_push_event(input.pad.get(), gst_event_new_caps(caps.get()));
+    }
+  }
+  void TearDown() override { gst_element_set_state(pipeline_.get(), GST_STATE_NULL); }
+
+  /// Pushes an event from make() into each input.
+  template <class Make>
+  void push(const Make& make) {
+    for (const auto& input : inputs_) gst_pad_push_event(input.pad.get(), make());
+  }
+  void push_segment(GstClockTime base = 0, GstSegmentFlags flags = GST_SEGMENT_FLAG_NONE) {
+    GstSegment segment;
+    gst_segment_init(&segment, GST_FORMAT_TIME);
+    segment.base = base;
+    segment.flags = flags;
+    push([&] { return gst_event_new_segment(&segment); });
+  }
+  static GstBuffer* frame(guint index) {
+    constexpr gsize size = gsize{64} * 48;
+    GstBuffer* const buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
+    gst_buffer_memset(buffer, 0, index % 2 == 1 ? 0xff : 0, size);
+    return buffer;
+  }
+  /// Events of neighbouring pixels, so that a denoiser keeps the last one.
+  static GstBuffer* neighbours() {
+    constexpr GstEventCameraEvent events[] = {{0, 4, 4}, {1, 5, 4}, {2, 4, 5}};
+    return gst_buffer_new_memdup(events, sizeof events);
+  }
+  /// Pushes an interval of 10 ms into each input: a frame, or three events.
+  void push_interval(guint index, bool discontinuous = false) {
+    for (const auto& input : inputs_) {
+      GstBuffer* const buffer = input.takes_frames ? frame(index) : neighbours();
+      GST_BUFFER_PTS(buffer) = index * 10 * GST_MSECOND;
+      GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;
+      if (discontinuous) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
+      gst_pad_push(input.pad.get(), buffer);
+    }
+  }
+  /// Ends all inputs, and waits for the end of the output.
+  void end() {
+    push(gst_event_new_eos);
+    const auto message = wait_for(pipeline_.get(), GST_MESSAGE_EOS | GST_MESSAGE_ERROR);
+    ASSERT_TRUE(message);
+    EXPECT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_EOS);
+    for (const auto& output : outputs_) EXPECT_EQ(output->named("eos").size(), 1U);
+  }
+  /// Expects every buffer and GAP to follow a SEGMENT, also after a flush.
+  void expect_segments() const {
+    for (const auto& output : outputs_)
+      for (const auto& item : output->all())
+        if (item.name == "buffer" || item.name == "gap") {
+          EXPECT_TRUE(GST_CLOCK_TIME_IS_VALID(item.base)) << item.name;
+        }
+  }
+
+  struct Input {
+    Owned<GstPad> pad;
+    bool takes_frames;
+  };
+
+  const Kind kind_{GetParam()};
+  const Owned<GstElement> pipeline_ = launched(kind_.launch());
+  Owned<GstElement> element_;
+  std::vector<std::unique_ptr<Output>> outputs_;
+  std::vector<Input> inputs_;
+};
+INSTANTIATE_TEST_SUITE_P(, EveryConsumer, testing::ValuesIn(seekable_consumers()),
+                         element_lines::test_name);
+
+/// Segments without output, as of seeks with GST_SEEK_FLAG_SEGMENT.
+TEST_P(EveryConsumer, EndsEachSegmentOnceAfterItsStart) {
+  for (const GstClockTime base : {0 * GST_SECOND, 1 * GST_SECOND}) {
+    push_segment(base, GST_SEGMENT_FLAG_SEGMENT);
+    push([] { return gst_event_new_segment_done(GST_FORMAT_TIME, 0); });
+  }
+  end();
+  for (const auto& output : outputs_) {
+    std::vector<GstClockTime> bases;
+    for (const auto& done : output->named("segment-done")) bases.push_back(done.base);
+    // A segment in bytes has the base 0.
+    EXPECT_TRUE(bases == (std::vector<GstClockTime>{0, 1 * GST_SECOND}) ||
+                bases == (std::vector<GstClockTime>{0, 0}))
+        << testing::PrintToString(bases);
+  }
+}
+
+TEST_P(EveryConsumer, EndsWithoutData) {
+  push_segment();
+  end();
+}
+
+TEST_P(EveryConsumer, EndsAfterGaps) {
+  push_segment();
+  for (guint i = 0; i < 3; ++i)
+    push([i] { return gst_event_new_gap(i * 10 * GST_MSECOND, 10 * GST_MSECOND); });
+  end();
+  expect_segments();
+}
+
+TEST_P(EveryConsumer, ForwardsCustomEvents) {
+  if (inputs_.size() > 1) GTEST_SKIP() << one_thread;
+  push_segment();
+  for (guint i = 0; i < 3; ++i) push_interval(i);
+  push([] {
+    return gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("custom"));
+  });
+  end();
+  for (const auto& output : outputs_) EXPECT_GE(output->named("custom").size(), 1U);
+}
+
+TEST_P(EveryConsumer, StartsOverAfterAFlush) {
+  if (inputs_.size() > 1) GTEST_SKIP() << one_thread;
+  push_segment();
+  for (guint i = 0; i < 3; ++i) push_interval(i);
+  push(gst_event_new_flush_start);
+  push([] { return gst_event_new_flush_stop(TRUE); });
+  push_segment(1 * GST_SECOND);
+  for (guint i = 0; i < 3; ++i) push_interval(i);
+  end();
+  expect_segments();
+  for (const auto& output : outputs_) {
+    const auto buffers = output->named("buffer");
+    ASSERT_FALSE(buffers.empty());
+    EXPECT_TRUE(buffers.back().base == 1 * GST_SECOND || buffers.back().base == 0);
+  }
+}
+
+/// Elements whose output continues where their input does not: files and datagrams have no flags,
+/// and eventrender draws frames through gaps.
+bool continues_through_discontinuities(const std::string& name) {
+  return name.ends_with("enc") || name.ends_with("mux") || name.ends_with("pay") ||
+         name == "eventrender";
+}
+
+TEST_P(EveryConsumer, MarksADiscontinuity) {
+  if (inputs_.size() > 1) GTEST_SKIP() << one_thread;
+  if (continues_through_discontinuities(GetParam())) GTEST_SKIP();
+  push_segment();
+  for (guint i = 0; i < 3; ++i) push_interval(i);
+  for (guint i = 10; i < 13; ++i) push_interval(i, i == 10);
+  end();
+  for (const auto& output : outputs_)
+    EXPECT_TRUE(std::ranges::any_of(output->named("buffer"), [](const Output::Item& item) {
+      return GST_CLOCK_TIME_IS_VALID(item.discontinuity) && item.discontinuity >= 90 * GST_MSECOND;
+    }));
+}
+
+}  // namespace
