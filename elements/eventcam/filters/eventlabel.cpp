@@ -82,7 +82,7 @@ class EventLabeller final : public EventAggregator {
   void stop() override;
   void flush() noexcept override;
   void release_memory() noexcept override { flush(); }
-  bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
 
@@ -306,7 +306,7 @@ GstClockTime EventLabeller::next_time() {
 
 /* negotiation, states */
 
-bool EventLabeller::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
+bool EventLabeller::handle_caps(GstAggregatorPad* pad, GstCaps* caps) {
   if (pad == main_pad()) {
     GstEventCameraInfo info;
     if (!gst_event_camera_info_from_caps(&info, caps)) return false;

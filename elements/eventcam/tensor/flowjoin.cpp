@@ -53,7 +53,7 @@ class FlowJoin final : public EventAggregator {
   void stop() override;
   void flush() noexcept override {}
   void release_memory() noexcept override {}
-  bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
 
@@ -181,7 +181,7 @@ GstClockTime FlowJoin::next_time() {
   return running_time(main_pad(), GST_BUFFER_PTS(frame.get())).value_or(0);
 }
 
-bool FlowJoin::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
+bool FlowJoin::handle_caps(GstAggregatorPad* pad, GstCaps* caps) {
   const GstStructure* const structure = gst_caps_get_structure(caps, 0);
   if (pad == flow_pad_) {
     const char* const dimensions = gst_structure_get_string(structure, "dimensions");
