@@ -135,10 +135,10 @@ class TextureVideoSimulator final : public VideoSimulator {
 
   std::optional<Interval> finish() override {
     if (!queued_) return std::nullopt;
-    auto [interval, is_drawn] = *std::exchange(queued_, std::nullopt);
-    run([&] { interval.events = simulator_->read(); });
-    if (is_drawn || interval.events == nullptr) return std::nullopt;
-    return std::move(interval);
+    Queued done = *std::exchange(queued_, std::nullopt);
+    run([&] { done.interval.events = simulator_->read(); });
+    if (done.is_drawn || done.interval.events == nullptr) return std::nullopt;
+    return std::move(done.interval);
   }
 
   void drop() override {
