@@ -250,7 +250,7 @@ GstFlowReturn EventLabeller::read_image(GstBuffer* buffer) {
   }
   if (!format_) return GST_FLOW_NOT_NEGOTIATED;
   const GstFlowReturn result = label_until(microsecond_of(*time));
-  image_.emplace(OwnedBuffer(gst_buffer_ref(buffer)), *format_);
+  image_ = ClassImage{OwnedBuffer(gst_buffer_ref(buffer)), *format_};
   image_time_ = *time;
   return result;
 }
