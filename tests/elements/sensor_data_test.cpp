@@ -31,8 +31,7 @@ class SensorData : public testing::Test {
 TEST_F(SensorData, TriggersAreCarriedByASerializedEvent) {
   const auto triggers = bytes_of<GstEventCameraTrigger>({{-1, 2, 1}, {3, 4, 0}});
   const Owned<GstEvent> event(gst_event_new_event_camera_triggers(triggers.get()));
-  EXPECT_TRUE(GST_EVENT_IS_SERIALIZED(event.get()));
-  EXPECT_TRUE(GST_EVENT_IS_DOWNSTREAM(event.get()));
+  EXPECT_EQ(GST_EVENT_TYPE(event.get()), GST_EVENT_CUSTOM_DOWNSTREAM);  // serialized
   const Bytes read(gst_event_get_event_camera_triggers(event.get()));
   EXPECT_TRUE(g_bytes_equal(read.get(), triggers.get()));
   EXPECT_EQ(gst_event_get_event_camera_imu_samples(event.get()), nullptr);
@@ -44,7 +43,7 @@ TEST_F(SensorData, ImuSamplesAreCarriedByASerializedEvent) {
   const auto samples =
       bytes_of<GstEventCameraImuSample>({{7, 20.5F, {1, 2, 3}, {4, 5, 6}, {7, 8, 9}}});
   const Owned<GstEvent> event(gst_event_new_event_camera_imu_samples(samples.get()));
-  EXPECT_TRUE(GST_EVENT_IS_SERIALIZED(event.get()));
+  EXPECT_EQ(GST_EVENT_TYPE(event.get()), GST_EVENT_CUSTOM_DOWNSTREAM);
   const Bytes read(gst_event_get_event_camera_imu_samples(event.get()));
   EXPECT_TRUE(g_bytes_equal(read.get(), samples.get()));
   EXPECT_EQ(gst_event_get_event_camera_triggers(event.get()), nullptr);
