@@ -16,7 +16,6 @@
 #include "gst/glsimulator/mapped_texture.hpp"
 #include "gst/simulator/frame_luma.hpp"
 
-using eventcamera::EventBuckets;
 using eventcamera::LumaWeights;
 using eventcamera::Nanoseconds;
 
