@@ -64,18 +64,6 @@ class EventLabel : public testing::Test {
     return found;
   }
 
-  std::string text_of_next(GstMessageType type) {
-    const auto message = label.message(type);
-    return message ? text_of(message.get()) : "";
-  }
-
-  /// Waits for an error message, as the source pad has its own thread.
-  std::string error() {
-    const Owned<GstMessage> message(
-        gst_bus_timed_pop_filtered(label.bus.get(), 60 * GST_SECOND, GST_MESSAGE_ERROR));
-    return message ? text_of(message.get()) : "";
-  }
-
   TwoInputs label{"eventlabel", "event_sink", "video_sink"};
   Owned<GstHarness>& events = label.first;
   Owned<GstHarness>& images = label.second;
@@ -225,7 +213,7 @@ TEST_F(EventLabel, NeedsImagesOfTheSizeOfTheSensor) {
   push_image(0, 1);
   push_events(0, {0});
   gst_harness_push_event(images.get(), gst_event_new_eos());
-  EXPECT_EQ(error(),
+  EXPECT_EQ(label.error(),
             "The class images have 4x8 pixels, and the sensor 8x4. Scale the images with "
             "videoscale method=nearest-neighbour.");
 }
@@ -250,7 +238,7 @@ TEST_F(EventLabel, ReportsImagesWithoutTheirPixels) {
   push_image(0, 1, 20);
   push_events(0, {0});
   gst_harness_push_event(images.get(), gst_event_new_eos());
-  EXPECT_TRUE(error().starts_with("Cannot read a class image: "));
+  EXPECT_TRUE(label.error().starts_with("Cannot read a class image: "));
 }
 
 TEST_F(EventLabel, SkipsEventsOutsideTheSensor) {
@@ -263,7 +251,7 @@ TEST_F(EventLabel, SkipsEventsOutsideTheSensor) {
                              40 * ms));
   gst_harness_push_event(images.get(), gst_event_new_eos());
   EXPECT_EQ(classes(), (Classes{-1, -1, 1}));
-  EXPECT_NE(text_of_next(GST_MESSAGE_WARNING).find("outside the sensor"), std::string::npos);
+  EXPECT_NE(label.text_of_next(GST_MESSAGE_WARNING).find("outside the sensor"), std::string::npos);
 }
 
 TEST_F(EventLabel, SkipsImagesWithoutATime) {
@@ -274,9 +262,9 @@ TEST_F(EventLabel, SkipsImagesWithoutATime) {
   push_image(5 * ms, 3);
   gst_harness_push_event(images.get(), gst_event_new_eos());
   EXPECT_EQ(classes(), (Classes{-1, 1}));
-  EXPECT_TRUE(text_of_next(GST_MESSAGE_WARNING)
+  EXPECT_TRUE(label.text_of_next(GST_MESSAGE_WARNING)
                   .starts_with("Cannot match all class images to events: one has no PTS"));
-  EXPECT_EQ(text_of_next(GST_MESSAGE_WARNING), "");
+  EXPECT_EQ(label.text_of_next(GST_MESSAGE_WARNING), "");
 }
 
 TEST_F(EventLabel, SkipsEventsWithoutATime) {
@@ -286,7 +274,7 @@ TEST_F(EventLabel, SkipsEventsWithoutATime) {
   push_events(0, {0});
   push_image(40 * ms, 2);
   EXPECT_EQ(classes(), Classes{1});
-  EXPECT_EQ(text_of_next(GST_MESSAGE_WARNING),
+  EXPECT_EQ(label.text_of_next(GST_MESSAGE_WARNING),
             "Cannot label all events: a buffer has no PTS; skipping them.");
 }
 

@@ -63,17 +63,6 @@ class FlowJoin : public testing::Test {
     return numbers[23];
   }
 
-  std::string text_of_next(GstMessageType type) {
-    const auto message = join.message(type);
-    return message ? text_of(message.get()) : "";
-  }
-
-  std::string error() {
-    const Owned<GstMessage> message(
-        gst_bus_timed_pop_filtered(join.bus.get(), 60 * GST_SECOND, GST_MESSAGE_ERROR));
-    return message ? text_of(message.get()) : "";
-  }
-
   TwoInputs join{"flowjoin", "video_sink", "flow_sink"};
   Owned<GstHarness>& video = join.first;
   Owned<GstHarness>& flow = join.second;
@@ -91,7 +80,7 @@ TEST_F(FlowJoin, AddsTheFlowThatBeginsWithAFrame) {
   push_frame(40 * ms);
   EXPECT_EQ(joined(), 2.F);
   EXPECT_EQ(last_pts, 40 * ms);
-  EXPECT_EQ(text_of_next(GST_MESSAGE_WARNING), "");
+  EXPECT_EQ(join.text_of_next(GST_MESSAGE_WARNING), "");
 }
 
 TEST_F(FlowJoin, PassesFramesWithoutFlow) {
@@ -99,7 +88,7 @@ TEST_F(FlowJoin, PassesFramesWithoutFlow) {
   push_frame(0);
   push_flow(40 * ms, 1);
   EXPECT_EQ(joined(), none);
-  EXPECT_TRUE(text_of_next(GST_MESSAGE_WARNING).starts_with("A frame has no optical flow;"));
+  EXPECT_TRUE(join.text_of_next(GST_MESSAGE_WARNING).starts_with("A frame has no optical flow;"));
   push_frame(40 * ms);
   EXPECT_EQ(joined(), 1.F);
   push_flow(60 * ms, 2);  // of no frame
@@ -114,7 +103,7 @@ TEST_F(FlowJoin, PassesFramesWithoutFlow) {
   push_frame(200 * ms);
   push_flow(200 * ms, 4);
   EXPECT_EQ(joined(), 4.F);
-  EXPECT_EQ(text_of_next(GST_MESSAGE_WARNING), "");
+  EXPECT_EQ(join.text_of_next(GST_MESSAGE_WARNING), "");
 }
 
 TEST_F(FlowJoin, SkipsFlowOfOtherDurations) {
@@ -150,7 +139,7 @@ TEST_F(FlowJoin, GoesOnAfterTheEndOfFlow) {
     push_frame(pts);
     EXPECT_EQ(joined(), none);
   }
-  EXPECT_EQ(text_of_next(GST_MESSAGE_WARNING), "") << "no flow begins with the last frame";
+  EXPECT_EQ(join.text_of_next(GST_MESSAGE_WARNING), "") << "no flow begins with the last frame";
   gst_harness_push_event(video.get(), gst_event_new_eos());
   GstBuffer* rest = nullptr;
   EXPECT_TRUE(gst_harness_pull_until_eos(video.get(), &rest));
@@ -182,7 +171,8 @@ TEST_F(FlowJoin, NeedsFlowOfTheSizeOfTheVideo) {
   begin("2:3:4");
   push_frame(0);
   push_flow(0, 1);
-  EXPECT_EQ(error(), "The optical flow has the dimensions 2:3:4, and the video needs 2:4:3:1.");
+  EXPECT_EQ(join.error(),
+            "The optical flow has the dimensions 2:3:4, and the video needs 2:4:3:1.");
 }
 
 TEST_F(FlowJoin, FollowsChangesOfTheSize) {
@@ -200,7 +190,7 @@ TEST_F(FlowJoin, ReportsTensorsOfTheWrongSize) {
   begin();
   push_frame(0);
   push_flow(0, 1, 40 * ms, 11);
-  EXPECT_EQ(error(),
+  EXPECT_EQ(join.error(),
             "Cannot read a tensor of optical flow: it has 88 bytes instead of 96. Check the "
             "element upstream.");
 }

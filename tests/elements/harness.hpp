@@ -75,7 +75,9 @@ inline std::string with_upload(const std::string& launch) {
   return (is_on_gpu(launch) ? "glupload ! " : "") + launch;
 }
 
+/// Text of an error or a warning; empty for none.
 inline std::string text_of(GstMessage* message) {
+  if (message == nullptr) return "";
   GError* error = nullptr;
   if (GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR)
     gst_message_parse_error(message, &error, nullptr);
@@ -237,10 +239,7 @@ class Harness {
   }
 
  private:
-  std::string text_of_next(GstMessageType type) {
-    const auto next = message(type);
-    return next ? text_of(next.get()) : "";
-  }
+  std::string text_of_next(GstMessageType type) { return text_of(message(type).get()); }
 
   /// Draws one component; others in the same words stay.
   void draw(GstBuffer* buffer, int component, const std::function<int(int x, int y)>& value) const {
@@ -321,6 +320,16 @@ struct TwoInputs {
 
   Owned<GstMessage> message(GstMessageType type) {
     return Owned<GstMessage>(gst_bus_pop_filtered(bus.get(), type));
+  }
+
+  /// Text of the next message of this type; empty if none was posted.
+  std::string text_of_next(GstMessageType type) { return text_of(message(type).get()); }
+
+  /// Waits for an error message, as the source pad has its own thread.
+  std::string error() {
+    const Owned<GstMessage> next(
+        gst_bus_timed_pop_filtered(bus.get(), 60 * GST_SECOND, GST_MESSAGE_ERROR));
+    return text_of(next.get());
   }
 
   Owned<GstElement> element;
