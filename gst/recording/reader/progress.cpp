@@ -63,7 +63,7 @@ GstStructure* EventReader::stats() {
 
 /// Posts an info message listing the skipped topics.
 void EventReader::post_skipped() {
-  const auto skipped = recording_->left_out();
+  const auto skipped = recording_->unread_topics();
   if (skipped.empty() || skipped == posted_skipped_) return;
   posted_skipped_ = skipped;
   post_message(element_, GST_MESSAGE_INFO,

@@ -61,7 +61,7 @@ GstFlowReturn EventReader::handle_buffer(GstBuffer* buffer) {
 
 /// Handles the end of an upstream interval: nothing earlier will follow. May throw.
 GstFlowReturn EventReader::handle_interval_end(Microseconds end) {
-  recording_->reach(end);
+  recording_->advance_to(end);
   return push_pending();
 }
 
@@ -229,8 +229,8 @@ void EventReader::handle_gap(GstEvent* event) {
   if (is_known)
     flow_ = guard([&] {
       if (!recording_) open_recording();
-      if (recording_->reach(static_cast<Microseconds>((pts + duration) / GST_USECOND)))
-        return push_pending();
+      recording_->advance_to(static_cast<Microseconds>((pts + duration) / GST_USECOND));
+      if (recording_->has_events()) return push_pending();
       GstFlowReturn result = push_pending();
       if (result == GST_FLOW_OK && output_due_) result = begin_output();
       if (result == GST_FLOW_OK) push_to_pads(gst_event_ref(event));
