@@ -73,6 +73,8 @@ std::unique_ptr<RecordingDecoder> make_evt_decoder_of(const GstCaps* caps,
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventdatenc ! filesink
  * location=recording.dat
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat evt = {
     .type_name = "GstEvtDec",
@@ -98,6 +100,8 @@ GST_ELEMENT_REGISTER_DEFINE(evtdec, "evtdec", GST_RANK_PRIMARY, event_reader_typ
  * gst-launch-1.0 filesrc location=recording.dat ! eventdatdec ! evtenc ! filesink
  * location=recording.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat dat = {
     .type_name = "GstEventDatDec",
@@ -130,6 +134,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 filesrc location=recording.es ! eventesdec ! evtenc ! filesink
  * location=recording.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat es = {
     .type_name = "GstEventEsDec",
@@ -166,6 +172,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_re
  * gst-launch-1.0 filesrc location=00002.bin ! eventatisdec width=34 height=34 ! evtenc ! filesink
  * location=two.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat atis = {
     .type_name = "GstEventAtisDec",
@@ -198,6 +206,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventatisdec, "eventatisdec", GST_RANK_PRIMARY, even
  * gst-launch-1.0 filesrc location=recording.csv ! eventcsvdec ! evtenc ! filesink
  * location=events.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat csv = {
     .type_name = "GstEventCsvDec",
@@ -227,6 +237,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 filesrc location=events.npy ! eventnpydec ! evtenc ! filesink
  * location=events.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat npy = {
     .type_name = "GstEventNpyDec",
@@ -254,6 +266,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 filesrc location=events.npz ! eventnpzdec ! evtenc ! filesink
  * location=events.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat npz = {
     .type_name = "GstEventNpzDec",
@@ -290,6 +304,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 filesrc location=recording.h5 ! eventhdf5dec ! eventrender ! videoconvert !
  * autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat hdf5 = {
     .type_name = "GstEventHdf5Dec",
@@ -335,6 +351,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, even
  * gst-launch-1.0 filesrc location=davis.aedat4 ! aedatdemux name=d  d.events_0 ! queue !
  * eventrender ! videoconvert ! autovideosink  d.video_0 ! queue ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat aedat = {
     .type_name = "GstAedatDemux",
@@ -378,6 +396,8 @@ GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_re
  * gst-launch-1.0 filesrc location=walk.mcap ! eventmcapdemux name=d  d.events_0 ! queue !
  * eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static std::unique_ptr<RecordingDecoder> make_bag_decoder(const GstCaps* /*caps*/,
                                                           const FormatSettings& settings) {
@@ -415,6 +435,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventmcapdemux, "eventmcapdemux", GST_RANK_PRIMARY,
  * gst-launch-1.0 filesrc location=walk.bag ! eventbagdemux name=d  d.events_0 ! queue ! eventrender
  * ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat bag = {
     .type_name = "GstEventBagDemux",
