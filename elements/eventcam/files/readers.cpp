@@ -65,6 +65,8 @@ std::unique_ptr<Decoder> make_raw_decoder(const GstCaps* caps, const FormatSetti
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventdatenc ! filesink
  * location=recording.dat
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat evt = {
     .type_name = "GstEvtDec",
@@ -90,6 +92,8 @@ GST_ELEMENT_REGISTER_DEFINE(evtdec, "evtdec", GST_RANK_PRIMARY, event_reader_typ
  * gst-launch-1.0 filesrc location=recording.dat ! eventdatdec ! evtenc ! filesink
  * location=recording.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat dat = {
     .type_name = "GstEventDatDec",
@@ -122,6 +126,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 filesrc location=recording.es ! eventesdec ! evtenc ! filesink
  * location=recording.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat es = {
     .type_name = "GstEventEsDec",
@@ -157,6 +163,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_re
  * gst-launch-1.0 filesrc location=00002.bin ! eventatisdec width=34 height=34 ! evtenc ! filesink
  * location=two.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat atis = {
     .type_name = "GstEventAtisDec",
@@ -188,6 +196,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventatisdec, "eventatisdec", GST_RANK_PRIMARY, even
  * gst-launch-1.0 filesrc location=recording.csv ! eventcsvdec ! evtenc ! filesink
  * location=events.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat csv = {
     .type_name = "GstEventCsvDec",
@@ -217,6 +227,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 filesrc location=events.npy ! eventnpydec ! evtenc ! filesink
  * location=events.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat npy = {
     .type_name = "GstEventNpyDec",
@@ -244,6 +256,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 filesrc location=events.npz ! eventnpzdec ! evtenc ! filesink
  * location=events.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat npz = {
     .type_name = "GstEventNpzDec",
@@ -280,6 +294,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 filesrc location=recording.h5 ! eventhdf5dec ! eventrender ! videoconvert !
  * autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat hdf5 = {
     .type_name = "GstEventHdf5Dec",
@@ -325,6 +341,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, even
  * gst-launch-1.0 filesrc location=davis.aedat4 ! aedatdemux name=d  d.events_0 ! queue !
  * eventrender ! videoconvert ! autovideosink  d.video_0 ! queue ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat aedat = {
     .type_name = "GstAedatDemux",
@@ -367,6 +385,8 @@ GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_re
  * gst-launch-1.0 filesrc location=walk.mcap ! eventmcapdemux name=d  d.events_0 ! queue !
  * eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static std::unique_ptr<Decoder> make_bag_decoder(const GstCaps* /*caps*/,
                                                  const FormatSettings& settings) {
@@ -404,6 +424,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventmcapdemux, "eventmcapdemux", GST_RANK_PRIMARY,
  * gst-launch-1.0 filesrc location=walk.bag ! eventbagdemux name=d  d.events_0 ! queue ! eventrender
  * ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat bag = {
     .type_name = "GstEventBagDemux",
