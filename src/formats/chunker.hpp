@@ -67,6 +67,10 @@ class Chunker {
   /// Returns the next interval if it is complete.
   std::optional<Interval> next();
 
+  /// Exchanges the memory of the events that next() returned last, where they stay valid, for
+  /// other memory.
+  void swap_memory(std::vector<Event>& memory) { returned_.swap(memory); }
+
   /// Start of the first interval; nothing if not known yet.
   std::optional<Microseconds> first() const { return first_; }
 

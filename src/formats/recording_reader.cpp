@@ -495,7 +495,7 @@ template <class Sample>
 std::span<const Sample> RecordingReader::samples_before(Microseconds end,
                                                         WaitingItems<Sample>& waiting) {
   const auto shift = shift_.value_or(0) - origin_;
-  const auto items = waiting.take_before(end - shift);
+  const auto items = waiting.pop_before(end - shift);
   for (auto& item : items) item.t += shift;
   const auto first =
       start_ > 0 ? std::ranges::lower_bound(items, start_, {}, &Sample::t) : items.begin();

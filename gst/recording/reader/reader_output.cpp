@@ -103,7 +103,10 @@ GstFlowReturn ReaderOutput::push(const RecordingReader::Chunk& chunk) {
                  "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
                  chunk.events.size(), GST_TIME_ARGS(pts), GST_TIME_ARGS(duration));
   if (chunk.events.empty()) return combined(pad, pad.push_gap(pts, duration));
-  return combined(pad, pad.push(chunk.events, chunk.labels, pts, duration));
+  auto memory = pad.spare_memory();
+  recording_->swap_memory(chunk.stream, memory);
+  const auto count = chunk.events.size();
+  return combined(pad, pad.push(std::move(memory), count, chunk.labels, pts, duration));
 }
 
 GstFlowReturn ReaderOutput::push(const RecordingReader::TimedFrame& item) {

@@ -174,7 +174,7 @@ class Scanner final : public WordScanner {
         return;
       }
     }
-    hand_out(out);
+    append_pending(out);
   }
 
   /// Moves committed_at_ to the first stretches that are complete and continue the clock, or to the
@@ -320,7 +320,7 @@ class Scanner final : public WordScanner {
   }
 
   /// Appends what was decided to be passed on.
-  void hand_out(std::vector<Piece>& out) {
+  void append_pending(std::vector<Piece>& out) {
     if (committed_size_ == 0) return;
     Piece next{.words = {piece_.words.begin() + static_cast<std::ptrdiff_t>(committed_size_),
                          piece_.words.end()},
@@ -334,7 +334,7 @@ class Scanner final : public WordScanner {
 
   /// Ends the synchronisation; words since the last commit are not passed on.
   void close(std::vector<Piece>& out) {
-    hand_out(out);
+    append_pending(out);
     is_synchronised_ = false;
     piece_ = {};
     first_event_.reset();

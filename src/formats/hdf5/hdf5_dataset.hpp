@@ -38,7 +38,7 @@ class Hdf5Dataset {
 
   /// Reads numbers of 64-bit floating point, of which those in one column are seconds and are
   /// read as microseconds; fractions of others are cut off. False if the dataset has others.
-  bool take_fractions(std::size_t seconds_column);
+  bool read_fractions(std::size_t seconds_column);
 
   /// Reads rows, with all columns or the chosen members. False if the file is corrupt there.
   bool read(std::uint64_t first, std::uint64_t count, std::vector<std::int64_t>& out);
@@ -80,7 +80,7 @@ class Hdf5Dataset {
   void check_storage(hid_t file);
 
   bool read_stored(const hsize_t* offset, std::size_t max_stored, std::vector<std::uint8_t>& out,
-                   std::uint32_t& left_out);
+                   std::uint32_t& filter_mask);
   bool load(std::uint64_t block);
   bool read_elements(std::uint64_t first, std::uint64_t count, std::vector<std::uint8_t>& out);
 

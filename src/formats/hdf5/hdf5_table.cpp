@@ -53,7 +53,7 @@ std::unique_ptr<Hdf5Table> open_mvsec(hid_t file) {
   constexpr std::size_t time_column = 2;
   Hdf5Dataset events(file, "davis/left/events");
   if (events.rank() != 2 || events.columns() != event_columns ||
-      !events.take_fractions(time_column))
+      !events.read_fractions(time_column))
     throw UnsupportedFormat(
         "HDF5 dataset /davis/left/events must hold rows of four fractional numbers x, y, t and p");
   return make_row_table(Hdf5Format::mvsec, std::move(events), SensorSize{346, 260}, false,

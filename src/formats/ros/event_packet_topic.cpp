@@ -188,7 +188,7 @@ class EventPacketDecoder final : public TopicDecoder {
       return;
     }
     if (encoding_.empty()) {
-      take_size(packet.width, packet.height);
+      set_size(packet.width, packet.height);
       choose(packet);
     }
     if (packet.encoding != encoding_ || packet.is_big_endian) {

@@ -46,7 +46,7 @@ class TopicDecoder {
 
   /// Takes the size of the first message, if it is valid; that of a later one might not hold the
   /// events before it.
-  void take_size(std::uint32_t width, std::uint32_t height);
+  void set_size(std::uint32_t width, std::uint32_t height);
 
   Corruption& corruption_;
   Decoded decoded_;

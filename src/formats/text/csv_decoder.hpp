@@ -56,7 +56,7 @@ class CsvDecoder final : public EventDecoder {
   static std::optional<Row> read_row(std::span<const std::string_view> fields,
                                      std::span<const std::optional<EventColumn>> columns,
                                      int power);
-  std::size_t take_head(std::string_view text);
+  std::size_t append_head(std::string_view text);
   void read_head();
   bool read_header_line(std::string_view line);
   void find_columns(const TableSample& sample);
