@@ -17,8 +17,7 @@ namespace {
 constexpr Microseconds max_lag = 500'000;
 /// Minimum length of a gap of such a stream. Queues of a second do not fill before.
 constexpr Microseconds min_gap = 250'000;
-/// Wrap period of the EVT3 clock, the shortest of all; those of the other formats are multiples of
-/// it.
+/// Wrap period of the EVT3 clock, the shortest of all; other formats have multiples of it.
 constexpr Microseconds clock_range = Microseconds{1} << 24;
 constexpr Microseconds always = std::numeric_limits<Microseconds>::min();
 
@@ -572,7 +571,7 @@ void RecordingReader::add(const ImuItem& item) {
   counts_.stray += imu_samples_.push(item.samples);
 }
 
-/// Shifts the clock of words to that of their interval. If the two differ only by wraps of the
+/// Shifts the clock of words to the clock of their interval. If the two differ only by wraps of the
 /// words' clock, event times are preserved exactly.
 void RecordingReader::set_shift(Microseconds first) {
   first = std::clamp(first, -Chunker::max_time, Chunker::max_time);

@@ -245,8 +245,8 @@ void ReaderOutput::post_collection() {
   gst_object_unref(collection);
 }
 
-/// If the file does not state the sensor size, uses that of the properties, else the size in
-/// downstream's caps, else one that most events fit into. False if no sensor is so large.
+/// If the file does not state the sensor size, uses the properties, else downstream's caps, else a
+/// size that most events fit into. False if no sensor is so large.
 bool ReaderOutput::find_size(std::size_t index) {
   const auto& stream = recording_->streams()[index];
   if (stream.size_from != RecordingReader::SizeFrom::assumption) return true;

@@ -17,20 +17,20 @@ GstEvent* with_seqnum(GstEvent* event, guint32 seqnum) {
 
 std::vector<eventcamera::Event> SpareMemory::pop() {
   const std::lock_guard lock(mutex_);
-  if (spare_.empty()) return {};
-  auto memory = std::move(spare_.back());
-  spare_.pop_back();
+  if (count_ == 0) return {};
+  auto memory = std::exchange(spare_[--count_], {});
   capacity_ -= memory.capacity();
   return memory;
 }
 
-void SpareMemory::push(std::vector<eventcamera::Event> memory) {
+void SpareMemory::push(std::vector<eventcamera::Event> memory) noexcept {
   constexpr std::size_t min_needed = 512;
   const std::lock_guard lock(mutex_);
   needed_ = std::max({memory.size(), needed_ - needed_ / 64, min_needed});
   const auto capacity = memory.capacity();
-  if (capacity / 4 > needed_ || capacity_ + capacity > max_events) return;
-  spare_.push_back(std::move(memory));
+  if (capacity / 4 > needed_ || capacity_ + capacity > max_events || count_ == spare_.size())
+    return;
+  spare_[count_++] = std::move(memory);
   capacity_ += capacity;
 }
 

@@ -4,6 +4,7 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <mutex>
@@ -21,13 +22,14 @@
 class SpareMemory {
  public:
   std::vector<eventcamera::Event> pop();
-  void push(std::vector<eventcamera::Event> memory);
+  void push(std::vector<eventcamera::Event> memory) noexcept;
 
  private:
   static constexpr std::size_t max_events = std::size_t{1} << 23;  // 64 MiB
 
   std::mutex mutex_;
-  std::vector<std::vector<eventcamera::Event>> spare_;
+  std::array<std::vector<eventcamera::Event>, 16> spare_;
+  std::size_t count_ = 0;     ///< number of them
   std::size_t capacity_ = 0;  ///< of all of them, in events
   std::size_t needed_ = 0;    ///< events of a recent buffer: a maximum that decays
 };

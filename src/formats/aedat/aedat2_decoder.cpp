@@ -138,7 +138,7 @@ bool Aedat2Decoder::find_layout() {
   return true;
 }
 
-/// Takes the stated size, or that of all cameras with this layout.
+/// Uses the stated size, or the size of all cameras with this layout.
 void Aedat2Decoder::find_size() {
   constexpr SensorSize max_davis_size{640, 480};
   if (stream_.size == SensorSize{}) stream_.size = assumed_;

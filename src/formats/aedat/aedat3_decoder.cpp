@@ -256,8 +256,7 @@ void Aedat3Decoder::append(const std::uint8_t* event, Decoded& out) {
     return;
   }
   struct Input {
-    std::uint32_t
-        rising;  ///< type of the rising edge; those of the falling edge and the pulse follow
+    std::uint32_t rising;  ///< type of the rising edge; falling edge and pulse follow
     std::uint16_t id;
   };
   constexpr Input inputs[] = {{2, 0}, {6, 1}, {9, 2}};

@@ -63,8 +63,8 @@ class CameraClock {
     return true;
   }
 
-  /// Continues after the camera's clock started over, with the next time that decoders take for
-  /// that of the words.
+  /// Continues after the camera's clock started over, at the next time that decoders unwrap this
+  /// count to.
   void start_over(std::uint32_t count, std::optional<Microseconds> expected) {
     const auto earliest = std::max(time(), expected.value_or(0));
     before_ = high_ = count;
@@ -178,7 +178,7 @@ class Scanner final : public WordScanner {
   }
 
   /// Moves committed_at_ to the first stretches that are complete and continue the clock, or to the
-  /// first byte that may belong to such. What is before it is lost.
+  /// first byte that may belong to such. Earlier bytes are lost.
   bool find_stretches() {
     auto skipped = words_;
     skipped.interrupt();

@@ -24,7 +24,7 @@ class NpyDecoder final : public EventDecoder {
   explicit NpyDecoder(const TableSettings& settings = {});
 
   /// Reads only elements, as described by `header`. Throws UnsupportedFormat if their columns
-  /// cannot be those of events.
+  /// cannot be events.
   NpyDecoder(const NpyHeader& header, const TableSettings& settings);
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;

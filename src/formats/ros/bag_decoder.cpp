@@ -61,7 +61,7 @@ BagDecoder::BagDecoder(std::string topics) {
   if (!topics.empty()) wanted_ = "," + topics + ",";
 }
 
-/// Throws UnsupportedFormat if `start` is that of no known format.
+/// Throws UnsupportedFormat if no known format starts with `start`.
 void BagDecoder::choose_format(std::span<const std::uint8_t> start) {
   const auto* const found = std::ranges::find_if(
       formats, [&](const Format& format) { return has_at(0, format.magic, start); });

@@ -83,7 +83,7 @@ class EvtPackets {
   }
 
  private:
-  /// Turns times of the sensor into those of ROS. The sensor's clock wraps; the stamp determines
+  /// Turns times of the sensor into times of ROS. The sensor's clock wraps; the stamp determines
   /// how often.
   void shift(Decoded& out, std::optional<std::uint64_t>& offset) {
     if (!shift_) {

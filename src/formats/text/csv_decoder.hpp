@@ -19,8 +19,8 @@ namespace eventcamera {
 /// # or % are comments; empty lines are ignored.
 ///
 /// Properties not given in the settings are detected from the header and the first 256 lines:
-/// - the columns, by a line of names, which may include those of labels, cause and class, and
-///   further ones that are ignored, or by the numbers (TableSample);
+/// - the columns, by a line of names, which may include labels, cause and class, and
+///   further columns that are ignored, or by the numbers (TableSample);
 /// - the time unit, by the name of its column or by the numbers. Integer times in blank-separated
 ///   columns without names may be microseconds (DVS-Voltmeter) or nanoseconds (rpg_esim); an
 ///   ambiguous file is refused. Times are rounded down to microseconds;
