@@ -382,7 +382,8 @@ static void finalize(GObject* object) {
 
 static void gst_rtp_event_depay_init(GstRtpEventDepay* self) {
   self->priv = new Private(GST_RTP_BASE_DEPAYLOAD(self));
-  // The base class would drop late packets uncounted, and those after an invalid number ahead.
+  // Otherwise gst_rtp_base_depayload_handle_buffer() drops late packets uncounted, and those that
+  // follow an invalid number ahead of theirs.
   g_object_set(self, "max-reorder", 0, nullptr);
 }
 
