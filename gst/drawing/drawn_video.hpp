@@ -20,6 +20,6 @@ GType palette_type();
 void keep_metas(GstBuffer* frame, GstBuffer* picture);
 
 /// For decide_allocation(): uses downstream's buffer pool if it offers one that takes such buffers,
-/// else a new video pool.
+/// else a new video pool. `kept` is the number of buffers that the element keeps.
 /// False if `caps` are not video.
-bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps);
+bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps, guint kept = 0);

@@ -86,6 +86,12 @@ static gboolean propose_allocation(GstBaseTransform* transform, GstQuery* decide
   gst_allocation_params_init(&params);
   params.align = 63;  // vectors of pixels do not straddle cache lines
   gst_query_add_allocation_param(query, nullptr, &params);
+  GstCaps* caps = nullptr;
+  GstVideoInfo video;
+  gst_query_parse_allocation(query, &caps, nullptr);
+  if (caps != nullptr && gst_video_info_from_caps(&video, caps))  // the last frame may be held
+    gst_query_add_allocation_pool(query, nullptr, static_cast<guint>(GST_VIDEO_INFO_SIZE(&video)),
+                                  2, 0);
   return PARENT_TRANSFORM_CLASS->propose_allocation(transform, decide, query);
 }
 
@@ -103,7 +109,7 @@ static gboolean decide_allocation(GstBaseTransform* transform, GstQuery* query) 
   gst_query_parse_allocation(query, &caps, nullptr);
   if (!event_simulator_draws(caps))
     decide_on_event_pool(query);
-  else if (!decide_on_drawn_pool(query, caps))
+  else if (!decide_on_drawn_pool(query, caps, 1))  // the last picture
     return FALSE;
   return PARENT_TRANSFORM_CLASS->decide_allocation(transform, query);
 }
@@ -321,6 +327,15 @@ static void install_settings(GObjectClass* klass) {
       g_param_spec_enum("palette", "Palette", "Colours of event frames (accumulated-event video)",
                         palette_type(), static_cast<int>(SimulatorSettings().palette),
                         mutable_playing_flags));
+  properties.add(
+      &SimulatorSettings::skip_repeated,
+      g_param_spec_boolean("skip-repeated", "Skip repeated",
+                           "Compare frames, and treat one that equals the last, changed one as a "
+                           "repetition: its interval continues, and the last picture is drawn "
+                           "again. For webcams and editors that repeat frames to raise the "
+                           "framerate. Frames that are flagged GAP or have the memory of the last "
+                           "one are always repetitions",
+                           FALSE, mutable_playing_flags));
 }
 
 static void install_write_flow(GObjectClass* klass) {
@@ -346,6 +361,7 @@ static GstStructure* stats_of(GObject* object) {
   const auto stats = simulation_of(object).stats.copy();
   return gst_structure_new("application/x-event-simulator-stats", "frames", G_TYPE_UINT64,
                            stats.frames, "skipped-frames", G_TYPE_UINT64, stats.skipped_frames,
+                           "repeated-frames", G_TYPE_UINT64, stats.repeated_frames,
                            "processing-time", G_TYPE_UINT64, stats.processing_time, nullptr);
 }
 
@@ -360,7 +376,7 @@ static void install_qos_properties(GObjectClass* klass) {
                            TRUE, mutable_playing_flags));
   install_stats(klass, stats_of,
                 "Counters since start: frames (processed), skipped-frames (due to qos), "
-                "processing-time (of all processed frames, ns)");
+                "repeated-frames (by upstream), processing-time (of all processed frames, ns)");
 }
 
 static void install_base_properties(GObjectClass* klass) {

@@ -80,6 +80,8 @@ bool Simulation::set_caps(GstCaps* in, GstCaps* out) {
       state_->video = video;
       state_->frames->set_video(video);
     }
+    stream_.repeated.reset();  // the last frame may have another format
+    stream_.picture.reset();
     state_->draws = event_simulator_draws(out);
     if (state_->draws) state_->frames->set_drawn_video(drawn);
   });
@@ -210,6 +212,24 @@ void Simulation::warn_of_times(const char* what) {
       "an interval needs a PTS at both ends");
 }
 
+/// Returns the time of a frame: its PTS. A decoder gives frames whose timestamps are not in order
+/// the PTS of the frame before, which would end the interval at its start: such frames are spaced
+/// by the framerate, the first by half of that, because the next one is often right.
+Nanoseconds Simulation::time_of(GstClockTime pts) {
+  const auto time = static_cast<Nanoseconds>(pts);
+  const auto before = std::exchange(stream_.last_pts, pts);
+  const auto last = state_->simulator().last_time();
+  const auto duration = static_cast<Nanoseconds>(interval_.load());
+  const bool is_late_enough = last && time - *last >= Nanoseconds{event_resolution};
+  if (!before || pts < *before || !last || is_late_enough || duration == 0) return time;
+  stream_.warn_of_equal_times(
+      element_,
+      {GST_STREAM_ERROR_FORMAT,
+       "Bad video timestamps: frames have the same one. Spacing them by the framerate."},
+      "a frame is not later than the one before");
+  return *last + (*last <= time ? duration / 2 : duration);
+}
+
 /// Returns why the interval since the last frame cannot end at `time`; null if it can.
 const char* Simulation::fault_of_time(Nanoseconds time) const {
   const auto last = state_->simulator().last_time();
@@ -242,6 +262,7 @@ void Simulation::check_interlacing(GstBuffer* frame) {
 void Simulation::forget_frames() {
   stream_.gap.reset();
   stream_.motion.reset();
+  stream_.repeated.reset();
   if (!state_) return;
   push_interval(state_->frames->finish());
   if (!state_->simulator().last_time()) return;
@@ -262,17 +283,20 @@ void Simulation::start_timeline() {
   stream_.flow = GST_FLOW_OK;
   reported([&] { start_over(); });
   stream_.next_time.reset();
+  stream_.last_pts.reset();
 }
 
 void Simulation::interrupt() {
   reported([&] { start_over(); });
+  stream_.last_pts.reset();
   stream_.discontinuous = true;
 }
 
 void Simulation::skip_frame(GstClockTime pts) {
   GST_DEBUG_OBJECT(element_, "downstream is late: skipped the frame at %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(pts));
-  stream_.motion.reset();  // it ends at the frame that was skipped
+  stream_.motion.reset();    // it ends at the frame that was skipped
+  stream_.repeated.reset();  // the next frame may repeat it
   ++stats.lock()->skipped_frames;
 }
 
@@ -367,14 +391,20 @@ GstFlowReturn Simulation::push_frame(OwnedBuffer frame) {
 void Simulation::simulate(OwnedBuffer frame) {
   const GstClockTime pts = GST_BUFFER_PTS(frame.get());
   check_interlacing(frame.get());
-  hold_last_frame(pts);
-  sync_controlled_properties(pts);
   if (pts > G_MAXINT64) {
     warn_of_times("the PTS of a frame is out of range");
     forget_frames();
     return;
   }
-  const auto time = static_cast<Nanoseconds>(pts);
+  const Nanoseconds time = time_of(pts);
+  const bool compare = settings.copy().skip_repeated;
+  const auto kind = stream_.repeated.kind_of(frame.get(), time, compare, state_->video);
+  if (kind == RepeatedFrames::Kind::repeated) {
+    stream_.repeated.add(frame.get(), time, compare, kind);
+    return repeat(frame.get(), time);
+  }
+  hold_last_frame(static_cast<GstClockTime>(time));
+  sync_controlled_properties(static_cast<GstClockTime>(time));
   if (const char* fault = fault_of_time(time)) {
     warn_of_times(fault);
     forget_frames();
@@ -387,6 +417,7 @@ void Simulation::simulate(OwnedBuffer frame) {
                    GST_TIME_ARGS(pts), GST_TIME_ARGS(static_cast<GstClockTime>(*until)));
     return;
   }
+  stream_.repeated.add(frame.get(), time, compare, kind);
   auto& frames = *state_->frames;
   const auto start = state_->simulator().last_time();
   const SimulatorSettings current = begin_interval();
@@ -423,7 +454,21 @@ void Simulation::draw_frame(const SimulatorSettings& current, const KnownFlow& f
                          eventcamera::palette(current.palette), prepared);
     return GST_FLOW_OK;
   });
-  if (picture) stream_.flow = push_buffer(std::move(picture), pts, duration);
+  if (!picture) return;
+  stream_.picture.reset(gst_buffer_ref(picture.get()));
+  stream_.flow = push_buffer(std::move(picture), pts, duration);
+}
+
+/// Continues the interval in a frame that repeats the last one, or draws the last picture again.
+/// May throw.
+void Simulation::repeat(GstBuffer* frame, Nanoseconds time) {
+  ++stats.lock()->repeated_frames;
+  keep_flow(frame);
+  if (!stream_.picture) return;
+  stream_.pushed_until = time;
+  OwnedBuffer again(gst_buffer_copy(stream_.picture.get()));
+  GST_BUFFER_FLAG_UNSET(again.get(), GST_BUFFER_FLAG_DISCONT);
+  stream_.flow = push_buffer(std::move(again), GST_BUFFER_PTS(frame), GST_BUFFER_DURATION(frame));
 }
 
 /* gaps */
@@ -488,7 +533,14 @@ void Simulation::finish() {
 }
 
 void Simulation::end() {
-  if (state_) reported([&] { hold_last_frame(GST_CLOCK_TIME_NONE); });
+  if (!state_) return;
+  reported([&] {
+    hold_last_frame(GST_CLOCK_TIME_NONE);
+    const auto last = state_->simulator().last_time();
+    const auto repeated = stream_.repeated.last_time();
+    if (!state_->draws && last && repeated && *last < *repeated)
+      hold_until(*repeated, GST_SEQNUM_INVALID);
+  });
 }
 
 /// Releases the frame of a finished interval, and pushes the events: a GAP if there are none. May

@@ -13,6 +13,7 @@
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/simulator/eventsimulator.hpp"
+#include "gst/simulator/repeated_frames.hpp"
 #include "gst/simulator/video_simulator.hpp"
 #include "src/core/image.hpp"
 
@@ -22,13 +23,15 @@ GST_DEBUG_CATEGORY_EXTERN(event_simulator_debug);
 struct SimulatorSettings {
   eventcamera::Settings simulation;
   eventcamera::PaletteName palette = eventcamera::PaletteName::dark;
-  bool write_flow = false;  ///< add the flow of each interval to its buffer
+  bool write_flow = false;     ///< add the flow of each interval to its buffer
+  bool skip_repeated = false;  ///< compare pictures to find repeated frames
 };
 
 /// Counters of the property stats.
 struct SimulatorStats {
   guint64 frames = 0;
   guint64 skipped_frames = 0;
+  guint64 repeated_frames = 0;
   guint64 processing_time = 0;  ///< ns
 };
 
@@ -127,10 +130,14 @@ class Simulation {
     std::optional<Gap> gap;                      ///< since the last frame
     std::unique_ptr<GBytes, UnrefBytes> motion;  ///< known, from the last frame to the next one
     std::optional<GstClockTime> next_time;       ///< end of the last frame
-    std::optional<bool> is_live;                 ///< upstream's answer, once asked
+    std::optional<GstClockTime> last_pts;        ///< of the last frame
+    RepeatedFrames repeated;
+    OwnedBuffer picture;          ///< drawn last, for repeated frames
+    std::optional<bool> is_live;  ///< upstream's answer, once asked
     IntervalDuration interval;
     WarnOnce warn_of_no_pts{event_simulator_debug};
     WarnOnce warn_of_times{event_simulator_debug};
+    WarnOnce warn_of_equal_times{event_simulator_debug};
     WarnOnce warn_of_interlacing{event_simulator_debug};
   };
 
@@ -148,6 +155,7 @@ class Simulation {
 
   OwnedBuffer with_time(OwnedBuffer frame);
   std::optional<GstClockTime> time_of_arrival();
+  Nanoseconds time_of(GstClockTime pts);
   const char* fault_of_time(Nanoseconds time) const;
   void check_interlacing(GstBuffer* frame);
   void warn_of_times(const char* what);
@@ -160,6 +168,7 @@ class Simulation {
   void start_over();
   void simulate(OwnedBuffer frame);
   void draw_frame(const SimulatorSettings& current, const KnownFlow& flow, OwnedBuffer frame);
+  void repeat(GstBuffer* frame, Nanoseconds time);
   void hold_last_frame(GstClockTime next);
   void hold_until(Nanoseconds end, guint32 seqnum);
 

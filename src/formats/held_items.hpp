@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 namespace eventcamera {
 

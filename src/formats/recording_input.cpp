@@ -12,7 +12,7 @@ void RecordingInput::push(std::span<const std::uint8_t> bytes) {
 
 void RecordingInput::finish() {
   const auto guard = lock();
-  decoder_->finish();
+  decoder_->drain();
   is_finished_ = true;
 }
 

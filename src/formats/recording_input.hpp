@@ -9,8 +9,8 @@
 #include <span>
 #include <utility>
 
+#include "src/formats/decoder.hpp"
 #include "src/formats/held_items.hpp"
-#include "src/formats/recording_decoder.hpp"
 
 namespace eventcamera {
 
@@ -19,7 +19,7 @@ namespace eventcamera {
 class RecordingInput {
  public:
   /// Creates a decoder of the file, positioned at its start. May throw.
-  using MakeDecoder = std::function<std::unique_ptr<RecordingDecoder>()>;
+  using MakeDecoder = std::function<std::unique_ptr<Decoder>()>;
 
   explicit RecordingInput(MakeDecoder make_decoder)
       : make_decoder_(std::move(make_decoder)), decoder_(make_decoder_()) {}
@@ -57,7 +57,7 @@ class RecordingInput {
   /// Continues at a seek point, or with a new decoder at the start of the file.
   void restart(const std::optional<SeekPoint>& seek_point);
 
-  /// As RecordingDecoder::seek_point_before(). May be called from any thread.
+  /// As Decoder::seek_point_before(). May be called from any thread.
   std::optional<SeekPoint> seek_point_before(Microseconds t) const;
 
   /// True if all items before this position in the file were returned.
@@ -65,8 +65,8 @@ class RecordingInput {
     return held_.size() == 0 && decoder_->position() >= position;
   }
 
-  RecordingDecoder& decoder() { return *decoder_; }
-  const RecordingDecoder& decoder() const { return *decoder_; }
+  Decoder& decoder() { return *decoder_; }
+  const Decoder& decoder() const { return *decoder_; }
 
   /// Pull mode: the source of bytes.
   ByteSource& source() const { return *source_; }
@@ -83,7 +83,7 @@ class RecordingInput {
 
   MakeDecoder make_decoder_;
   mutable std::mutex mutex_;  ///< guards decoder_ against seek_point_before()
-  std::unique_ptr<RecordingDecoder> decoder_;
+  std::unique_ptr<Decoder> decoder_;
 
   ByteSource* source_ = nullptr;
   bool reads_itself_ = false;

@@ -140,7 +140,7 @@ class RecordingReader {
 
   std::string format_name() const { return input_.decoder().format_name(); }
 
-  /// Content that was ignored; see RecordingDecoder.
+  /// Content that was ignored; see Decoder.
   std::string left_out() const { return input_.decoder().left_out(); }
 
   /// True if no events and frames were found before the Start.

@@ -120,13 +120,13 @@ void RecordingSurvey::note(const FrameItem& item) {
   if (!surveyed.first_frame) surveyed.first_frame = item.frame;
 }
 
-void RecordingSurvey::finish(const RecordingDecoder& decoder) {
+void RecordingSurvey::finish(const Decoder& decoder) {
   for (std::size_t i = 0; i < decoder.streams().size(); ++i)
     if (decoder.streams()[i].kind == StreamKind::events) finish(i);
 }
 
 /// Finishes streams of events with too few of them to tell the first.
-void RecordingSurvey::finish_short_streams(const RecordingDecoder& decoder) {
+void RecordingSurvey::finish_short_streams(const Decoder& decoder) {
   for (std::size_t i = 0; i < decoder.streams().size(); ++i)
     if (decoder.streams()[i].kind == StreamKind::events && !stream(i).first) finish(i);
 }

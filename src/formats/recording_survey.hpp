@@ -48,7 +48,7 @@ class RecordingSurvey {
   }
 
   /// Push mode: declares the end of the items.
-  void finish(const RecordingDecoder& decoder);
+  void finish(const Decoder& decoder);
 
   /// True if enough is known to begin: the first time of every stream, and enough events to guess
   /// unknown sensor sizes.
@@ -77,7 +77,7 @@ class RecordingSurvey {
   void note(const FrameItem& item);
   void note(const TriggerItem& /*item*/) {}
   void note(const ImuItem& /*item*/) {}
-  void finish_short_streams(const RecordingDecoder& decoder);
+  void finish_short_streams(const Decoder& decoder);
   void finish(std::size_t index);
   void learn_duration(std::optional<Microseconds> stated, bool is_whole,
                       const RecordingInput& input);

@@ -45,7 +45,7 @@ struct Contents {
   std::vector<Trigger> triggers;
 };
 
-void take(RecordingDecoder& decoder, Contents& out) {
+void take(Decoder& decoder, Contents& out) {
   while (const auto item = decoder.next()) {
     if (const auto* events = std::get_if<EventItem>(&*item)) {
       out.events.insert(out.events.end(), events->events.begin(), events->events.end());
@@ -63,7 +63,7 @@ void take(RecordingDecoder& decoder, Contents& out) {
 }
 
 /// Pushes bytes in pieces, which are invalid once they have been read.
-void push(RecordingDecoder& decoder, std::span<const std::uint8_t> bytes, Contents& out,
+void push(Decoder& decoder, std::span<const std::uint8_t> bytes, Contents& out,
           std::size_t piece = std::size_t{1} << 20) {
   for (const auto part : pieces::of(bytes, piece)) {
     const auto copy = std::make_unique<std::uint8_t[]>(part.size());
@@ -71,11 +71,11 @@ void push(RecordingDecoder& decoder, std::span<const std::uint8_t> bytes, Conten
     decoder.push({copy.get(), part.size()});
     take(decoder, out);
   }
-  decoder.finish();
+  decoder.drain();
   take(decoder, out);
 }
 
-Contents decoded(RecordingDecoder& decoder, std::span<const std::uint8_t> bytes,
+Contents decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
                  std::size_t piece = std::size_t{1} << 20) {
   Contents contents;
   push(decoder, bytes, contents, piece);

@@ -18,6 +18,8 @@
  * gst-launch-1.0 videotestsrc pattern=ball ! tee name=t  t. ! queue ! videoconvert ! eventoverlay
  * name=overlay ! videoconvert ! autovideosink  t. ! queue ! eventsim-diff ! overlay.event_sink
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/video/video.h>
 

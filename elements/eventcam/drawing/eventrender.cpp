@@ -27,6 +27,8 @@
  * gst-launch-1.0 videotestsrc pattern=ball ! eventsim-diff ! eventrender mode=decay !
  * video/x-raw,framerate=60/1 ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/video/video.h>
 

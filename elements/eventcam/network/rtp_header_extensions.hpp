@@ -23,8 +23,8 @@ class RtpHeaderExtensions {
   }
 
  private:
-  /// RFC 8285: maximum identifier and size of elements with a header of one byte, and maximum size
-  /// of those with two.
+  /// RFC 8285: maximum identifier and size of elements with a one-byte header, and maximum size of
+  /// elements with a two-byte header.
   static constexpr guint max_short_id = 14;
   static constexpr gsize max_short_size = 16;
   static constexpr gsize max_long_size = 255;
@@ -36,7 +36,7 @@ class RtpHeaderExtensions {
   }
 
   static gsize size_of(const GstStructure& caps) {
-    const OwnedBuffer any(gst_buffer_new());  // extensions may ask what they are added to
+    const OwnedBuffer any(gst_buffer_new());  // extensions may inspect the buffer
     gsize count = 0;
     gsize size = 0;
     bool is_short = true;

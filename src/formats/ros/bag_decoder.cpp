@@ -117,7 +117,7 @@ bool BagDecoder::is_wanted(const BagTopic& topic, StreamKind kind) const {
          });
 }
 
-void BagDecoder::finish() {
+void BagDecoder::drain() {
   finished_ = true;
   if (!file_) choose_format(start_);
   file_->finish();

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/ros/bag_file.hpp"
 #include "src/formats/ros/topic_decoder.hpp"
 
@@ -19,14 +19,14 @@ namespace eventcamera {
 ///
 /// Each topic that is read is a stream, named by StreamInfo::source. Times are the stamps of the
 /// messages' headers, not the times at which they were recorded.
-class BagDecoder final : public RecordingDecoder {
+class BagDecoder final : public Decoder {
  public:
   /// `topics`: names of the topics to read, separated by commas; empty: the first with events, and
   /// all with images.
   explicit BagDecoder(std::string topics);
 
   void push(std::span<const std::uint8_t> piece) override;
-  void finish() override;
+  void drain() override;
   bool open(ByteSource& source) override;
   std::optional<Item> next() override;
   const std::vector<StreamInfo>& streams() const override { return streams_; }

@@ -174,13 +174,13 @@ void CsvDecoder::read_head() {
   if (!empty && text.size() == head_.size())
     throw UnsupportedFormat("not CSV events: no line ends");
 
-  if (settings_.size != SensorSize{}) size_ = settings_.size;
-  validator_.set_size(size_);
+  if (settings_.size != SensorSize{}) stream_.size = settings_.size;
+  validator_.set_size(stream_.size);
   find_columns(sample);
   find_unit(sample);
-  has_labels_ =
+  stream_.labelled =
       std::ranges::any_of(columns_, [](auto column) { return column && *column > EventColumn::p; });
-  if (columns_.size() == event_columns && !has_labels_)
+  if (columns_.size() == event_columns && !stream_.labelled)
     plain_lines_.emplace(columns_, separator_, power_);
 }
 
@@ -191,16 +191,16 @@ bool CsvDecoder::read_header_line(std::string_view line) {
   if (line.starts_with(geometry)) {
     if (split(line.substr(geometry.size()), fields) != 2) return true;
     const auto size = read_size(fields[0], fields[1]);
-    if (size != SensorSize{}) size_ = size;
+    if (size != SensorSize{}) stream_.size = size;
     has_geometry_ = true;
     return true;
   }
   if (is_comment(line)) return true;
   const auto count = split(line, fields);
   if (count == 2) {
-    if (size_ != SensorSize{}) return false;
-    size_ = read_size(fields[0], fields[1]);
-    return size_ != SensorSize{};
+    if (stream_.size != SensorSize{}) return false;
+    stream_.size = read_size(fields[0], fields[1]);
+    return stream_.size != SensorSize{};
   }
   const auto names = std::span(fields).first(count);
   // An index column may be unnamed.
@@ -221,7 +221,7 @@ bool CsvDecoder::read_header_line(std::string_view line) {
       if (column == EventColumn::y) size.height = read_extent(field.substr(at + 1)).value_or(0);
     }
   }
-  if (size.width > 0 && size.height > 0) size_ = size;
+  if (size.width > 0 && size.height > 0) stream_.size = size;
   const auto known = std::ranges::count_if(
       columns_, [](auto column) { return column && *column <= EventColumn::p; });
   if (known < static_cast<std::ptrdiff_t>(event_columns) && settings_.columns.empty())

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
+#include "src/formats/event_decoder.hpp"
 #include "src/formats/event_table.hpp"
 #include "src/formats/table_sample.hpp"
 #include "src/formats/text/decimal.hpp"
@@ -29,7 +29,7 @@ namespace eventcamera {
 /// Polarity is 0/1, -1/1 or false/true.
 ///
 /// A file with only a header or comments, or with nothing, is a recording without events.
-class CsvDecoder final : public Decoder {
+class CsvDecoder final : public EventDecoder {
  public:
   explicit CsvDecoder(const TableSettings& settings = {});
 
