@@ -86,7 +86,6 @@ class EventOverlay final : public EventAggregator {
 
   GstAggregatorPad* const events_pad_ = pad("event_sink");
 
-  // Accessed by the source pad's thread only, or while there is none.
   std::optional<GstVideoInfo> video_;
   std::optional<SensorSize> sensor_;
   std::optional<Overlay> overlay_;     // set once both are known
@@ -110,8 +109,8 @@ std::optional<EventInterval> running_interval(GstAggregatorPad* pad,
   return EventInterval{*start, *start + static_cast<GstClockTime>(std::min(length, max))};
 }
 
-/// Interval during which a frame is shown, in running time; that since the last frame if nothing
-/// tells when it ends.
+/// Interval during which a frame is shown, in running time; since the last frame if its end is
+/// unknown.
 std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) const {
   const GstClockTime start = GST_BUFFER_PTS(frame);
   if (!GST_CLOCK_TIME_IS_VALID(start) || start > G_MAXINT64) return std::nullopt;
@@ -126,7 +125,7 @@ std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) c
 
 /* events */
 
-/// The events of a buffer that is played at a rate, with times that differ as running times do.
+/// The events of a buffer, with times scaled by the rate to differences of running time.
 std::span<const Event> EventOverlay::in_running_time(std::span<const Event> events, double rate) {
   if (rate == 1) return events;
   constexpr double max = std::numeric_limits<std::uint32_t>::max();
