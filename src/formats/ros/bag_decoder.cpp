@@ -254,7 +254,7 @@ std::optional<Microseconds> BagDecoder::decoded_last_time() {
   return last;
 }
 
-std::string BagDecoder::left_out() const {
+std::string BagDecoder::unread_topics() const {
   if (unread_.empty()) return {};
   return "topics " + listed(unread_);
 }
