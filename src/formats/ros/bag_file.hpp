@@ -73,7 +73,7 @@ class BagFile {
   Corruption& corruption() { return corruption_; }
 
  protected:
-  explicit BagFile(TakeTopic take_topic) : take_topic_(std::move(take_topic)) {}
+  explicit BagFile(TakeTopic handle_topic) : take_topic_(std::move(handle_topic)) {}
 
   /// Limit of the name of a topic or type, bytes.
   static constexpr std::size_t max_name = 1024;

@@ -44,9 +44,9 @@ class TopicDecoder {
  protected:
   explicit TopicDecoder(Corruption& corruption) : corruption_(corruption) {}
 
-  /// Takes the size of the first message, if it is valid; that of a later one might not hold the
-  /// events before it.
-  void take_size(std::uint32_t width, std::uint32_t height);
+  /// Adopts the size of the first message, if valid: earlier events might not fit into a later
+  /// size.
+  void handle_size(std::uint32_t width, std::uint32_t height);
 
   Corruption& corruption_;
   Decoded decoded_;
