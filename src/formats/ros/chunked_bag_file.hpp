@@ -41,7 +41,7 @@ class ChunkedBagFile : public BagFile {
   /// Limit of topics.
   static constexpr std::size_t max_topics = 4096;
 
-  /// What the first bytes of a record say.
+  /// First bytes of a record, parsed.
   struct Head {
     enum class Kind : std::uint8_t { none, skipped, read, chunk, end };
     Kind kind = Kind::none;  ///< none: this is not a record

@@ -40,7 +40,7 @@ constexpr Microseconds microseconds(std::uint64_t nanoseconds) {
   return time / 1000 - (time % 1000 < 0 ? 1 : 0);
 }
 
-/// What the clocks of the sensor and of ROS may drift apart in a recording, less than half of the
+/// Maximum drift between the clocks of the sensor and of ROS in a recording, less than half of the
 /// wrap period of EVT3. If they are further apart after a seek, the camera was started again.
 constexpr Microseconds max_drift = 4'000'000;
 

@@ -44,7 +44,7 @@ class ImageDecoder final : public TopicDecoder {
   void restart() override { due_.reset(); }
 
  private:
-  /// Returns what is wrong, or nullptr.
+  /// Returns the fault of a message, or nullptr.
   const char* read(MessageCursor& fields) {
     Frame frame;
     frame.t = static_cast<Microseconds>(fields.header_stamp() / 1000);
