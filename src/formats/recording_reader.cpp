@@ -666,7 +666,7 @@ RecordingReader::Counts RecordingReader::counts() const {
   for (const auto& stream : streams_) {
     counts.outside += stream.outside;
     if (!begun_) continue;
-    const auto& dropped = stream.chunker.dropped();
+    const auto dropped = stream.chunker.dropped();
     counts.late += dropped.late;
     counts.stray += dropped.stray;
   }
