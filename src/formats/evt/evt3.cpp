@@ -140,7 +140,7 @@ class Evt3Decoder final : public UnitDecoder {
       case continued_12:
         break;
       default:
-        batch.bad(at, 2, "EVT3 word of unknown type");
+        if (word != padding) batch.bad(at, 2, "EVT3 word of unknown type");
     }
     return at + 2;
   }

@@ -28,6 +28,9 @@ enum Type : std::uint32_t {
   continued_12 = 0xf,
 };
 
+/// Word that the cameras of Lucid fill their packets with, wherever these end.
+constexpr std::uint32_t padding = 0x9999;
+
 }  // namespace evt3
 
 /// Writes EVT3 words, restricted to what all known readers interpret equally: vectors are complete

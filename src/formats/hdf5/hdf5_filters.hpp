@@ -10,7 +10,10 @@
 
 namespace eventcamera {
 
-/// True for a supported filter: deflate, shuffle or Fletcher-32.
+/// Number of the filter LZF, h5py's own; its plugin in Debian cannot be loaded.
+constexpr int lzf_filter = 32000;
+
+/// True for a supported filter: deflate, LZF, shuffle or Fletcher-32.
 bool is_own_hdf5_filter(int filter);
 
 /// Undoes the filters of a chunk of numbers of the given size, the last filter first. Set bits of

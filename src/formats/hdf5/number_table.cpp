@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "src/formats/hdf5/hdf5_rows.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 
@@ -28,10 +29,29 @@ std::uint64_t NumberTable::read(std::uint64_t row, RowValidator& validator,
       note(corruption, t_dataset(), row, "timestamp out of range");
       continue;
     }
+    const auto on = polarities_.is_on(p_[i]);
+    if (!on) {
+      note(corruption, t_dataset(), row, "polarity other than 0, 1 and -1");
+      continue;
+    }
     const auto label = has_labels_ ? label_from(cause_[i], object_class_[i]) : Label{};
-    validator.take(t, x_[i], y_[i], p_[i] > 0, label, out, corruption);
+    validator.take(t, x_[i], y_[i], *on, label, out, corruption);
   }
   return end;
+}
+
+TimeUnit NumberTable::detect(const TableSample& sample, const Columns& columns,
+                             std::optional<TimeUnit> unit, bool are_floating,
+                             const std::string& path) {
+  if (!sample.empty()) polarities_ = sample.find_polarities(columns);
+  if (unit) return *unit;
+  if (sample.empty()) return are_floating ? TimeUnit::seconds : TimeUnit::microseconds;
+  unit = sample.find_unit(columns, false);
+  if (!unit)
+    throw UnsupportedFormat("the time unit of the HDF5 dataset " + path +
+                            " is ambiguous; rename the times to t_s, t_us or t_ns, or convert them "
+                            "to text or NumPy, whose readers have time-unit");
+  return *unit;
 }
 
 std::uint64_t NumberTable::row_before(Microseconds t) {
