@@ -126,7 +126,7 @@ def read_records(args, videos):
 
 
 def reason_to_make(video, record, output):
-    """Why a video has to be made; empty if it need not."""
+    """Reason to make a video; empty if it is up to date."""
     if not record or "written" not in record:
         return "missing"
     try:

@@ -23,6 +23,8 @@
  * gst-launch-1.0 filesrc location=drive.mp4 ! decodebin ! eventsim-dense flow=dis-hq ! videoconvert
  * ! vp8enc deadline=1 ! webmmux ! filesink location=events.webm
  * ]|
+ *
+ * Since: 0.1
  */
 #include "features.hpp"
 #include "gst/simulator/dense_properties.hpp"

@@ -39,6 +39,8 @@
  * gst-launch-1.0 videotestsrc pattern=ball num-buffers=100 ! eventsim-dvs preset=v2e-noisy
  * threshold-sigma=0.03 seed=7 ! evtenc format=EVT3 ! filesink location=ball.raw
  * ]|
+ *
+ * Since: 0.1
  */
 #include <algorithm>
 #include <bitset>
@@ -79,7 +81,7 @@ static GType upsampling_type() {
       {static_cast<int>(Upsampling::linear),
        "Linear interpolation per pixel, in units of the response", "linear"},
       {static_cast<int>(Upsampling::motion),
-       "Motion along dense optical flow, in steps of a pixel, longer where much moves", "motion"},
+       "Motion along dense optical flow, in steps of a pixel, or more if it is fast", "motion"},
       {0, nullptr, nullptr},
   };
   return enum_type("GstEventSimDvsUpsampling", values);
@@ -167,8 +169,8 @@ const PixelProperty pixel_properties[] = {
     {"upsampling", "Upsampling", "Model of light between two frames", &DvsSettings::upsampling, 0,
      0, fixed, upsampling_type},
     {"max-interpolated-frames", "Maximum interpolated frames",
-     "Maximum number of frames interpolated between two frames with upsampling=motion; without "
-     "this limit, up to 4 pixels of motion have steps of a pixel, and more have longer ones",
+     "Maximum number of frames interpolated between two frames with upsampling=motion. Without "
+     "this limit, steps are a pixel for motion of up to 4 pixels, and longer for more",
      &DvsSettings::max_interpolated_frames, 0, 254},
     {"cutoff-frequency", "Cutoff frequency",
      "Bandwidth of the photoreceptor at white; darker pixels are slower (Hz; 0 = no limit)",
@@ -211,7 +213,7 @@ const PixelProperty pixel_properties[] = {
      "of real cameras saturate in this way at strong edges",
      &DvsSettings::adaptation, 0, 10, controllable},
     {"adaptation-time", "Adaptation time",
-     "Time in which the growth by one event is gone, at a constant rate (ns)",
+     "Time in which the growth by one event decays to 0, at a constant rate (ns)",
      &DvsSettings::adaptation_time, 1000, max_time, controllable},
     {"refractory-period", "Refractory period",
      "Time after an event during which the pixel cannot fire (ns)", &DvsSettings::refractory_period,
@@ -298,7 +300,7 @@ struct Settings {
   DvsPreset preset = DvsPreset::ideal;
   std::string profile;
   Overrides of_profile;       ///< override the preset
-  std::string profile_error;  ///< why the profile could not be read, if so
+  std::string profile_error;  ///< reason why the profile could not be read; empty if it was
   Overrides of_properties;    ///< override both
 
   DvsSettings dvs_settings() const {
@@ -349,20 +351,19 @@ static GParamSpec* spec_of(const PixelProperty& s, Value value) {
 static void install_properties(GObjectClass* klass) {
   const Settings defaults;
   Properties<settings_of> properties(klass);
-  properties.add(
-      &Settings::preset,
-      g_param_spec_enum("preset", "Preset",
-                        "Camera model: sets all properties of the pixel, except those that are set "
-                        "explicitly, before or after",
-                        preset_type(), static_cast<int>(defaults.preset), mutable_playing_flags));
+  properties.add(&Settings::preset,
+                 g_param_spec_enum(
+                     "preset", "Preset",
+                     "Camera model: sets all properties of the pixel that are not set explicitly, "
+                     "before or after",
+                     preset_type(), static_cast<int>(defaults.preset), mutable_playing_flags));
   properties.add(
       [klass](Settings& settings, const GValue* value) { settings.set_profile(value, klass); },
       [](Settings& settings, GValue* value) { write_value(settings.profile, value); },
       g_param_spec_string(
           "profile", "Camera profile",
-          "File of settings that event-calibrate fitted to a camera, which override "
-          "those of the preset, but not those that are set explicitly, before or "
-          "after",
+          "File of settings that event-calibrate fitted to a camera. They override the preset, but "
+          "not properties that are set explicitly, before or after",
           "", mutable_ready_flags));
   for (std::size_t i = 0; i < std::size(pixel_properties); ++i) {
     const auto add = [&](auto member) {

@@ -23,6 +23,8 @@
  * |[
  * gst-launch-1.0 videotestsrc pattern=ball ! eventsim-frame ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventSimulatorMethod frame = {
     .type_name = "GstEventSimFrame",
@@ -52,6 +54,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventsim_frame, "eventsim-frame", GST_RANK_NONE,
  * gst-launch-1.0 videotestsrc pattern=ball num-buffers=300 ! eventsim-sparse !
  * eventnpyenc ! filesink location=ball.npy
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventSimulatorMethod sparse = {
     .type_name = "GstEventSimSparse",
@@ -83,6 +87,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventsim_sparse, "eventsim-sparse", GST_RANK_NONE,
  * |[
  * gst-launch-1.0 v4l2src ! eventsim-diff ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventSimulatorMethod diff = {
     .type_name = "GstEventSimDiff",

@@ -23,7 +23,7 @@
 /// seekable range, and a seek must flush, because the pads reach it at different times. A seek is
 /// forwarded to all pads, or to none if one of them would refuse it.
 ///
-/// Only for the source pad's thread, or while it does not run.
+/// Functions are called by the source pad's task, or in state changes while it does not run.
 class EventAggregator {
  public:
   struct Role {

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 /// Triggers and IMU samples on their way from a reader to a writer: serialized custom events, which
 /// other elements forward. docs/formats.md describes them. They precede the buffer or GAP of their

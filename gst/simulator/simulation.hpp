@@ -35,9 +35,9 @@ struct SimulatorStats {
   guint64 processing_time = 0;  ///< ns
 };
 
-/// Duration of the intervals of a stream, which is the latency of their events. Starts with that of
-/// the caps. Rises to the second longest of the last intervals, so that one pause does not delay
-/// all that follows; falls once all of them are clearly shorter. Jitter does not change it.
+/// Duration of the intervals of a stream, which is the latency of their events. Starts with the
+/// caps' duration. Rises to the second longest of the last intervals, so that one pause does not
+/// delay all that follows; falls once all of them are clearly shorter. Jitter does not change it.
 class IntervalDuration {
  public:
   using Nanoseconds = eventcamera::Nanoseconds;
@@ -60,7 +60,7 @@ class IntervalDuration {
 /// pushes events or pictures. A failure is reported, and drops the simulator; the next frame makes
 /// another.
 ///
-/// Called with the stream lock of the sink pad, or while there is no streaming thread.
+/// GstBaseTransform calls all functions but the last ones under the stream lock of the sink pad.
 class Simulation {
  public:
   using Nanoseconds = eventcamera::Nanoseconds;

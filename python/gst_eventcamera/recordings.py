@@ -85,7 +85,7 @@ class Stream:
         return self._length(self._whole)
 
     def _length(self, whole: float) -> float:
-        """Of the part, of a recording of so many seconds."""
+        """Start and end of the part in a recording of this many seconds."""
         return max(0.0, min(whole, math.inf if self.end is None else self.end) - self.start)
 
     def between(self, start: float, end: Optional[float] = None) -> Stream:
@@ -320,7 +320,7 @@ def _labels(events: np.ndarray) -> list[np.ndarray]:
 
 
 def _buffers(events: np.ndarray) -> Iterator[Gst.Buffer]:
-    """The events in buffers of a grid, those without events left out."""
+    """The events in buffers of a grid, without empty buffers."""
     t = np.asarray(events["t"])
     cuts = [0, *(np.flatnonzero(t[1:] // BUFFER != t[:-1] // BUFFER) + 1), len(events)]
     for first, last in itertools.pairwise(cuts) if len(events) > 0 else []:

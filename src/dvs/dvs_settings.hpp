@@ -22,7 +22,7 @@ enum class Response {
 /// Model of light between two frames.
 enum class Upsampling {
   linear,  ///< linear interpolation per pixel, in units of the response
-  motion,  ///< motion along the optical flow, in steps of a pixel, longer where much moves
+  motion,  ///< motion along the optical flow, in steps of a pixel, or more if it is fast
 };
 
 /// Reference level of a pixel after an event.
@@ -59,7 +59,7 @@ struct DvsSettings {
   double dead_pixels = 0;      ///< fraction of all pixels
 
   double adaptation = 0;                     ///< growth of the thresholds by an event, a fraction
-  Nanoseconds adaptation_time = 10'000'000;  ///< time in which the growth from one event fades
+  Nanoseconds adaptation_time = 10'000'000;  ///< decay time of the growth from one event
 
   Nanoseconds refractory_period = 0;
   RefractoryReset refractory_reset = RefractoryReset::level;

@@ -139,7 +139,7 @@ class PixelSimulator final : public DvsSimulator {
     });
   }
 
-  /// Row by row, which leaves the events of a microsecond nearly in raster order.
+  /// Row by row: the events of one microsecond are nearly in raster order.
   void advance_along_motion() {
     const auto flow = find_flow();
     const int max_steps = settings_.max_interpolated_frames + 1;
@@ -157,7 +157,7 @@ class PixelSimulator final : public DvsSimulator {
     });
   }
 
-  /// Extends an empty run over the tiles that have the steps of the first one, which it returns.
+  /// Extends an empty run over the tiles with as many steps as the first one. Returns that number.
   int extend_over_tiles(Run& run) const {
     const auto steps_at = [&](int x) {
       return tiles_.steps(x / MotionTiles::width, run.y / MotionTiles::height);

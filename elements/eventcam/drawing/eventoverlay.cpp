@@ -18,6 +18,8 @@
  * gst-launch-1.0 videotestsrc pattern=ball ! tee name=t  t. ! queue ! videoconvert ! eventoverlay
  * name=overlay ! videoconvert ! autovideosink  t. ! queue ! eventsim-diff ! overlay.event_sink
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/video/video.h>
 
@@ -89,7 +91,6 @@ class EventOverlay final : public EventAggregator {
 
   GstAggregatorPad* const events_pad_ = pad("event_sink");
 
-  // Accessed by the source pad's thread only, or while there is none.
   std::optional<GstVideoInfo> video_;
   std::optional<GstVideoInfo> drawn_;  // output; in colour where the video is grey
   std::optional<SensorSize> sensor_;
@@ -114,8 +115,8 @@ std::optional<EventInterval> running_interval(GstAggregatorPad* pad,
   return EventInterval{*start, *start + static_cast<GstClockTime>(std::min(length, max))};
 }
 
-/// Interval during which a frame is shown, in running time; that since the last frame if nothing
-/// tells when it ends.
+/// Interval during which a frame is shown, in running time; since the last frame if its end is
+/// unknown.
 std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) const {
   const GstClockTime start = GST_BUFFER_PTS(frame);
   if (!GST_CLOCK_TIME_IS_VALID(start) || start > G_MAXINT64) return std::nullopt;
@@ -130,7 +131,7 @@ std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) c
 
 /* events */
 
-/// The events of a buffer that is played at a rate, with times that differ as running times do.
+/// The events of a buffer, with times scaled by the rate to differences of running time.
 std::span<const Event> EventOverlay::in_running_time(std::span<const Event> events, double rate) {
   if (rate == 1) return events;
   constexpr double max = std::numeric_limits<std::uint32_t>::max();

@@ -26,6 +26,8 @@
  * gst-launch-1.0 filesrc location=davis.aedat4 ! aedatdemux name=d  d.events_0 ! queue ! m.
  * d.video_0 ! queue ! m.  aedatmux name=m ! filesink location=copy.aedat4
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/base/gstaggregator.h>
 
@@ -77,8 +79,6 @@ struct GstAedatMuxPrivate {
 
   Guarded<Settings> settings;
   std::atomic<bool> has_header = false;  ///< no pads can be added
-
-  // Accessed by the streaming thread only, or while there is none.
   AedatFile file;
   std::optional<GstSegment> segment;  ///< of the events written last
 };

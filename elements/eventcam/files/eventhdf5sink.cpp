@@ -18,6 +18,8 @@
  * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventhdf5sink format=metavision
  * location=events.hdf5
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/base/gstbasesink.h>
 
@@ -72,8 +74,6 @@ struct GstEventHdf5SinkPrivate {
       : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_ENCODE) {}
 
   Guarded<Settings> settings;
-
-  // Accessed by the streaming thread only, or while there is none.
   State state;
   WritableEvents writable;
 };

@@ -100,14 +100,14 @@ void Aedat2Decoder::take_line(const std::string& line) {
       return name.find(known.name) != name.npos;
     });
     if (camera != std::end(aedat2_cameras)) {
-      size_ = camera->size;
+      stream_.size = camera->size;
       layout_ = camera->layout;
     } else if (assumed_ == SensorSize{}) {
       throw UnsupportedFormat("unsupported camera in the AEDAT 2.0 header: " + name +
                               "; set width and height");
     }
-  } else if (size_ == SensorSize{}) {
-    size_ = size_in(line).value_or(SensorSize{});
+  } else if (stream_.size == SensorSize{}) {
+    stream_.size = size_in(line).value_or(SensorSize{});
   }
   if (line.find("v2e") != std::string::npos) of_v2e_ = true;
 }
@@ -141,11 +141,11 @@ bool Aedat2Decoder::find_layout() {
 /// Takes the stated size, or that of all cameras with this layout.
 void Aedat2Decoder::find_size() {
   constexpr SensorSize max_davis_size{640, 480};
-  if (size_ == SensorSize{}) size_ = assumed_;
-  if (size_ == SensorSize{} && layout_ == dvs128_layout) size_ = {128, 128};
-  if (size_ == SensorSize{} && layout_ == dvs640_layout) size_ = {640, 480};
-  is_mirrored_ = size_ == SensorSize{};
-  limit_ = is_mirrored_ ? max_davis_size : size_;
+  if (stream_.size == SensorSize{}) stream_.size = assumed_;
+  if (stream_.size == SensorSize{} && layout_ == dvs128_layout) stream_.size = {128, 128};
+  if (stream_.size == SensorSize{} && layout_ == dvs640_layout) stream_.size = {640, 480};
+  stream_.mirrored = stream_.size == SensorSize{};
+  limit_ = stream_.mirrored ? max_davis_size : stream_.size;
 }
 
 void Aedat2Decoder::read_records(Decoded& out) {
@@ -249,9 +249,9 @@ void Aedat2Decoder::append(const Record& record, Decoded& out) {
   const auto x = layout_->x(address);
   const auto y = layout_->y(address);
   const auto polarity = layout_->is_on(address) ? Polarity::on : Polarity::off;
-  out.events.push_back(
-      is_mirrored_ ? AbsoluteEvent::at(x, y, t, polarity)
-                   : AbsoluteEvent::at(size_.width - 1 - x, size_.height - 1 - y, t, polarity));
+  out.events.push_back(stream_.mirrored ? AbsoluteEvent::at(x, y, t, polarity)
+                                        : AbsoluteEvent::at(limit_.width - 1 - x,
+                                                            limit_.height - 1 - y, t, polarity));
 }
 
 Aedat2Decoder::Record Aedat2Decoder::record_at(const std::uint8_t* bytes) const {

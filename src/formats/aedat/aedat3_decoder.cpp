@@ -104,8 +104,8 @@ void Aedat3Decoder::take_line(const std::string& line) {
   if (line.starts_with("#Format:") && line.find("RAW") == std::string::npos)
     throw UnsupportedFormat("unsupported compression of AEDAT 3.1: " + line.substr(1));
   // The camera and the filters of its events are separate sources, all of the same size.
-  if ((line.starts_with("#Source") || line.starts_with("#-Source")) && size_ == SensorSize{})
-    size_ = size_of(line);
+  if ((line.starts_with("#Source") || line.starts_with("#-Source")) && stream_.size == SensorSize{})
+    stream_.size = size_of(line);
 }
 
 void Aedat3Decoder::read_packets(Decoded& out) {
@@ -242,7 +242,7 @@ bool Aedat3Decoder::is_odd(const std::uint8_t* event) const {
   const auto data = little_endian<std::uint32_t>(event);
   if (little_endian<std::int32_t>(event + 4) < 0) return true;
   if (packet_.type != polarity || (data & valid) == 0) return false;
-  const auto limit = size_ != SensorSize{} ? size_ : SensorSize{widest, widest};
+  const auto limit = stream_.size != SensorSize{} ? stream_.size : SensorSize{widest, widest};
   return x_of(data) >= limit.width || y_of(data) >= limit.height;
 }
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 namespace eventcamera {
 

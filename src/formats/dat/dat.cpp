@@ -237,7 +237,7 @@ class DatEncoder final : public Encoder {
 
 }  // namespace
 
-std::unique_ptr<Decoder> make_dat_decoder() {
+std::unique_ptr<EventDecoder> make_dat_decoder() {
   return std::make_unique<DatDecoder>();
 }
 

@@ -170,11 +170,11 @@ class EsDecoder final : public UnitStreamDecoder {
     return header_size;
   }
 
-  template <class EventDecoder>
+  template <class DvsDecoder>
   void begin_events(SensorSize size) {
     if (!is_side(size.width) || !is_side(size.height))
       throw UnsupportedFormat("Event Stream with an impossible sensor size of " + in_pixels(size));
-    begin(std::make_unique<EventDecoder>(size, origin_), size);
+    begin(std::make_unique<DvsDecoder>(size, origin_), size);
   }
 
   EsOrigin origin_;
@@ -239,7 +239,7 @@ class EsEncoder final : public Encoder {
 
 }  // namespace
 
-std::unique_ptr<Decoder> make_event_stream_decoder(EsOrigin origin) {
+std::unique_ptr<EventDecoder> make_event_stream_decoder(EsOrigin origin) {
   return std::make_unique<EsDecoder>(origin);
 }
 

@@ -112,8 +112,8 @@ std::optional<std::int64_t> npy_integer(const NpyField& field, const std::uint8_
 }
 
 NpyDecoder::NpyDecoder(const TableSettings& settings) : settings_(settings) {
-  size_ = settings.size;
-  validator_.set_size(size_);
+  stream_.size = settings.size;
+  validator_.set_size(stream_.size);
 }
 
 NpyDecoder::NpyDecoder(const NpyHeader& header, const TableSettings& settings)
@@ -180,9 +180,9 @@ void NpyDecoder::find_layout(std::span<const std::uint8_t> elements) {
         "time-unit");
   power_ = power_of(*unit);
   const std::span<const NpyField> all(header_->fields);
-  has_labels_ = std::ranges::any_of(all.subspan(event_columns),
-                                    [](const NpyField& field) { return field.bytes > 0; });
-  plain_ = power_ == 0 && header_->element_bytes >= sizeof(std::uint64_t) && !has_labels_ &&
+  stream_.labelled = std::ranges::any_of(all.subspan(event_columns),
+                                         [](const NpyField& field) { return field.bytes > 0; });
+  plain_ = power_ == 0 && header_->element_bytes >= sizeof(std::uint64_t) && !stream_.labelled &&
            std::ranges::all_of(all.first(event_columns), [](const NpyField& field) {
              // Unsigned 64-bit numbers may not fit.
              return field.kind != NpyField::Kind::floating &&
@@ -249,7 +249,7 @@ void NpyDecoder::decode_tail(ByteSource& source, Decoded& out) const {
   tail.layout_known_ = true;
   tail.power_ = power_;
   tail.plain_ = plain_;
-  tail.has_labels_ = has_labels_;
+  tail.stream_.labelled = stream_.labelled;
   tail.left_ = last;
   tail.decode(bytes, out);
 }

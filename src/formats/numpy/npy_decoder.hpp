@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
+#include "src/formats/event_decoder.hpp"
 #include "src/formats/event_table.hpp"
 #include "src/formats/numpy/npy_header.hpp"
 
@@ -19,7 +19,7 @@ std::optional<std::int64_t> npy_integer(const NpyField& field, const std::uint8_
 /// order, or rows of numbers whose columns are detected from the first rows. Numbers are integers
 /// or floating-point numbers of any width and byte order. The time unit is taken from the name of
 /// the field, or detected from the first rows (TableSample). A polarity above 0 is ON.
-class NpyDecoder final : public Decoder {
+class NpyDecoder final : public EventDecoder {
  public:
   explicit NpyDecoder(const TableSettings& settings = {});
 

@@ -3,8 +3,8 @@
 
 #include <memory>
 
+#include "src/formats/decoder.hpp"
 #include "src/formats/event_table.hpp"
-#include "src/formats/recording_decoder.hpp"
 
 namespace eventcamera {
 
@@ -12,6 +12,6 @@ namespace eventcamera {
 /// or one array of events as in an .npy file. The sensor size is that of the numbers named width
 /// and height, if any. Pushed bytes are collected in memory, up to 256 MiB, and read at their end,
 /// because an archive's directory is at its end.
-std::unique_ptr<RecordingDecoder> make_npz_decoder(const TableSettings& settings = {});
+std::unique_ptr<Decoder> make_npz_decoder(const TableSettings& settings = {});
 
 }  // namespace eventcamera

@@ -117,7 +117,7 @@ bool BagDecoder::is_wanted(const BagTopic& topic, StreamKind kind) const {
          });
 }
 
-void BagDecoder::finish() {
+void BagDecoder::drain() {
   finished_ = true;
   if (!file_) choose_format(start_);
   file_->finish();
@@ -254,7 +254,7 @@ std::optional<Microseconds> BagDecoder::decoded_last_time() {
   return last;
 }
 
-std::string BagDecoder::left_out() const {
+std::string BagDecoder::unread_topics() const {
   if (unread_.empty()) return {};
   return "topics " + listed(unread_);
 }

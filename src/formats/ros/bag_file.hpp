@@ -35,7 +35,7 @@ struct BagMessage {
 
 /// Reads the messages of a bag, in the order of the file.
 ///
-/// Bytes are passed in pieces, as to a RecordingDecoder; the split does not affect the result.
+/// Bytes are passed in pieces, as to a Decoder; the split does not affect the result.
 class BagFile {
  public:
   /// Called with every topic before its first message; returns a number for its messages, or

@@ -7,8 +7,7 @@
 
 #include "src/core/sensor_size.hpp"
 #include "src/formats/corruption.hpp"
-#include "src/formats/decoded.hpp"
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/ros/bag_file.hpp"
 
 namespace eventcamera {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "src/formats/event_table.hpp"
+
 namespace eventcamera {
 
 namespace {
@@ -77,7 +79,7 @@ std::optional<Decimal> rounded_down(const Number& number) {
     if (digits > max / 10) return std::nullopt;
     digits *= 10;
   }
-  // Cuts off digits, which are rest / scale.
+  // Cuts off digits: the fraction is rest / scale.
   auto rest = 0.0;
   auto scale = 1.0;
   for (; power < 0 && digits != 0; ++power, scale *= 10) {
@@ -87,12 +89,8 @@ std::optional<Decimal> rounded_down(const Number& number) {
   whole = whole && rest == 0;
   if (digits >= max && !whole) return std::nullopt;
   if (digits > max) return std::nullopt;
-  const auto next = static_cast<double>(digits) + 1;
-  constexpr double max_uncertainty = 0.0005;  // three more digits are always believed
-  const bool is_next = scale - rest <= scale * std::min(next * 0x1p-53, max_uncertainty);
-  const bool is_this =
-      rest <= scale * std::min(static_cast<double>(digits) * 0x1p-53, max_uncertainty);
-  const bool up = negative ? !whole && !is_this : is_next;
+  const double rounding_up = has_fraction ? max_rounding_up * scale : 0;
+  const bool up = negative ? !whole && rest > rounding_up : scale - rest <= rounding_up;
   const auto value = static_cast<std::int64_t>(digits + (up ? 1 : 0));
   return Decimal{negative ? -value : value, whole, has_fraction};
 }
