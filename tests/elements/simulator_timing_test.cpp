@@ -276,14 +276,22 @@ TEST_P(EverySimulator, WarnsOfTimeThatRunsBackwards) {
 }
 
 /// As from decoders, where the timestamps of a file are not in the order of its frames.
-TEST_P(EverySimulator, SpacesFramesOfTheSameTimestampByTheFramerate) {
+TEST_P(EverySimulator, SpacesFramesOfTheSameTimestamp) {
   h.caps(video);
   for (const auto pts : {0, 40, 40, 80, 80, 80, 80}) flash(pts * GST_MSECOND);
   flash(240 * GST_MSECOND);
   flash(240 * GST_MSECOND + 1);  // less than a microsecond later
+  for (int i = 0; i < 3; ++i) {  // a stream of them
+    GstBuffer* const frame = h.flat(0, i % 2 * 100);
+    GST_BUFFER_DURATION(frame) = 30 * GST_MSECOND;
+    GST_BUFFER_FLAG_SET(frame, i == 0 ? GST_BUFFER_FLAG_DISCONT : 0);
+    h.push(frame);
+  }
   const GstClockTime times[] = {0, 40, 60, 80, 100, 140, 180, 240, 260};
   for (std::size_t i = 1; i < std::size(times); ++i)
     expect_interval(times[i - 1] * GST_MSECOND, times[i] * GST_MSECOND);
+  expect_interval(0, 30 * GST_MSECOND);
+  expect_interval(30 * GST_MSECOND, 60 * GST_MSECOND);
   EXPECT_NE(h.warning().find("the same one"), std::string::npos);
   EXPECT_EQ(h.warning(), "");
 }
