@@ -20,7 +20,6 @@ GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
 
 using eventcamera::Microseconds;
 using eventcamera::RecordingReader;
-using eventcamera::SeekPoint;
 using eventcamera::UnsupportedFormat;
 
 namespace {
