@@ -84,14 +84,16 @@ static gboolean forward(GstAggregator* element, GstEvent* event) {
 }
 
 /// Answers a caps query on a pad whose buffers pass through with the caps that downstream accepts.
-static void answer_caps_of_passed(GstAggregator* aggregator, GstAggregatorPad* pad,
-                                  GstQuery* query) {
+static void answer_caps_of_passed(EventAggregator& self, GstAggregator* aggregator,
+                                  GstAggregatorPad* pad, GstQuery* query) {
   GstCaps* filter = nullptr;
   gst_query_parse_caps(query, &filter);
   const OwnedCaps ours(gst_pad_get_pad_template_caps(GST_PAD(pad)));
-  const OwnedCaps taken(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(aggregator), filter));
-  const OwnedCaps result(
-      gst_caps_intersect_full(taken.get(), ours.get(), GST_CAPS_INTERSECT_FIRST));
+  const OwnedCaps taken(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(aggregator), ours.get()));
+  OwnedCaps result = self.input_caps(
+      OwnedCaps(gst_caps_intersect_full(taken.get(), ours.get(), GST_CAPS_INTERSECT_FIRST)));
+  if (filter != nullptr)
+    result.reset(gst_caps_intersect_full(result.get(), filter, GST_CAPS_INTERSECT_FIRST));
   gst_query_set_caps_result(query, result.get());
 }
 
@@ -225,7 +227,7 @@ struct EventAggregatorFunctions {
     }
     GST_DEBUG_OBJECT(pad, "accepted %" GST_PTR_FORMAT, caps);
     if (is_passed(self, pad)) {
-      self.main_caps_.reset(gst_caps_ref(caps));
+      self.main_caps_ = self.output_caps(caps);
       gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(self.element_));
     }
     return true;
@@ -346,7 +348,7 @@ struct EventAggregatorFunctions {
   static gboolean sink_query(GstAggregator* element, GstAggregatorPad* pad, GstQuery* query) {
     if (!is_passed(of(element), pad) || GST_QUERY_TYPE(query) != GST_QUERY_CAPS)
       return PARENT_AGGREGATOR_CLASS->sink_query(element, pad, query);
-    answer_caps_of_passed(element, pad, query);
+    answer_caps_of_passed(of(element), element, pad, query);
     return TRUE;
   }
 

@@ -5,7 +5,8 @@
 
 #include "src/render/palette.hpp"
 
-/// Video formats that events can be drawn in, the most common first.
+/// Video formats that events can be drawn in, the most common first, and those with colours.
+#define COLOUR_FORMATS "{ BGRx, RGBx, xRGB, xBGR, BGRA, RGBA, ARGB, ABGR, RGB, BGR }"
 #define DRAWN_VIDEO_FORMATS "{ BGRx, RGBx, xRGB, xBGR, BGRA, RGBA, ARGB, ABGR, RGB, BGR, GRAY8 }"
 
 /// Pixel layout of a video of DRAWN_VIDEO_FORMATS.

@@ -192,6 +192,9 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
         return TRUE;
       }
       break;
+    case GST_EVENT_TAG:
+      simulation.check_orientation(event);
+      break;
     case GST_EVENT_STREAM_START:
     case GST_EVENT_FLUSH_STOP:
       simulation.start_timeline();

@@ -212,22 +212,26 @@ void Simulation::warn_of_times(const char* what) {
       "an interval needs a PTS at both ends");
 }
 
-/// Returns the time of a frame: its PTS. A decoder gives frames whose timestamps are not in order
-/// the PTS of the frame before, which would end the interval at its start: such frames are spaced
-/// by the framerate, the first by half of that, because the next one is often right.
-Nanoseconds Simulation::time_of(GstClockTime pts) {
+/// Returns the time of a frame: its PTS. Decoders give a frame the PTS of the one before if the
+/// timestamps of a file are not in the order of its frames, or are missing, as in GIF. Then it
+/// follows after the duration of the last frame; in the middle of a stream, the first one after
+/// half of that, because the next frame often has the right time.
+Nanoseconds Simulation::time_of(GstBuffer* frame) {
+  const GstClockTime pts = GST_BUFFER_PTS(frame);
   const auto time = static_cast<Nanoseconds>(pts);
   const auto before = std::exchange(stream_.last_pts, pts);
+  GstClockTime duration = std::exchange(stream_.last_duration, GST_BUFFER_DURATION(frame));
+  if (duration == 0 || duration > GST_SECOND) duration = interval_;
   const auto last = state_->simulator().last_time();
-  const auto duration = static_cast<Nanoseconds>(interval_.load());
   const bool is_late_enough = last && time - *last >= Nanoseconds{event_resolution};
   if (!before || pts < *before || !last || is_late_enough || duration == 0) return time;
   stream_.warn_of_equal_times(
       element_,
       {GST_STREAM_ERROR_FORMAT,
-       "Bad video timestamps: frames have the same one. Spacing them by the framerate."},
+       "Bad video timestamps: frames have the same one. Spacing them by their durations."},
       "a frame is not later than the one before");
-  return *last + (*last <= time ? duration / 2 : duration);
+  const bool is_one_of_many = *last > time || !stream_.pushed_until;
+  return *last + static_cast<Nanoseconds>(is_one_of_many ? duration : duration / 2);
 }
 
 /// Returns why the interval since the last frame cannot end at `time`; null if it can.
@@ -254,6 +258,55 @@ void Simulation::check_interlacing(GstBuffer* frame) {
        "The video is interlaced: moving edges will fire in every other row. Insert a deinterlace "
        "element upstream."},
       std::string("interlace-mode=") + gst_video_interlace_mode_to_string(mode));
+}
+
+/// Pad that sends to `sink`, within bins; null if there is none.
+static OwnedPad source_of(GstPad* sink) {
+  OwnedPad peer(gst_pad_get_peer(sink));
+  while (peer && GST_IS_PROXY_PAD(peer.get())) {
+    GstPad* const inner = GST_IS_GHOST_PAD(peer.get())
+                              ? gst_ghost_pad_get_target(GST_GHOST_PAD(peer.get()))
+                              : GST_PAD(gst_proxy_pad_get_internal(GST_PROXY_PAD(peer.get())));
+    const bool is_source = GST_IS_GHOST_PAD(peer.get());
+    peer.reset(inner);
+    if (peer && !is_source) peer.reset(gst_pad_get_peer(inner));
+  }
+  return peer;
+}
+
+/// True if an element upstream turns or flips the video. The tags do not tell: videoflip 1.22
+/// leaves them unchanged.
+static bool is_turned_before(GstPad* sink) {
+  constexpr int max_elements = 64;
+  OwnedPad source = source_of(sink);
+  for (int i = 0; i < max_elements && source; ++i) {
+    const OwnedElement element(gst_pad_get_parent_element(source.get()));
+    if (!element) return false;
+    if (GST_IS_VIDEO_DIRECTION(element.get())) {
+      gint direction = GST_VIDEO_ORIENTATION_IDENTITY;
+      g_object_get(element.get(), "video-direction", &direction, nullptr);
+      if (direction != GST_VIDEO_ORIENTATION_IDENTITY) return true;
+    }
+    const OwnedPad next(gst_element_get_static_pad(element.get(), "sink"));
+    source = next ? source_of(next.get()) : nullptr;
+  }
+  return false;
+}
+
+void Simulation::check_orientation(GstEvent* tags) {
+  GstTagList* list = nullptr;
+  gst_event_parse_tag(tags, &list);
+  const gchar* orientation = nullptr;
+  if (!gst_tag_list_peek_string_index(list, GST_TAG_IMAGE_ORIENTATION, 0, &orientation) ||
+      g_str_equal(orientation, "rotate-0") ||
+      is_turned_before(GST_BASE_TRANSFORM_SINK_PAD(element_)))
+    return;
+  stream_.warn_of_orientation(
+      element_,
+      {GST_STREAM_ERROR_FORMAT,
+       "The video is rotated, and so are its events. Insert videoflip video-direction=auto "
+       "upstream."},
+      std::string("image-orientation=") + orientation);
 }
 
 /* discontinuities */
@@ -396,7 +449,7 @@ void Simulation::simulate(OwnedBuffer frame) {
     forget_frames();
     return;
   }
-  const Nanoseconds time = time_of(pts);
+  const Nanoseconds time = time_of(frame.get());
   const bool compare = settings.copy().skip_repeated;
   const auto kind = stream_.repeated.kind_of(frame.get(), time, compare, state_->video);
   if (kind == RepeatedFrames::Kind::repeated) {

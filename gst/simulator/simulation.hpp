@@ -35,9 +35,9 @@ struct SimulatorStats {
   guint64 processing_time = 0;  ///< ns
 };
 
-/// Duration of the intervals of a stream, which is the latency of their events. Starts with that of
-/// the caps. Rises to the second longest of the last intervals, so that one pause does not delay
-/// all that follows; falls once all of them are clearly shorter. Jitter does not change it.
+/// Duration of the intervals of a stream, which is the latency of their events. Starts with the
+/// caps' duration. Rises to the second longest of the last intervals, so that one pause does not
+/// delay all that follows; falls once all of them are clearly shorter. Jitter does not change it.
 class IntervalDuration {
  public:
   using Nanoseconds = eventcamera::Nanoseconds;
@@ -60,7 +60,7 @@ class IntervalDuration {
 /// pushes events or pictures. A failure is reported, and drops the simulator; the next frame makes
 /// another.
 ///
-/// Called with the stream lock of the sink pad, or while there is no streaming thread.
+/// GstBaseTransform calls all functions but the last ones under the stream lock of the sink pad.
 class Simulation {
  public:
   using Nanoseconds = eventcamera::Nanoseconds;
@@ -81,6 +81,8 @@ class Simulation {
   /// earlier than its end, because a GAP can overtake frames that a decoder still holds. Returns
   /// false if the event must be forwarded instead: for drawn video, and before a first frame.
   bool hold_through(GstEvent* gap);
+  /// Warns about rotated video, which its tags tell.
+  void check_orientation(GstEvent* tags);
   /// Finishes and pushes the pending interval.
   void finish();
   /// Finishes, with the events of the last gap: no frames follow.
@@ -131,6 +133,7 @@ class Simulation {
     std::unique_ptr<GBytes, UnrefBytes> motion;  ///< known, from the last frame to the next one
     std::optional<GstClockTime> next_time;       ///< end of the last frame
     std::optional<GstClockTime> last_pts;        ///< of the last frame
+    GstClockTime last_duration = 0;  ///< of the last frame, GST_CLOCK_TIME_NONE = unknown
     RepeatedFrames repeated;
     OwnedBuffer picture;          ///< drawn last, for repeated frames
     std::optional<bool> is_live;  ///< upstream's answer, once asked
@@ -139,6 +142,7 @@ class Simulation {
     WarnOnce warn_of_times{event_simulator_debug};
     WarnOnce warn_of_equal_times{event_simulator_debug};
     WarnOnce warn_of_interlacing{event_simulator_debug};
+    WarnOnce warn_of_orientation{event_simulator_debug};
   };
 
   const EventSimulatorMethod& method() const {
@@ -155,7 +159,7 @@ class Simulation {
 
   OwnedBuffer with_time(OwnedBuffer frame);
   std::optional<GstClockTime> time_of_arrival();
-  Nanoseconds time_of(GstClockTime pts);
+  Nanoseconds time_of(GstBuffer* frame);
   const char* fault_of_time(Nanoseconds time) const;
   void check_interlacing(GstBuffer* frame);
   void warn_of_times(const char* what);

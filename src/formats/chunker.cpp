@@ -91,7 +91,7 @@ void Chunker::keep_all(std::span<const AbsoluteEvent> events) {
   for (const auto& event : events) keep(event);
 }
 
-void Chunker::reach(Microseconds t) {
+void Chunker::advance_to(Microseconds t) {
   reached_ = std::max(reached_, std::clamp(t, -max_time, max_time));
   keep_all(unsettled_.settle_before(reached_ + settled));
 }
@@ -137,10 +137,10 @@ std::optional<Chunker::Interval> Chunker::next() {
   }
   if (end > due) {
     const auto cut = finished_ || paused_ ? due : std::min(end, middle());
-    return cut > start_ ? hand_out(cut) : hand_out_part(paused_ ? waiting_ : waiting_ / 2);
+    return cut > start_ ? interval_until(cut) : part_of(paused_ ? waiting_ : waiting_ / 2);
   }
   const auto silent_until = grid_before(cells_.empty() ? due : std::min(due, cells_.front().start));
-  return hand_out(std::max(end, silent_until));
+  return interval_until(std::max(end, silent_until));
 }
 
 /// Where to cut while too many events wait: in the first cell if it has most of them.
@@ -164,7 +164,7 @@ void Chunker::sort(Cell& cell) {
   std::ranges::stable_sort(cell.events, {}, &Event::t);
 }
 
-Chunker::Interval Chunker::hand_out(Microseconds end) {
+Chunker::Interval Chunker::interval_until(Microseconds end) {
   Interval interval{start_, end - start_, {}, {}};
   start_ = end;
   if (cells_.empty() || cells_.front().start >= end) return interval;
@@ -183,7 +183,7 @@ Chunker::Interval Chunker::hand_out(Microseconds end) {
 }
 
 /// The first events of a single time, of which more may follow: an interval without a duration.
-Chunker::Interval Chunker::hand_out_part(std::size_t count) {
+Chunker::Interval Chunker::part_of(std::size_t count) {
   return_first(count);
   return {start_, 0, returned_, returned_labels_};
 }

@@ -56,7 +56,7 @@ class Chunker {
   void push(std::span<const AbsoluteEvent> events);
 
   /// Declares that nothing earlier than `t` will follow.
-  void reach(Microseconds t);
+  void advance_to(Microseconds t);
 
   /// Declares a pause up to `t`: the events that wait are returned. Earlier ones may still follow.
   void pause(Microseconds t);
@@ -66,6 +66,10 @@ class Chunker {
 
   /// Returns the next interval if it is complete.
   std::optional<Interval> next();
+
+  /// Exchanges the memory of the events that next() returned last, where they stay valid, for
+  /// other memory.
+  void swap_memory(std::vector<Event>& memory) { returned_.swap(memory); }
 
   /// Start of the first interval; nothing if not known yet.
   std::optional<Microseconds> first() const { return first_; }
@@ -96,8 +100,8 @@ class Chunker {
   Cell& cell_of(Microseconds t);
   Microseconds middle();
   static void sort(Cell& cell);
-  Interval hand_out(Microseconds end);
-  Interval hand_out_part(std::size_t count);
+  Interval interval_until(Microseconds end);
+  Interval part_of(std::size_t count);
   void return_first(std::size_t count);
   Microseconds grid_before(Microseconds t) const { return t - (t - *first_) % length_; }
 

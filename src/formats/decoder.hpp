@@ -183,9 +183,9 @@ class Decoder {
   /// Where to restart for the first item of a stream, if the file states it.
   virtual std::optional<SeekPoint> first_of(std::size_t /*stream*/) const { return std::nullopt; }
 
-  /// What the file has and the decoder does not read, for users, such as "topics /a, /b"; empty if
-  /// there is nothing that another setting would read.
-  virtual std::string left_out() const { return {}; }
+  /// Topics that are not read but that another setting would read, for users, such as
+  /// "topics /a, /b"; empty if there are none.
+  virtual std::string unread_topics() const { return {}; }
 
   /// Name of the format for users; empty if it adds nothing to the media type.
   virtual std::string format_name() const { return {}; }

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/formats/event_table.hpp"
 
+#include <cmath>
 #include <string>
+
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 
@@ -13,24 +16,32 @@ std::optional<EventColumn> column_with(std::string_view word) {
     EventColumn column;
   };
   static constexpr Name names[] = {
-      {"t", EventColumn::t},
-      {"ts", EventColumn::t},
-      {"time", EventColumn::t},
-      {"timestamp", EventColumn::t},
-      {"timestamps", EventColumn::t},
-      {"x", EventColumn::x},
-      {"xs", EventColumn::x},
-      {"y", EventColumn::y},
-      {"ys", EventColumn::y},
-      {"p", EventColumn::p},
-      {"ps", EventColumn::p},
-      {"pol", EventColumn::p},
-      {"polarity", EventColumn::p},
-      {"polarities", EventColumn::p},
-      {"on", EventColumn::p},
-      {"cause", EventColumn::cause},
-      {"class", EventColumn::object_class},
+      {"t", EventColumn::t},          {"ts", EventColumn::t},
+      {"time", EventColumn::t},       {"timestamp", EventColumn::t},
+      {"timestamps", EventColumn::t}, {"time_stamp", EventColumn::t},
+      {"times", EventColumn::t},      {"stamp", EventColumn::t},
+      {"x", EventColumn::x},          {"xs", EventColumn::x},
+      {"col", EventColumn::x},        {"cols", EventColumn::x},
+      {"column", EventColumn::x},     {"y", EventColumn::y},
+      {"ys", EventColumn::y},         {"row", EventColumn::y},
+      {"rows", EventColumn::y},       {"p", EventColumn::p},
+      {"ps", EventColumn::p},         {"pol", EventColumn::p},
+      {"pols", EventColumn::p},       {"polarity", EventColumn::p},
+      {"polarities", EventColumn::p}, {"on", EventColumn::p},
+      {"cause", EventColumn::cause},  {"class", EventColumn::object_class},
   };
+  word.remove_prefix(word.rfind('.') + 1);
+  for (const std::string_view before : {"event_", "events_", "dataset_events_", "ev_", "coord_"})
+    if (word.starts_with(before)) {
+      word.remove_prefix(before.size());
+      break;
+    }
+  for (const std::string_view after :
+       {"_coords", "_coord", "_coordinates", "_coordinate", "_position", "_pos", "_px"})
+    if (word.ends_with(after)) {
+      word.remove_suffix(after.size());
+      break;
+    }
   const auto* const found = std::ranges::find(names, word, &Name::name);
   if (found == std::end(names)) return std::nullopt;
   return found->column;
@@ -42,10 +53,23 @@ std::optional<TimeUnit> unit_with(std::string_view word) {
     TimeUnit unit;
   };
   static constexpr Name names[] = {
-      {"s", TimeUnit::seconds},       {"sec", TimeUnit::seconds},
-      {"ms", TimeUnit::milliseconds}, {"us", TimeUnit::microseconds},
-      {"µs", TimeUnit::microseconds}, {"usec", TimeUnit::microseconds},
-      {"ns", TimeUnit::nanoseconds},  {"nsec", TimeUnit::nanoseconds},
+      {"s", TimeUnit::seconds},
+      {"sec", TimeUnit::seconds},
+      {"secs", TimeUnit::seconds},
+      {"second", TimeUnit::seconds},
+      {"seconds", TimeUnit::seconds},
+      {"ms", TimeUnit::milliseconds},
+      {"msec", TimeUnit::milliseconds},
+      {"milliseconds", TimeUnit::milliseconds},
+      {"us", TimeUnit::microseconds},
+      {"\xc2\xb5s", TimeUnit::microseconds},  // micro sign
+      {"\xce\xbcs", TimeUnit::microseconds},  // Greek mu
+      {"usec", TimeUnit::microseconds},
+      {"microseconds", TimeUnit::microseconds},
+      {"ns", TimeUnit::nanoseconds},
+      {"nsec", TimeUnit::nanoseconds},
+      {"nanosec", TimeUnit::nanoseconds},
+      {"nanoseconds", TimeUnit::nanoseconds},
   };
   const auto* const found = std::ranges::find(names, word, &Name::name);
   if (found == std::end(names)) return std::nullopt;
@@ -89,6 +113,48 @@ std::optional<Columns> columns_of(std::string_view letters) {
     if (std::ranges::count(columns, std::optional(static_cast<EventColumn>(i))) != 1)
       return std::nullopt;
   return columns;
+}
+
+void PolarityCode::count(double number) {
+  constexpr std::size_t max_names = 40;
+  ++rows_;
+  if (number == 0 || number == 1 || number == 2) {
+    ++counts_[static_cast<std::size_t>(number)];
+  } else if (number == std::trunc(number) && std::abs(number) <= UINT32_MAX &&
+             is_minus_one(static_cast<std::int64_t>(number))) {
+    ++minus_ones_;
+    if (number > 0) ++unsigned_;
+  } else if (std::isfinite(number)) {
+    ++other_rows_;
+    std::string text = std::to_string(number);
+    text.erase(text.find_last_not_of('0') + 1);
+    if (text.ends_with('.')) text.pop_back();
+    text = " " + text;
+    if (others_.size() < max_names && (others_ + " ").find(text + " ") == std::string::npos)
+      others_ += text;
+  }
+}
+
+void PolarityCode::choose() {
+  const auto [zeros, ones, twos] = counts_;
+  const bool is_ambiguous = unsigned_ * 100 > rows_ && zeros * 100 > rows_;
+  if (twos > 0 && zeros + minus_ones_ == 0) on_ = 2;
+  const auto wrong = other_rows_ + (on_ == 2 ? 0 : twos);
+  if (wrong * 100 <= rows_ && !is_ambiguous) return;
+  std::string values;
+  if (minus_ones_ > unsigned_) values += " -1";
+  if (zeros > 0) values += " 0";
+  if (ones > 0) values += " 1";
+  if (twos > 0) values += " 2";
+  if (unsigned_ > 0) values += " and the largest unsigned number";
+  throw UnsupportedFormat("the polarities are" + values + others_ +
+                          "; write 1 for ON and 0 or -1 for OFF");
+}
+
+void UnreadableRows::check(bool ended) const {
+  constexpr std::uint64_t always_tolerated = 100;
+  if (unreadable_ * 100 <= rows_ || (!ended && unreadable_ <= always_tolerated)) return;
+  throw UnsupportedFormat("more than one in a hundred is not an event, first " + first_);
 }
 
 }  // namespace eventcamera

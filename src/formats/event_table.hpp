@@ -3,9 +3,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "src/core/label.hpp"
@@ -35,9 +38,14 @@ struct ColumnName {
   std::optional<TimeUnit> unit = std::nullopt;  ///< for times
 };
 
-/// Returns the column for a name used by any tool, ignoring case. Times may have a unit, as in t_ns
-/// and "time [s]"; anything else from a space, '@', '[' or '(' on is ignored.
+/// Returns the column for a name used by any tool, ignoring case, as in x, event_x, x_coords and
+/// TD.x. Times may have a unit, as in t_ns and "time [s]"; anything else from a space, '@', '[' or
+/// '(' on is ignored.
 std::optional<ColumnName> column_named(std::string_view name);
+
+/// Times with a fraction are rounded down to microseconds, unless the next one is at most so far:
+/// programs print and store 33e-6 s as slightly less.
+constexpr double max_rounding_up = 0.25;
 
 /// Meaning of each column of a table; columns without a value are ignored.
 using Columns = std::vector<std::optional<EventColumn>>;
@@ -53,6 +61,63 @@ inline Label label_from(std::int64_t cause, std::int64_t object_class) {
   return {.object_class = static_cast<std::uint16_t>(is_class ? object_class : 0),
           .cause = static_cast<Cause>(is_cause ? cause : 0)};
 }
+
+/// Meaning of the numbers in a column of polarities.
+class PolarityCode {
+ public:
+  /// Counts the numbers of some rows.
+  void count(double number);
+
+  /// Chooses between 1 = ON, with 0 or -1 for OFF, and 2 = ON with 1 = OFF, by the counted numbers.
+  /// Throws UnsupportedFormat, which names them, if they do not tell.
+  void choose();
+
+  bool is_one_two() const { return on_ == 2; }
+
+  /// Nothing if the number is not a polarity.
+  std::optional<bool> is_on(std::int64_t number) const {
+    if (number == on_) return true;
+    if (is_one_two()) return number == 1 ? std::optional(false) : std::nullopt;
+    if (number == 0 || is_minus_one(number)) return false;
+    return std::nullopt;
+  }
+
+ private:
+  /// Also true for -1 as an unsigned number of 8, 16 or 32 bits.
+  static constexpr bool is_minus_one(std::int64_t number) {
+    return number == -1 || number == UINT8_MAX || number == UINT16_MAX || number == UINT32_MAX;
+  }
+
+  std::int64_t on_ = 1;
+  std::uint64_t rows_ = 0;
+  std::array<std::uint64_t, 3> counts_{};  ///< of 0, 1 and 2
+  std::uint64_t minus_ones_ = 0;
+  std::uint64_t unsigned_ = 0;  ///< of them
+  std::string others_;          ///< some of the other numbers
+  std::uint64_t other_rows_ = 0;
+};
+
+/// Counts rows that are not events. A table with more than one in a hundred is refused: it is
+/// probably not what it was taken for.
+class UnreadableRows {
+ public:
+  void count(std::uint64_t rows) { rows_ += rows; }
+
+  /// Counts the last row as unreadable; `what` describes it.
+  void add(std::string what) {
+    if (unreadable_++ == 0) first_ = std::move(what);
+  }
+
+  /// Throws UnsupportedFormat if there are too many. While rows follow, some are always tolerated.
+  void check(bool ended) const;
+
+  std::uint64_t rows() const { return rows_; }
+
+ private:
+  std::uint64_t rows_ = 0;
+  std::uint64_t unreadable_ = 0;
+  std::string first_;
+};
 
 /// Known properties of a table; the others are detected from its header and first rows.
 struct TableSettings {

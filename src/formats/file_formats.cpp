@@ -2,6 +2,7 @@
 #include "src/formats/file_formats.hpp"
 
 #include <algorithm>
+#include <string>
 
 #include "src/core/byte_order.hpp"
 #include "src/formats/atis/atis_bin.hpp"
@@ -9,6 +10,8 @@
 #include "src/formats/prophesee_header.hpp"
 #include "src/formats/ros/bag_magic.hpp"
 #include "src/formats/text/csv_decoder.hpp"
+#include "src/formats/text/utf8_text.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 namespace {
@@ -96,25 +99,33 @@ Likelihood match_dat(Bytes bytes) {
   return matches ? Likelihood::high : Likelihood::none;
 }
 
-/// Matches text if CsvDecoder decodes every line as an event, and the columns have names or there
-/// are some events. An ambiguous time unit does not matter here, nor do events outside a sensor;
+/// Matches text if its columns have names, or if CsvDecoder decodes some lines, and every one, as
+/// an event. An ambiguous time unit does not matter here, nor do events outside a sensor;
 /// they are reported when the file is read.
 Likelihood match_csv(Bytes bytes) {
   constexpr std::size_t max_bytes = 4096;
   constexpr std::size_t min_events = 3;
   bytes = bytes.first(std::min(bytes.size(), max_bytes));
-  const auto is_text = [](std::uint8_t byte) {
+  const auto is_text = [](char letter) {
+    const auto byte = static_cast<std::uint8_t>(letter);
     return byte >= ' ' || (byte >= '\t' && byte <= '\r');
   };
-  if (!std::ranges::all_of(bytes, is_text)) return Likelihood::none;
-  while (!bytes.empty() && bytes.back() != '\n') bytes = bytes.first(bytes.size() - 1);
+  std::string converted;
+  auto text = Utf8Text().text_of(bytes, converted);
+  if (!std::ranges::all_of(text, is_text)) return Likelihood::none;
+  text = text.substr(0, text.rfind('\n') + 1);
   CsvDecoder decoder({.unit = TimeUnit::microseconds});
   Decoded decoded;
-  decoder.decode(bytes, decoded);
-  decoder.finish(decoded);
+  try {
+    decoder.decode({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, decoded);
+    decoder.finish(decoded);
+  } catch (const UnsupportedFormat&) {
+    // The reader says what is wrong.
+    return decoder.has_names() ? Likelihood::certain : Likelihood::none;
+  }
   const auto events = decoded.events.size() + decoder.corruption().outside;
-  return certain_if((decoder.has_names() || events >= min_events) &&
-                    decoder.corruption().places == 0);
+  return certain_if(decoder.has_names() ||
+                    (events >= min_events && decoder.corruption().places == 0));
 }
 
 Likelihood match_atis_bin(Bytes bytes) {

@@ -28,7 +28,7 @@ bool fits(double value, EventColumn column) {
     case EventColumn::y:
       return is_within(value, 0, 0x8000);
     case EventColumn::p:
-      return is_within(value, -1, 2);
+      return is_within(value, -1, 0x100000000);
     case EventColumn::cause:
     case EventColumn::object_class:
       return true;  // an event without a label is an event
@@ -52,6 +52,43 @@ std::optional<TimeUnit> unit_by_gaps(const std::vector<TableNumber>& times) {
   return is_dense ? std::optional(TimeUnit::microseconds) : std::nullopt;
 }
 
+/// True if the times are integers from 0 or 1 on without gaps, each of many events: most probably
+/// numbers of frames.
+bool are_frame_numbers(const std::vector<TableNumber>& times) {
+  constexpr std::size_t min_events = 8;
+  if (times.front().value < 0 || times.front().value > 1) return false;
+  std::size_t events = 1;
+  for (std::size_t i = 1; i < times.size(); ++i, ++events) {
+    const auto gap = times[i].value - times[i - 1].value;
+    if (gap == 0) continue;
+    if (gap != 1 || events < min_events) return false;
+    events = 0;
+  }
+  return times.back().value > times.front().value;
+}
+
+/// False if events were further apart in this unit than event cameras and simulators have them, or
+/// if integer microseconds began weeks ago without being a date.
+bool is_plausible(const std::vector<TableNumber>& times, TimeUnit unit) {
+  constexpr std::size_t min_rows = 4;
+  constexpr std::size_t many_rows = 64;
+  constexpr double max_uptime = 1e12;
+  constexpr double min_date = 1e14;
+  if (times.size() < min_rows) return true;
+  const bool is_whole_microsecond = unit == TimeUnit::microseconds;
+  if (is_whole_microsecond && are_frame_numbers(times)) return false;
+  if (is_whole_microsecond && times.front().value >= max_uptime && times.front().value < min_date)
+    return false;
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < times.size(); ++i)
+    gaps.push_back(std::abs(times[i].value - times[i - 1].value));
+  const auto median = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2);
+  std::ranges::nth_element(gaps, median);
+  const double microseconds = *median * std::pow(10, power_of(unit));
+  const double max_gap = times.size() < many_rows ? 1e6 : is_whole_microsecond ? 1e3 : 1e4;
+  return microseconds <= max_gap;
+}
+
 }  // namespace
 
 bool TableSample::has_columns(std::size_t count) const {
@@ -59,9 +96,8 @@ bool TableSample::has_columns(std::size_t count) const {
          std::ranges::all_of(rows_, [count](const Row& row) { return row.size() == count; });
 }
 
-/// True if the first of five columns counts rows, like an index of pandas.
-bool TableSample::counts_rows() const {
-  if (!has_columns(5)) return false;
+bool TableSample::counts_rows(std::size_t columns) const {
+  if (!has_columns(columns)) return false;
   for (std::size_t i = 1; i < rows_.size(); ++i)
     if (rows_[i].front().value != rows_[i - 1].front().value + 1) return false;
   return true;
@@ -83,7 +119,7 @@ std::vector<TableNumber> TableSample::times_of(const Columns& columns) const {
 }
 
 std::optional<Columns> TableSample::find_columns(bool is_xypt) const {
-  const std::size_t skipped = counts_rows() ? 1 : 0;
+  const std::size_t skipped = counts_rows(event_columns + 1) ? 1 : 0;
   // Returns the column with a number for which `holds` is true, if there is exactly one.
   const auto only_column = [&](const auto& holds) {
     std::optional<std::size_t> only;
@@ -107,6 +143,12 @@ std::optional<Columns> TableSample::find_columns(bool is_xypt) const {
     if (rows_.empty()) return columns;
     const auto times = times_of(columns);
     if (times.size() * 2 < rows_.size()) continue;
+    const auto p = std::ranges::find(columns, std::optional(EventColumn::p)) - columns.begin();
+    const auto polarities = std::ranges::count_if(rows_, [&](const Row& row) {
+      return row.size() == columns.size() &&
+             is_within(row[static_cast<std::size_t>(p)].value, -1, 3);
+    });
+    if (static_cast<std::size_t>(polarities) * 2 < rows_.size()) continue;
     const bool is_it = time ? columns[*time] == EventColumn::t
                             : std::ranges::is_sorted(times, {}, &TableNumber::value);
     if (is_it) return columns;
@@ -115,10 +157,26 @@ std::optional<Columns> TableSample::find_columns(bool is_xypt) const {
 }
 
 std::optional<TimeUnit> TableSample::find_unit(const Columns& columns, bool is_either) const {
+  const auto times = times_of(columns);
+  const auto unit = guessed_unit(columns, is_either, times);
+  return unit && is_plausible(times, *unit) ? unit : std::nullopt;
+}
+
+PolarityCode TableSample::find_polarities(const Columns& columns) const {
+  PolarityCode code;
+  const auto p = static_cast<std::size_t>(
+      std::ranges::find(columns, std::optional(EventColumn::p)) - columns.begin());
+  for (const auto& row : rows_)
+    if (row.size() == columns.size()) code.count(row[p].value);
+  code.choose();
+  return code;
+}
+
+std::optional<TimeUnit> TableSample::guessed_unit(const Columns& columns, bool is_either,
+                                                  const std::vector<TableNumber>& times) const {
   // Dates from 1973 on; no recording that starts at 0 is that long.
   constexpr double min_date_in_microseconds = 1e14;
   constexpr double min_date_in_nanoseconds = 1e17;
-  const auto times = times_of(columns);
   if (times.empty()) return TimeUnit::microseconds;
   if (!std::ranges::all_of(times, is_whole, &TableNumber::value)) return TimeUnit::seconds;
   const auto last = std::ranges::max(times, {}, &TableNumber::value).value;

@@ -29,6 +29,7 @@ class TableSample {
 
   /// Number of rows sufficient for detection.
   static constexpr std::size_t max_rows = 256;
+  static constexpr std::size_t max_binary_rows = 4096;  ///< that are cheap to read
 
   void add(Row row) { rows_.push_back(std::move(row)); }
   bool empty() const { return rows_.empty(); }
@@ -39,6 +40,10 @@ class TableSample {
   /// True if every row has this many fields.
   bool has_columns(std::size_t count) const;
 
+  /// True if there are several rows with this many fields, and the first one counts them, like an
+  /// index of pandas.
+  bool counts_rows(std::size_t columns) const;
+
   /// Detects the columns. If only one column has fractions, it is the time. Otherwise returns the
   /// first of txyp, xypt and xytp for which p is a polarity, x and y are coordinates and t never
   /// decreases; xypt is tried before if it `is_xypt` most likely. A column that counts rows may
@@ -47,12 +52,17 @@ class TableSample {
 
   /// Detects the time unit: seconds if a time has a fraction; otherwise microseconds, or
   /// nanoseconds if only these give a plausible date. If `is_either`, the gaps between times decide
-  /// between the two; nothing if they are ambiguous.
+  /// between the two. Nothing if they are ambiguous, if events were too far apart in this unit, or
+  /// if the times seem to be numbers of frames.
   std::optional<TimeUnit> find_unit(const Columns& columns, bool is_either) const;
 
+  /// Detects the meaning of the polarities. Throws UnsupportedFormat if they do not tell.
+  PolarityCode find_polarities(const Columns& columns) const;
+
  private:
-  bool counts_rows() const;
   std::vector<TableNumber> times_of(const Columns& columns) const;
+  std::optional<TimeUnit> guessed_unit(const Columns& columns, bool is_either,
+                                       const std::vector<TableNumber>& times) const;
 
   std::vector<Row> rows_;
 };

@@ -316,6 +316,34 @@ TEST(Stream, WarnsOfMixedVideoOnlyWhereItIsInterlaced) {
   EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
 }
 
+void push_orientation(Harness& h, const char* orientation) {
+  gst_harness_push_event(h.get(), gst_event_new_tag(gst_tag_list_new(GST_TAG_IMAGE_ORIENTATION,
+                                                                     orientation, nullptr)));
+}
+
+TEST(Stream, WarnsOnceOfRotatedVideo) {
+  Harness h("eventsim-frame");
+  h.caps(video(61, 43));
+  push_orientation(h, "rotate-0");
+  EXPECT_EQ(h.warning(), "");
+  push_orientation(h, "rotate-90");
+  push_orientation(h, "rotate-180");
+  EXPECT_NE(h.warning().find("videoflip video-direction=auto"), std::string::npos);
+  EXPECT_EQ(h.warning(), "");
+}
+
+TEST(Stream, WarnsOfNoVideoThatIsTurnedUpright) {
+  for (const char* before : {"videoflip video-direction=auto ! queue",
+                             "bin.( bin.( videoflip video-direction=auto ) ! identity )"}) {
+    Harness h(std::string(before) + " ! eventsim-frame name=simulator");
+    h.caps(video(61, 43));
+    push_orientation(h, "rotate-90");
+    h.push(h.flat(0, 50));
+    h.wait_for_events();
+    EXPECT_EQ(h.warning(), "") << before;
+  }
+}
+
 TEST(EventCamera, MapsEventsAtAnyAddress) {
   gst_init(nullptr, nullptr);
   const guint8 bytes[] = {0, 1, 0, 0, 0, 2, 0, 3, 0x80};

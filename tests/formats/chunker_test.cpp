@@ -361,13 +361,13 @@ TEST(Chunker, HandsOutWhatIsReachedAtOnce) {
   Chunker chunker(length);
   chunker.push(std::vector{at(0), at(3'000)});
   EXPECT_FALSE(chunker.next());
-  chunker.reach(9'999);
+  chunker.advance_to(9'999);
   EXPECT_FALSE(chunker.next());
-  chunker.reach(10'000);
+  chunker.advance_to(10'000);
   const auto interval = chunker.next();
   ASSERT_TRUE(interval);
   EXPECT_EQ(interval->events.size(), 2U);
-  chunker.reach(35'000);
+  chunker.advance_to(35'000);
   const auto silence = chunker.next();
   ASSERT_TRUE(silence);
   EXPECT_TRUE(silence->events.empty());

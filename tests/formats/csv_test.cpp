@@ -51,10 +51,15 @@ TEST(Decimal, IsExact) {
            {"5.", 0, 5, true},
            {"0.003820001", 6, 3820, false},
            {"0.0038195", 6, 3819, false},
+           {"0.00381974", 6, 3819, false},
+           {"0.00381975", 6, 3820, false},
            {"0.000003", 6, 3, true},
            {"2.999999999999999924e-06", 6, 3, false},  // 3e-6 as a double
-           {"2.9999999999999e-06", 6, 2, false},
-           {"1600000000.123456999", 6, 1600000000123456, false},
+           {"3.2999999999999996e-05", 6, 33, false},   // 33*1e-6
+           {"0.0011239999999999998", 6, 1124, false},  // 1124*1e-6
+           {"3.290176391601562e-05", 6, 33, false},    // (1.6e9 + 33e-6) - 1.6e9
+           {"1600000000.123456740", 6, 1600000000123456, false},
+           {"1600000000.123456999", 6, 1600000000123457, false},
            {"1600000000.123456", 6, 1600000000123456, true},
            {"-0.0000015", 6, -2, false},
            {"-3.000000000000000076e-06", 6, -3, false},
@@ -172,11 +177,11 @@ TEST(Csv, WholeNumbersBetweenBlanksTellTheirUnitOrAreRefused) {
   EXPECT_EQ(first_of(lines(1'468'939'993'067'416'019, 7, 100, " ")), 1'468'939'993'067'416);
   EXPECT_EQ(first_of(lines(1'468'939'993'067'416, 7, 100, " ")), 1'468'939'993'067'416);
   EXPECT_EQ(first_of(lines(1'468'939'993'067'416'019, 7, 100, ",")), 1'468'939'993'067'416);
-  // No tool writes comma-separated nanoseconds without stating the unit.
-  EXPECT_EQ(first_of(lines(5'000, 1000, 100, ",")), 5'000);
+  // Between commas, close times are microseconds.
   EXPECT_EQ(first_of(lines(5'001, 7, 100, ",")), 5'001);
-  for (const auto& text : {lines(5'001, 7, 100, " "), lines(5'000, 0, 1, " "),
-                           lines(5'001, 0, 1, "\t"), std::string("1000 3 4 1\n2000 3 4 1\n")}) {
+  for (const auto& text :
+       {lines(5'001, 7, 100, " "), lines(5'000, 0, 1, " "), lines(5'000, 1000, 100, ","),
+        lines(5'001, 0, 1, "\t"), std::string("1000 3 4 1\n2000 3 4 1\n")}) {
     try {
       read(text);
       ADD_FAILURE() << text.substr(0, 40);
@@ -219,13 +224,14 @@ TEST(Csv, SecondsAreExact) {
     std::snprintf(line, sizeof line, "1468939993.%06d%03d %d 2 1\n", i * 991 % 1'000'000, i % 1000,
                   i % 100);
     text += line;
-    expected.push_back(on(i % 100, 2, 1'468'939'993'000'000 + i * 991 % 1'000'000));
+    const int next = i % 1000 >= 750 ? 1 : 0;
+    expected.push_back(on(i % 100, 2, 1'468'939'993'000'000 + i * 991 % 1'000'000 + next));
   }
   EXPECT_EQ(read(text).events, expected);
   const std::string fill(200, '#');
   EXPECT_EQ(read("0.0 1 1 1\n0.12345678949999 1 1 1\n0.1234565 1 1 1\n1 1 1 1\n2.5 1 1 0\n" + fill)
                 .events,
-            (Events{on(1, 1, 0), on(1, 1, 123456), on(1, 1, 123456), on(1, 1, 1'000'000),
+            (Events{on(1, 1, 0), on(1, 1, 123457), on(1, 1, 123456), on(1, 1, 1'000'000),
                     off(1, 1, 2'500'000)}));
   // A double that is just below its microsecond, printed with all its digits.
   EXPECT_EQ(read("1.00000299999999995 1 1 1\n1.99999999999999978 1 1 1\n2.5 1 1 0\n" + fill).events,
@@ -235,11 +241,18 @@ TEST(Csv, SecondsAreExact) {
 }
 
 TEST(Csv, CorruptionIsSkippedAndCounted) {
-  const std::string text =
-      "t,x,y,p\n1,1,1,1\n2,2,2\n3,3,3,1,1\nfour,4,4,1\n5,5,5,2\n6,70000,6,1\n7,7,40000,1\n"
-      "8,-1,8,1\n3,9,9,0\n99999999999999999999,1,1,1\n10,10,10,1\n";
+  std::string text = "t,x,y,p\n1,1,1,1\n2,2,2\n6,70000,6,1\n7,7,40000,1\n8,-1,8,1\n3,9,9,0\n";
+  Events expected = {on(1, 1, 1), off(9, 9, 3)};
+  for (const auto* const line :
+       {"3,3,3,1,1\n", "four,4,4,1\n", "5,5,5,2\n", "99999999999999999999,1,1,1\n"}) {
+    for (int i = 0; i < 250; ++i) {
+      text += "10,10,10,1\n";
+      expected.push_back(on(10, 10, 10));
+    }
+    text += line;
+  }
   const auto found = read(text);
-  EXPECT_EQ(found.events, (Events{on(1, 1, 1), off(9, 9, 3), on(10, 10, 10)}));
+  EXPECT_EQ(found.events, expected);
   EXPECT_EQ(found.corruption.places, 5U);
   EXPECT_EQ(found.corruption.first_at, 16U);
   EXPECT_EQ(found.corruption.outside, 3U);
@@ -253,6 +266,143 @@ TEST(Csv, CorruptionIsSkippedAndCounted) {
   const auto outside = read("t,x,y,p\n1,9,7,1\n1,10,7,1\n1,9,8,1\n", settings);
   EXPECT_EQ(outside.events.size(), 1U);
   EXPECT_EQ(outside.corruption.outside, 2U);
+}
+
+/// Message of the error for a text that is refused.
+std::string error_of(std::string_view text) {
+  try {
+    read(text);
+  } catch (const UnsupportedFormat& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+bool mentions(const std::string& message, std::string_view words) {
+  return message.find(words) != std::string::npos;
+}
+
+TEST(Csv, MoreThanOneBadLineInAHundredIsRefused) {
+  const auto lines = [](int good, int bad) {
+    std::string text = "t,x,y,p\n";
+    for (int i = 0; i < good; ++i) text += std::to_string(i) + ",1,1,1\n";
+    for (int i = 0; i < bad; ++i) text += "bad,1,1,1\n";
+    return text + "5000,1,1,1\n";
+  };
+  EXPECT_EQ(read(lines(100, 1)).corruption.places, 1U);
+  EXPECT_EQ(read(lines(10'000, 100)).corruption.places, 100U);
+  EXPECT_TRUE(mentions(error_of(lines(3, 1)), "line 5: \"bad,1,1,1\""));
+  EXPECT_TRUE(mentions(error_of(lines(1000, 15)), "line 1002: "));
+  EXPECT_TRUE(mentions(error_of(lines(10'000, 150)), "line 10002: "));
+  // Separators of thousands, a decimal comma between commas, and rows with more fields than names.
+  EXPECT_TRUE(mentions(error_of("t,x,y,p\n100,10,20,1\n1,300,11,21,0\n1,000,400,12,22,1\n"),
+                       "line 3: \"1,300,11,21,0\" (fields: 5, expected: 4)"));
+  EXPECT_NE(error_of("t,x,y,p\n0,000100,10,20,1\n0,001300,11,21,0\n"), "none");
+  EXPECT_NE(error_of("t,x,y,p\n100,10,20,1,5\n200,11,21,0,5\n"), "none");
+  // A last line may be cut off.
+  EXPECT_EQ(read("t,x,y,p\n1,1,1,1\n2,1,").events.size(), 1U);
+}
+
+TEST(Csv, NumbersAsSpreadsheetsWriteThem) {
+  const Events expected = {on(10, 20, 100), off(11, 21, 200), on(12, 22, 1300),
+                           on(13, 23, 1'000'400)};
+  for (const auto* const text : {
+           "t;x;y;p\n0,000100;10;20;1\n0,000200;11;21;0\n0,001300;12;22;1\n1,000400;13;23;1\n",
+           "t\tx\ty\tp\n0,0001\t10\t20\t1\n0,0002\t11\t21\t0\n0,0013\t12\t22\t1\n1,0004\t13\t23\t"
+           "1\n",
+           "0,0001 10 20 1\n0,0002 11 21 0\n0,0013 12 22 1\n1,0004 13 23 1\n",
+           "t,x,y,p\n\"0,0001\",10,20,1\n\"0,0002\",11,21,0\n\"0,0013\",12,22,1\n\"1,0004\",13,23,"
+           "1\n",
+           "t;x;y;p\n100,0;10,0;20,0;1,0\n200,0;11,0;21,0;0,0\n1.300,0;12,0;22,0;1,0\n1.000.400,0;"
+           "13,0;"
+           "23,0;1,0\n",
+           "t;x;y;p\n100;10;20;1\n200;11;21;0\n1,300;12;22;1\n1,000,400;13;23;1\n",
+           "t,x,y,p\n100,10,20,1\n200,11,21,0\n\"1,300\",12,22,1\n\"1,000,400\",13,23,1\n",
+           "t;x;y;p\n100;10;20;1\n200;11;21;0\n1'300;12;22;1\n1'000'400;13;23;1\n",
+           "\"t\",\"x\",\"y\",\"p\"\n\"100\",\"10\",\"20\",\"1\"\n\"200\",\"11\",\"21\",\"0\"\n"
+           "\"1300\",\"12\",\"22\",\"1\"\n\"1000400\",\"13\",\"23\",\"1\"\n",
+           "t,x,y,p,\n100,10,20,1,\n200,11,21,0,\n1300,12,22,1,\n1000400,13,23,1,\n",
+       })
+    EXPECT_EQ(read(text).events, expected) << text;
+  EXPECT_TRUE(mentions(error_of("t;x;y;p\n1,300;12;22;1\n1,400;13;23;1\n"), "decimal point"));
+  EXPECT_NE(error_of("t;x;y;p\n1.300;12;22;1\n1.000.400;13;23;1\n"), "none");
+}
+
+TEST(Csv, PolaritiesOfAnyTool) {
+  const Events expected = {on(3, 4, 10), off(5, 6, 12)};
+  for (const auto* const text :
+       {"t,x,y,p\n10,3,4,2\n12,5,6,1\n", "10,3,4,2\n12,5,6,1\n", "t,x,y,p\n10,3,4,ON\n12,5,6,OFF\n",
+        "t,x,y,p\n10,3,4,pos\n12,5,6,neg\n", "t,x,y,p\n10,3,4,1\n12,5,6,4294967295\n",
+        "t,x,y,p\n10,3,4,1.0\n12,5,6,-1.0\n", "10 3 4 on\n12 5 6 off\n# end\n"})
+    EXPECT_EQ(read(text, {.unit = TimeUnit::microseconds}).events, expected) << text;
+  // Also in long files, where 1 is read fast elsewhere.
+  std::string text = "t,x,y,p\n";
+  for (int i = 0; i < 1000; ++i) text += std::to_string(i) + (i % 4 == 0 ? ",3,4,2\n" : ",3,4,1\n");
+  EXPECT_EQ(std::ranges::count(read(text).events, Polarity::on, &AbsoluteEvent::polarity), 250);
+  EXPECT_TRUE(mentions(error_of("t,x,y,p\n1,1,1,0\n2,1,1,1\n3,1,1,2\n4,1,1,3\n"), "are 0 1 2 3;"));
+  EXPECT_TRUE(mentions(error_of("t,x,y,p\n1,1,1,0\n2,1,1,255\n"), "unsigned"));
+}
+
+TEST(Csv, ImplausibleTimesAreRefused) {
+  const auto table = [](const auto& time) {
+    std::string text = "t,x,y,p\n";
+    for (int i = 0; i < 1000; ++i) text += time(i) + ",3,4,1\n";
+    return text;
+  };
+  // Nanoseconds, microseconds with fractions, frame numbers, nanoseconds since boot, milliseconds
+  // since 1970.
+  const std::string texts[] = {
+      table([](int i) { return std::to_string(5000 + i * 1234); }),
+      table([](int i) { return std::to_string(i * 10) + ".25"; }),
+      table([](int i) { return std::to_string(i / 100); }),
+      table([](int i) { return std::to_string(5'000'000'000'000 + i * 200); }),
+      table([](int i) { return std::to_string(1'600'000'000'000 + i / 10); }),
+      "t,x,y,p\n100007,1,1,1\n200007,1,1,-1\n1300007,1,1,1\n1000400007,1,1,1\n",
+      "t,x,y,p\n100.5,1,1,1\n200.5,1,1,-1\n20000.5,1,1,1\n1000400.5,1,1,1\n",
+  };
+  for (const auto& text : texts) {
+    EXPECT_TRUE(mentions(error_of(text), "time-unit")) << text.substr(0, 60);
+    EXPECT_FALSE(read(text, {.unit = TimeUnit::nanoseconds}).events.empty());
+  }
+  // A day's pause, and frames at their times, are plausible.
+  EXPECT_EQ(read(table([](int i) {
+              return std::to_string(i * 50 + i / 500 * 86'400'000'000);
+            })).events.size(),
+            1000U);
+  EXPECT_EQ(read(table([](int i) { return std::to_string(i / 50 * 33'333); })).events.size(),
+            1000U);
+}
+
+TEST(Csv, NamesOfAnyTool) {
+  const Events expected = {on(3, 4, 10), off(5, 6, 12)};
+  for (const auto* const text :
+       {"event_timestamp,x,y,polarity\n10,3,4,1\n12,5,6,0\n", "row,col,t,p\n4,3,10,1\n6,5,12,0\n",
+        "x_coords,y_coords,timestamps,polarities\n3,4,10,1\n5,6,12,0\n",
+        "timestamp_microseconds,x,y,p\n10,3,4,1\n12,5,6,0\n",
+        "t_\xce\xbcs,x,y,p\n10,3,4,1\n12,5,6,0\n", "TD.x TD.y TD.p TD.ts\n3 4 1 10\n5 6 0 12\n",
+        "'t','x','y','p'\n10,3,4,1\n12,5,6,0\n", "# y x p t\n4 3 1 10\n6 5 0 12\n",
+        "#y,x,p,t\n4,3,1,10\n6,5,0,12\n", "# y [px] x [px] p t [us]\n4 3 1 10\n6 5 0 12\n",
+        "% columns: y, x, p, t\n4,3,1,10\n6,5,0,12\n"})
+    EXPECT_EQ(read(text, {.unit = TimeUnit::microseconds}).events, expected) << text;
+  EXPECT_EQ(read("# t [ns] y x p\n10000 4 3 1\n12000 6 5 0\n").events, expected);
+  // Names that do not fit the lines, and comments with other words.
+  EXPECT_EQ(read("# t x y p label\n10,3,4,1\n12,5,6,0\n").events, expected);
+  EXPECT_EQ(read("# the events: t, x, y and p\n3,4,1,10\n5,6,0,12\n").events, expected);
+}
+
+TEST(Csv, Utf16IsReadAsUtf8) {
+  for (const bool is_big : {false, true}) {
+    Bytes bytes = is_big ? Bytes{0xfe, 0xff} : Bytes{0xff, 0xfe};
+    for (const unsigned unit : u"t_\u03bcs;x;y;p;\U0001f600\r\n10;3;4;1;a\r\n12;5;6;0;b\r\n") {
+      if (unit == 0) continue;
+      bytes.push_back(static_cast<std::uint8_t>(is_big ? unit >> 8 : unit));
+      bytes.push_back(static_cast<std::uint8_t>(is_big ? unit : unit >> 8));
+    }
+    CsvDecoder decoder;
+    EXPECT_EQ(decoded(decoder, bytes), (Events{on(3, 4, 10), off(5, 6, 12)}));
+    expect_same_however_cut([] { return std::make_unique<CsvDecoder>(); }, bytes);
+  }
+  EXPECT_THROW(read("5"), UnsupportedFormat);
 }
 
 TEST(Csv, ALongLineIsSkippedWithoutBeingKept) {

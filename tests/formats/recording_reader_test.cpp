@@ -706,13 +706,15 @@ TEST(RecordingReader, MovesWordsToTheTimeOfTheirStream) {
   const auto bytes = recordings::encode(*encoder, events);
   RecordingReader reader([] { return make_evt_decoder(EvtFormat::evt3, sensor); }, chunk_length,
                          RecordingReader::Clock::stream);
-  EXPECT_FALSE(reader.reach(5'000'000));
+  reader.advance_to(5'000'000);
+  EXPECT_FALSE(reader.has_events());
   const Microseconds hours = Microseconds{5} * 3600 * 1'000'000;
   reader.push(bytes, RecordingReader::Interval{hours, 10'000});
   Outcome outcome;
   outcome.take_all(reader);
   EXPECT_TRUE(outcome.chunks.empty());
-  EXPECT_TRUE(reader.reach(hours + 60'000'000));
+  reader.advance_to(hours + 60'000'000);
+  EXPECT_TRUE(reader.has_events());
   outcome.take_all(reader);
   EXPECT_EQ(outcome.events(0).size(), 2U);
   EXPECT_EQ(std::get<1>(outcome.chunks.front()), hours);
@@ -737,7 +739,7 @@ TEST(RecordingReader, KeepsNoStateOfWordsThroughADiscontinuity) {
   const auto read = [&](const Bytes& words) {
     reader.push(words, RecordingReader::Interval{0, 0});
     outcome.take_all(reader);
-    reader.reach(chunk_length);
+    reader.advance_to(chunk_length);
     outcome.take_all(reader);
     return std::exchange(outcome.chunks, {});
   };

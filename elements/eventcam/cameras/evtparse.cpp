@@ -56,6 +56,7 @@
 #include "elements/eventcam/cameras/event_camera.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
@@ -161,18 +162,8 @@ struct Private {
 
 }  // namespace
 
-#define GST_TYPE_EVT_PARSE (gst_evt_parse_get_type())
-G_DECLARE_FINAL_TYPE(GstEvtParse, gst_evt_parse, GST, EVT_PARSE, GstElement)
-
-struct _GstEvtParse {
-  GstElement parent;
-  Private* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstEvtParse, gst_evt_parse, GST_TYPE_ELEMENT,
-                        GST_DEBUG_CATEGORY_INIT(evt_parse_debug, "evtparse", 0,
-                                                "words of live event cameras"))
-GST_ELEMENT_REGISTER_DEFINE(evtparse, "evtparse", GST_RANK_NONE, GST_TYPE_EVT_PARSE)
+DEFINE_EVENT_ELEMENT(GstEvtParse, gst_evt_parse, EVT_PARSE, GstElement, GST_TYPE_ELEMENT, evtparse,
+                     GST_RANK_NONE, "words of live event cameras")
 
 static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVT_PARSE(object)->priv->settings;
@@ -438,11 +429,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 }
 
 /* type */
-
-static void finalize(GObject* object) {
-  delete GST_EVT_PARSE(object)->priv;
-  G_OBJECT_CLASS(gst_evt_parse_parent_class)->finalize(object);
-}
 
 static void gst_evt_parse_init(GstEvtParse* self) {
   self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));

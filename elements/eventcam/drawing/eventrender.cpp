@@ -110,7 +110,6 @@ class EventRender final : public EventAggregator {
   GstFlowReturn push_picture(const EventInterval& events, const EventInterval& picture);
   GstFlowReturn push_next_picture();
 
-  // Accessed by the source pad's thread only, or while there is none.
   std::optional<State> state_;
   std::optional<FrameTimes> times_;  // interval of the next picture, once the first event is near
   std::optional<gsize> taken_;       // number of processed events of the first queued buffer

@@ -47,6 +47,7 @@
 #include "elements/eventcam/measures/clipped_events.hpp"
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
@@ -125,18 +126,10 @@ struct Private {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventStats, gst_event_stats, GST, EVENT_STATS, GstBaseTransform)
-
-struct _GstEventStats {
-  GstBaseTransform parent;
-  Private* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstEventStats, gst_event_stats, GST_TYPE_BASE_TRANSFORM,
-                        GST_DEBUG_CATEGORY_INIT(event_stats_debug, "eventstats", 0,
-                                                "statistics of event streams"))
+DEFINE_EVENT_ELEMENT(GstEventStats, gst_event_stats, EVENT_STATS, GstBaseTransform,
+                     GST_TYPE_BASE_TRANSFORM, eventstats, GST_RANK_NONE,
+                     "statistics of event streams")
 #define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_stats_parent_class)
-GST_ELEMENT_REGISTER_DEFINE(eventstats, "eventstats", GST_RANK_NONE, gst_event_stats_get_type())
 
 static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_STATS(object)->priv->settings;
@@ -349,11 +342,6 @@ static gboolean stop(GstBaseTransform* transform) {
 }
 
 /* type */
-
-static void finalize(GObject* object) {
-  delete GST_EVENT_STATS(object)->priv;
-  G_OBJECT_CLASS(gst_event_stats_parent_class)->finalize(object);
-}
 
 static void gst_event_stats_init(GstEventStats* self) {
   self->priv = new Private(GST_BASE_TRANSFORM(self));

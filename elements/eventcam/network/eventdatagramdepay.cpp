@@ -49,6 +49,7 @@
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/latency.hpp"
@@ -152,19 +153,9 @@ struct Private {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventDatagramDepay, gst_event_datagram_depay, GST, EVENT_DATAGRAM_DEPAY,
-                     GstElement)
-
-struct _GstEventDatagramDepay {
-  GstElement parent;
-  Private* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstEventDatagramDepay, gst_event_datagram_depay, GST_TYPE_ELEMENT,
-                        GST_DEBUG_CATEGORY_INIT(event_datagram_depay_debug, "eventdatagramdepay", 0,
-                                                "datagrams of events from other tools"))
-GST_ELEMENT_REGISTER_DEFINE(eventdatagramdepay, "eventdatagramdepay", GST_RANK_NONE,
-                            gst_event_datagram_depay_get_type())
+DEFINE_EVENT_ELEMENT(GstEventDatagramDepay, gst_event_datagram_depay, EVENT_DATAGRAM_DEPAY,
+                     GstElement, GST_TYPE_ELEMENT, eventdatagramdepay, GST_RANK_NONE,
+                     "datagrams of events from other tools")
 
 static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_DATAGRAM_DEPAY(object)->priv->settings;
@@ -414,11 +405,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 }
 
 /* type */
-
-static void finalize(GObject* object) {
-  delete GST_EVENT_DATAGRAM_DEPAY(object)->priv;
-  G_OBJECT_CLASS(gst_event_datagram_depay_parent_class)->finalize(object);
-}
 
 static void gst_event_datagram_depay_init(GstEventDatagramDepay* self) {
   self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));

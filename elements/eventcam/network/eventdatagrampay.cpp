@@ -39,6 +39,7 @@
 #include "elements/eventcam/network/max_latency.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
@@ -90,19 +91,9 @@ struct Private {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventDatagramPay, gst_event_datagram_pay, GST, EVENT_DATAGRAM_PAY,
-                     GstElement)
-
-struct _GstEventDatagramPay {
-  GstElement parent;
-  Private* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstEventDatagramPay, gst_event_datagram_pay, GST_TYPE_ELEMENT,
-                        GST_DEBUG_CATEGORY_INIT(event_datagram_pay_debug, "eventdatagrampay", 0,
-                                                "datagrams of events for other tools"))
-GST_ELEMENT_REGISTER_DEFINE(eventdatagrampay, "eventdatagrampay", GST_RANK_NONE,
-                            gst_event_datagram_pay_get_type())
+DEFINE_EVENT_ELEMENT(GstEventDatagramPay, gst_event_datagram_pay, EVENT_DATAGRAM_PAY, GstElement,
+                     GST_TYPE_ELEMENT, eventdatagrampay, GST_RANK_NONE,
+                     "datagrams of events for other tools")
 
 static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_DATAGRAM_PAY(object)->priv->settings;
@@ -331,11 +322,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 }
 
 /* type */
-
-static void finalize(GObject* object) {
-  delete GST_EVENT_DATAGRAM_PAY(object)->priv;
-  G_OBJECT_CLASS(gst_event_datagram_pay_parent_class)->finalize(object);
-}
 
 static void gst_event_datagram_pay_init(GstEventDatagramPay* self) {
   self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));

@@ -9,8 +9,9 @@
 
 #include "gst/base/owned.hpp"
 
-/// Size of the RTP header extensions that a payloader with given caps writes in each packet. The
-/// base class does not expose it, so it is asked from other instances of the same extensions.
+/// Size of the RTP header extensions that a payloader with given caps writes in each packet.
+/// GstRTPBasePayload keeps its extensions private (header_exts), so other instances of them are
+/// asked.
 class RtpHeaderExtensions {
  public:
   /// Maximum size in bytes, with the extensions' common header.

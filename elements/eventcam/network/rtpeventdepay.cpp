@@ -55,6 +55,7 @@
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/guarded.hpp"
@@ -119,20 +120,10 @@ struct Private {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstRtpEventDepay, gst_rtp_event_depay, GST, RTP_EVENT_DEPAY,
-                     GstRTPBaseDepayload)
-
-struct _GstRtpEventDepay {
-  GstRTPBaseDepayload parent;
-  Private* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstRtpEventDepay, gst_rtp_event_depay, GST_TYPE_RTP_BASE_DEPAYLOAD,
-                        GST_DEBUG_CATEGORY_INIT(rtp_event_depay_debug, "rtpeventdepay", 0,
-                                                "RTP depayloader of events"))
+DEFINE_EVENT_ELEMENT(GstRtpEventDepay, gst_rtp_event_depay, RTP_EVENT_DEPAY, GstRTPBaseDepayload,
+                     GST_TYPE_RTP_BASE_DEPAYLOAD, rtpeventdepay, GST_RANK_SECONDARY,
+                     "RTP depayloader of events")
 #define PARENT_DEPAYLOAD_CLASS GST_RTP_BASE_DEPAYLOAD_CLASS(gst_rtp_event_depay_parent_class)
-GST_ELEMENT_REGISTER_DEFINE(rtpeventdepay, "rtpeventdepay", GST_RANK_SECONDARY,
-                            gst_rtp_event_depay_get_type())
 
 /* output */
 
@@ -375,14 +366,10 @@ static GstStructure* stats_of(GObject* object) {
   return stats;
 }
 
-static void finalize(GObject* object) {
-  delete GST_RTP_EVENT_DEPAY(object)->priv;
-  G_OBJECT_CLASS(gst_rtp_event_depay_parent_class)->finalize(object);
-}
-
 static void gst_rtp_event_depay_init(GstRtpEventDepay* self) {
   self->priv = new Private(GST_RTP_BASE_DEPAYLOAD(self));
-  // The base class would drop late packets uncounted, and those after an invalid number ahead.
+  // Otherwise gst_rtp_base_depayload_handle_buffer() drops late packets uncounted, and those that
+  // follow an invalid number ahead of theirs.
   g_object_set(self, "max-reorder", 0, nullptr);
 }
 

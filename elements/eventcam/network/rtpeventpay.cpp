@@ -38,6 +38,7 @@
 #include "elements/eventcam/network/rtp_events.hpp"
 #include "elements/eventcam/network/rtp_header_extensions.hpp"
 #include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
@@ -110,19 +111,10 @@ struct Private {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstRtpEventPay, gst_rtp_event_pay, GST, RTP_EVENT_PAY, GstRTPBasePayload)
-
-struct _GstRtpEventPay {
-  GstRTPBasePayload parent;
-  Private* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstRtpEventPay, gst_rtp_event_pay, GST_TYPE_RTP_BASE_PAYLOAD,
-                        GST_DEBUG_CATEGORY_INIT(rtp_event_pay_debug, "rtpeventpay", 0,
-                                                "RTP payloader of events"))
+DEFINE_EVENT_ELEMENT(GstRtpEventPay, gst_rtp_event_pay, RTP_EVENT_PAY, GstRTPBasePayload,
+                     GST_TYPE_RTP_BASE_PAYLOAD, rtpeventpay, GST_RANK_SECONDARY,
+                     "RTP payloader of events")
 #define PARENT_PAYLOAD_CLASS GST_RTP_BASE_PAYLOAD_CLASS(gst_rtp_event_pay_parent_class)
-GST_ELEMENT_REGISTER_DEFINE(rtpeventpay, "rtpeventpay", GST_RANK_SECONDARY,
-                            gst_rtp_event_pay_get_type())
 
 static Guarded<Settings>& settings_of(GObject* object) {
   return GST_RTP_EVENT_PAY(object)->priv->settings;
@@ -383,11 +375,6 @@ static GstStructure* stats_of(GObject* object) {
                     guint64{sent.bytes}, "events", G_TYPE_UINT64, guint64{sent.events},
                     "rejected-events", G_TYPE_UINT64, guint64{sent.rejected}, nullptr);
   return stats;
-}
-
-static void finalize(GObject* object) {
-  delete GST_RTP_EVENT_PAY(object)->priv;
-  G_OBJECT_CLASS(gst_rtp_event_pay_parent_class)->finalize(object);
 }
 
 static void gst_rtp_event_pay_init(GstRtpEventPay* self) {

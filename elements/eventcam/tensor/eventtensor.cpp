@@ -68,6 +68,7 @@
 #include "elements/eventcam/tensor/tensor_properties.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
@@ -138,17 +139,8 @@ struct Private {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventTensor, gst_event_tensor, GST, EVENT_TENSOR, GstElement)
-
-struct _GstEventTensor {
-  GstElement parent;
-  Private* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstEventTensor, gst_event_tensor, GST_TYPE_ELEMENT,
-                        GST_DEBUG_CATEGORY_INIT(event_tensor_debug, "eventtensor", 0,
-                                                "windows of events as tensors"))
-GST_ELEMENT_REGISTER_DEFINE(eventtensor, "eventtensor", GST_RANK_NONE, gst_event_tensor_get_type())
+DEFINE_EVENT_ELEMENT(GstEventTensor, gst_event_tensor, EVENT_TENSOR, GstElement, GST_TYPE_ELEMENT,
+                     eventtensor, GST_RANK_NONE, "windows of events as tensors")
 
 static Guarded<TensorProperties>& settings_of(GObject* object) {
   return GST_EVENT_TENSOR(object)->priv->settings;
@@ -412,11 +404,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 }
 
 /* type */
-
-static void finalize(GObject* object) {
-  delete GST_EVENT_TENSOR(object)->priv;
-  G_OBJECT_CLASS(gst_event_tensor_parent_class)->finalize(object);
-}
 
 static void gst_event_tensor_init(GstEventTensor* self) {
   self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));

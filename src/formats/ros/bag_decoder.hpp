@@ -37,11 +37,11 @@ class BagDecoder final : public Decoder {
   bool knows_all_streams() const override;
   std::optional<SeekPoint> first_of(std::size_t stream) const override;
   std::string format_name() const override { return format_name_; }
-  std::string left_out() const override;
+  std::string unread_topics() const override;
 
  private:
   void choose_format(std::span<const std::uint8_t> start);
-  std::optional<std::size_t> take_topic(const BagTopic& topic);
+  std::optional<std::size_t> add_topic(const BagTopic& topic);
   bool is_wanted(const BagTopic& topic, StreamKind kind) const;
   std::optional<Item> next_part();
   void learn_delay(Microseconds t);

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "src/core/max_side.hpp"
 #include "src/formats/text/decimal.hpp"
@@ -50,20 +51,40 @@ SensorSize read_size(std::string_view width, std::string_view height) {
   return size.width > 0 && size.height > 0 ? size : SensorSize{};
 }
 
-std::optional<bool> read_polarity(std::string_view text) {
-  if (text == "1") return true;
-  if (text == "0") return false;
-  if (is_word(text, "true")) return true;
-  if (is_word(text, "false")) return false;
-  const auto number = read_decimal(text, 0);
-  if (!number || !number->whole || number->value < -1 || number->value > 1) return std::nullopt;
-  return number->value == 1;
+/// Polarity in words, such as true and OFF.
+std::optional<bool> polarity_word(std::string_view text) {
+  for (const std::string_view word : {"true", "on", "pos", "positive", "+"})
+    if (is_word(text, word)) return true;
+  for (const std::string_view word : {"false", "off", "neg", "negative", "-"})
+    if (is_word(text, word)) return false;
+  return std::nullopt;
 }
 
-/// Removes quotes.
 std::string_view unquoted(std::string_view field) {
-  if (field.size() < 2 || field.front() != '"' || field.back() != '"') return field;
-  return field.substr(1, field.size() - 2);
+  if (field.size() < 2 || (field.front() != '"' && field.front() != '\'') ||
+      field.back() != field.front())
+    return field;
+  return trimmed(field.substr(1, field.size() - 2));
+}
+
+/// True if two fields are separated by blanks only, as in "0,5 10 20 1" but not in "1, 2, 3".
+bool has_lone_blank(std::string_view line) {
+  bool is_quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '"') is_quoted = !is_quoted;
+    if (is_quoted || !is_blank(line[i])) continue;
+    const auto next = line.find_first_not_of(" \t\r", i);
+    if (line[i - 1] != ',' && line[next] != ',') return true;
+    i = next - 1;
+  }
+  return false;
+}
+
+/// Returns ';', ',' or ' ', which stands for any blanks.
+char separator_of(std::string_view trimmed_line, bool are_names) {
+  if (trimmed_line.find(';') != std::string_view::npos) return ';';
+  if (trimmed_line.find(',') == std::string_view::npos) return ' ';
+  return !are_names && has_lone_blank(trimmed_line) ? ' ' : ',';
 }
 
 bool is_letter(char letter) {
@@ -72,8 +93,7 @@ bool is_letter(char letter) {
 }
 
 TableNumber sample_of(std::string_view field) {
-  if (is_word(field, "true")) return {1};
-  if (is_word(field, "false")) return {0};
+  if (const auto on = polarity_word(field)) return {*on ? 1.0 : 0.0};
   const auto decimal = read_decimal(field, 0);
   if (!decimal) return {std::numeric_limits<double>::quiet_NaN()};
   if (!decimal->has_fraction) return {static_cast<double>(decimal->value)};
@@ -91,20 +111,24 @@ TableNumber sample_of(std::string_view field) {
 CsvDecoder::CsvDecoder(const TableSettings& settings) : settings_(settings) {}
 
 void CsvDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
-  std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  std::string converted;
+  auto text = utf8_.text_of(bytes, converted);
   if (in_head_) {
-    const auto count = take_head(text);
+    const auto count = append_head(text);
     if (head_lines_ < head_lines && head_.size() < max_head) return;
     text.remove_prefix(count);
     read_head();
     const auto head = std::move(head_);
     read_text(std::string_view(head).substr(static_cast<std::size_t>(position_)), out);
+    rows_.check(true);
   }
   read_text(text, out);
+  rows_.check(false);
 }
 
 void CsvDecoder::finish(Decoded& out) {
   if (in_head_) {
+    head_ += utf8_.rest();
     head_ += '\n';
     read_head();
     head_.pop_back();
@@ -112,13 +136,15 @@ void CsvDecoder::finish(Decoded& out) {
     const auto head = std::move(head_);
     read_text(std::string_view(head).substr(static_cast<std::size_t>(position_)), out);
   }
+  rows_.check(true);
+  // A last line without an end may be cut off.
   if (!rest_.empty()) read_line(rest_, out);
   position_ += rest_.size();
   rest_.clear();
 }
 
 /// Appends `text` to the head, up to the head's end, and returns the number of characters appended.
-std::size_t CsvDecoder::take_head(std::string_view text) {
+std::size_t CsvDecoder::append_head(std::string_view text) {
   std::size_t count = 0;
   while (count < text.size() && head_lines_ < head_lines && head_.size() < max_head) {
     const char letter = text[count++];
@@ -129,24 +155,81 @@ std::size_t CsvDecoder::take_head(std::string_view text) {
   return count;
 }
 
-std::size_t CsvDecoder::split(std::string_view line, Fields& fields) {
+/// Returns the fields of a line, without their quotes; none if there are too many. An empty last
+/// one is left out: some programs end lines with a separator.
+std::size_t CsvDecoder::split(std::string_view line, bool are_names, Fields& fields) {
   std::size_t count = 0;
-  const bool by_marks = line.find_first_of(",;") != std::string_view::npos;
   line = trimmed(line);
+  const char separator = separator_of(line, are_names);
   while (true) {
     if (count == fields.size()) return 0;
-    const auto end = line.find_first_of(by_marks ? ",;" : " \t");
-    fields[count++] = trimmed(line.substr(0, end));
-    if (end == std::string_view::npos) return count;
+    auto end = std::string_view::npos;
+    char quote = 0;
+    for (std::size_t i = 0; i < line.size() && end == std::string_view::npos; ++i) {
+      if (quote == 0 && (line[i] == '"' || (line[i] == '\'' && i == 0)))
+        quote = line[i];
+      else if (line[i] == quote)
+        quote = 0;
+      else if (quote == 0 && (line[i] == separator || (separator == ' ' && is_blank(line[i]))))
+        end = i;
+    }
+    fields[count++] = unquoted(trimmed(line.substr(0, end)));
+    if (end == std::string_view::npos) break;
     line.remove_prefix(end + 1);
-    if (!by_marks) line = trimmed(line);
+    if (separator == ' ') line = trimmed(line);
   }
+  if (count > 1 && fields[count - 1].empty()) --count;
+  return count;
+}
+
+/// Finds out what commas in numbers are. Throws UnsupportedFormat if they do not tell.
+void CsvDecoder::find_commas(const std::vector<std::vector<std::string_view>>& rows) {
+  bool is_decimal = false;
+  bool is_grouping = false;
+  std::string_view either;
+  for (const auto& row : rows)
+    for (const auto field : row) {
+      const auto comma = field.find(',');
+      if (comma == std::string_view::npos || comma == 0) continue;
+      const auto digits = field.substr(field.front() == '-' ? 1 : 0);
+      const auto after = field.substr(comma + 1);
+      if (after.find(',') != std::string_view::npos ||
+          (after.find('.') != std::string_view::npos && after.find('.') == 3))
+        is_grouping = true;
+      else if (after.size() != 3 || digits.front() == '0' || digits.find(',') > 3)
+        is_decimal = true;
+      else
+        either = field;
+    }
+  if (is_decimal && is_grouping)
+    throw UnsupportedFormat(
+        "numbers have commas before decimals and before thousands; write a "
+        "decimal point, and no separators of thousands");
+  if (!is_decimal && !is_grouping && !either.empty())
+    throw UnsupportedFormat("the comma in " + std::string(either) +
+                            " may be before decimals or thousands; write a decimal point, and no "
+                            "separators of thousands");
+  commas_ = is_decimal ? Commas::decimal : is_grouping ? Commas::grouping : Commas::none;
+}
+
+/// Returns the number in a field without separators of thousands, and with a decimal point.
+std::string_view CsvDecoder::plain_number(std::string_view field, std::string& buffer) const {
+  if (field.find_first_of(commas_ == Commas::none ? "'" : ",'") == std::string_view::npos)
+    return field;
+  const bool has_comma = field.find(',') != std::string_view::npos;
+  buffer.clear();
+  for (const char letter : field) {
+    const bool is_group = letter == '\'' || (commas_ == Commas::grouping && letter == ',') ||
+                          (commas_ == Commas::decimal && has_comma && letter == '.');
+    if (!is_group) buffer += commas_ == Commas::decimal && letter == ',' ? '.' : letter;
+  }
+  return buffer;
 }
 
 /// Interprets the lines of the head and finds the start of the events.
 void CsvDecoder::read_head() {
   in_head_ = false;
-  TableSample sample;
+  std::vector<std::vector<std::string_view>> rows;
   std::string_view text = head_;
   constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
@@ -157,30 +240,40 @@ void CsvDecoder::read_head() {
     if (end == std::string_view::npos) break;
     const auto line = trimmed(text.substr(0, end));
     text.remove_prefix(end + 1);
-    const bool header = sample.empty() && read_header_line(line);
-    if (header) position_ = head_.size() - text.size();
+    const bool header = rows.empty() && read_header_line(line);
+    if (header) {
+      position_ = head_.size() - text.size();
+      ++lines_;
+    }
     if (header || is_comment(line)) continue;
-    if (sample.empty()) {
-      const auto mark = line.find_first_of(",; \t");
-      if (mark != std::string_view::npos) separator_ = line[mark];
+    if (rows.empty()) {
+      separator_ = separator_of(line, false);
+      if (separator_ == ' ')
+        separator_ = line[std::min(line.find_first_of(" \t"), line.size() - 1)];
     }
     Fields fields;
-    const auto count = split(line, fields);
-    TableSample::Row row(count);
-    std::transform(fields.begin(), fields.begin() + static_cast<std::ptrdiff_t>(count), row.begin(),
-                   sample_of);
-    sample.add(std::move(row));
+    const auto count = split(line, false, fields);
+    rows.emplace_back(fields.begin(), fields.begin() + static_cast<std::ptrdiff_t>(count));
   }
   if (!empty && text.size() == head_.size())
     throw UnsupportedFormat("not CSV events: no line ends");
 
   if (settings_.size != SensorSize{}) stream_.size = settings_.size;
   validator_.set_size(stream_.size);
+  find_commas(rows);
+  TableSample sample;
+  std::string buffer;
+  for (const auto& row : rows) {
+    TableSample::Row numbers;
+    for (const auto field : row) numbers.push_back(sample_of(plain_number(field, buffer)));
+    sample.add(std::move(numbers));
+  }
   find_columns(sample);
   find_unit(sample);
+  if (!sample.empty()) polarities_ = sample.find_polarities(columns_);
   stream_.labelled =
       std::ranges::any_of(columns_, [](auto column) { return column && *column > EventColumn::p; });
-  if (columns_.size() == event_columns && !stream_.labelled)
+  if (columns_.size() == event_columns && !stream_.labelled && !polarities_.is_one_two())
     plain_lines_.emplace(columns_, separator_, power_);
 }
 
@@ -189,72 +282,116 @@ bool CsvDecoder::read_header_line(std::string_view line) {
   constexpr std::string_view geometry = "%geometry:";
   Fields fields;
   if (line.starts_with(geometry)) {
-    if (split(line.substr(geometry.size()), fields) != 2) return true;
+    if (split(line.substr(geometry.size()), false, fields) != 2) return true;
     const auto size = read_size(fields[0], fields[1]);
     if (size != SensorSize{}) stream_.size = size;
     has_geometry_ = true;
     return true;
   }
-  if (is_comment(line)) return true;
-  const auto count = split(line, fields);
+  if (is_comment(line)) {
+    read_names_in_comment(line);
+    return true;
+  }
+  const auto first = line.find_first_not_of("\"', ;\t");
+  const bool are_names = first != std::string_view::npos && is_letter(line[first]);
+  const auto count = split(line, are_names, fields);
   if (count == 2) {
     if (stream_.size != SensorSize{}) return false;
     stream_.size = read_size(fields[0], fields[1]);
     return stream_.size != SensorSize{};
   }
-  const auto names = std::span(fields).first(count);
-  // An index column may be unnamed.
-  const auto named =
-      std::ranges::find_if(names, [](std::string_view name) { return !unquoted(name).empty(); });
-  if (has_names_ || named == names.end() || !is_letter(unquoted(*named).front())) return false;
+  if (has_names_ || !are_names) return false;
 
-  has_names_ = true;
+  unit_.reset();
+  const auto names = std::span(fields).first(count);
+  columns_ = columns_named(names);
   SensorSize size;
-  for (const auto field : names) {
-    const auto name = column_named(unquoted(field));
-    auto column = name ? std::optional(name->column) : std::nullopt;
-    if (std::ranges::find(columns_, column) != columns_.end()) column.reset();
-    columns_.push_back(column);
-    if (column == EventColumn::t) unit_ = name->unit;
-    if (const auto at = field.find('@'); at != std::string_view::npos) {
-      if (column == EventColumn::x) size.width = read_extent(field.substr(at + 1)).value_or(0);
-      if (column == EventColumn::y) size.height = read_extent(field.substr(at + 1)).value_or(0);
-    }
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto at = names[i].find('@');
+    if (at == std::string_view::npos) continue;
+    if (columns_[i] == EventColumn::x)
+      size.width = read_extent(names[i].substr(at + 1)).value_or(0);
+    if (columns_[i] == EventColumn::y)
+      size.height = read_extent(names[i].substr(at + 1)).value_or(0);
   }
   if (size.width > 0 && size.height > 0) stream_.size = size;
-  const auto known = std::ranges::count_if(
-      columns_, [](auto column) { return column && *column <= EventColumn::p; });
-  if (known < static_cast<std::ptrdiff_t>(event_columns) && settings_.columns.empty())
+  if (!are_all_named() && settings_.columns.empty())
     throw UnsupportedFormat("no columns t, x, y and p in the first line");
+  has_names_ = true;
   return true;
 }
 
+/// Returns the columns with these names, and sets the unit in the name of the time.
+Columns CsvDecoder::columns_named(std::span<const std::string_view> names) {
+  Columns columns;
+  for (const auto text : names) {
+    const auto name = column_named(text);
+    auto column = name ? std::optional(name->column) : std::nullopt;
+    if (std::ranges::find(columns, column) != columns.end()) column.reset();
+    columns.push_back(column);
+    if (column == EventColumn::t) unit_ = name->unit;
+  }
+  return columns;
+}
+
+/// True if there are columns t, x, y and p.
+bool CsvDecoder::are_all_named() const {
+  return std::ranges::count_if(columns_, [](auto column) {
+           return column && *column <= EventColumn::p;
+         }) >= static_cast<std::ptrdiff_t>(event_columns);
+}
+
+/// Takes the names of columns from a comment, such as "# t [s] x y p" or "# columns: x, y, p, t".
+void CsvDecoder::read_names_in_comment(std::string_view line) {
+  const auto begin = line.find_first_not_of("#% \t");
+  if (begin == std::string_view::npos || line.size() > max_line) return;
+  line.remove_prefix(begin);
+  if (const auto colon = line.rfind(':'); colon != std::string_view::npos)
+    line.remove_prefix(colon + 1);
+  Fields fields;
+  const auto count = split(line, true, fields);
+  std::vector<std::string> names;
+  for (const auto field : std::span(fields).first(count)) {
+    const bool is_unit = !field.empty() && (field.front() == '[' || field.front() == '(');
+    if (is_unit && !names.empty())
+      names.back() += " " + std::string(field);
+    else
+      names.emplace_back(field);
+  }
+  const std::vector<std::string_view> views(names.begin(), names.end());
+  const auto before = std::exchange(columns_, columns_named(views));
+  if (!are_all_named()) columns_ = before;
+}
+
 std::optional<CsvDecoder::Row> CsvDecoder::read_row(
-    std::span<const std::string_view> fields, std::span<const std::optional<EventColumn>> columns,
-    int power) {
-  if (fields.size() != columns.size()) return std::nullopt;
+    std::span<const std::string_view> fields) const {
+  if (fields.size() != columns_.size()) return std::nullopt;
   Row row;
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    if (!columns[i]) continue;
-    if (*columns[i] == EventColumn::p) {
-      const auto on = read_polarity(fields[i]);
+  std::string buffer;
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    if (!columns_[i]) continue;
+    const auto column = *columns_[i];
+    const auto field = plain_number(fields[i], buffer);
+    const auto number = read_decimal(field, column == EventColumn::t ? power_ : 0);
+    if (column == EventColumn::p) {
+      auto on = polarity_word(field);
+      if (number && number->whole) on = polarities_.is_on(number->value);
       if (!on) return std::nullopt;
       row.on = *on;
       continue;
     }
-    const auto number = read_decimal(fields[i], *columns[i] == EventColumn::t ? power : 0);
-    if (*columns[i] > EventColumn::p) {  // a label, which may be missing
-      auto& label = *columns[i] == EventColumn::cause ? row.cause : row.object_class;
+    if (column > EventColumn::p) {  // a label, which may be missing
+      auto& label = column == EventColumn::cause ? row.cause : row.object_class;
       label = number && number->whole ? number->value : 0;
       continue;
     }
     if (!number) return std::nullopt;
-    if (*columns[i] == EventColumn::t) {
+    if (column == EventColumn::t) {
       row.t = *number;
       continue;
     }
     if (!number->whole) return std::nullopt;
-    (*columns[i] == EventColumn::x ? row.x : row.y) = number->value;
+    (column == EventColumn::x ? row.x : row.y) = number->value;
   }
   return row;
 }
@@ -262,7 +399,8 @@ std::optional<CsvDecoder::Row> CsvDecoder::read_row(
 void CsvDecoder::find_columns(const TableSample& sample) {
   if (!settings_.columns.empty()) {
     columns_ = settings_.columns;
-  } else if (!has_names_) {
+  } else if (!has_names_ && (columns_.empty() || !sample.has_events(columns_))) {
+    unit_.reset();
     auto found = sample.find_columns(has_geometry_);
     if (!found)
       throw UnsupportedFormat(
@@ -270,11 +408,13 @@ void CsvDecoder::find_columns(const TableSample& sample) {
           "y and p in the first line");
     columns_ = *std::move(found);
     return;
-  } else if (sample.has_columns(columns_.size() + 1)) {
+  } else if (has_names_ && sample.counts_rows(columns_.size() + 1)) {
     columns_.insert(columns_.begin(), std::nullopt);  // unnamed index column
   }
   if (!sample.empty() && !sample.has_events(columns_))
-    throw UnsupportedFormat("not CSV events: no line has the expected columns");
+    throw UnsupportedFormat(
+        "not CSV events: no line has numbers t, x, y and p in the expected columns; separate the "
+        "fields by commas, semicolons or blanks, and write decimal points");
 }
 
 void CsvDecoder::find_unit(const TableSample& sample) {
@@ -284,8 +424,7 @@ void CsvDecoder::find_unit(const TableSample& sample) {
   if (!unit)
     throw UnsupportedFormat(
         "the time unit is ambiguous in the first lines; set time-unit, or name the column t_s, "
-        "t_us "
-        "or t_ns in the first line");
+        "t_us or t_ns in the first line");
   power_ = power_of(*unit);
 }
 
@@ -331,14 +470,18 @@ const char* CsvDecoder::read_lines(const char* at, const char* end, Decoded& out
   while (at < end) {
     if (plain_lines_) {
       const char* const first = at;
+      std::uint64_t lines = 0;
       while (end - at > PlainLines::reach) {
         PlainLines::Row row;
         const char* const next = plain_lines_->read(at, row);
         if (next == nullptr) break;
+        ++lines;
         validator_.take(row.t, row.x, row.y, row.on, out.events, corruption_);
         at = next;
       }
       position_ += static_cast<std::uint64_t>(at - first);
+      lines_ += lines;
+      rows_.count(lines);
     }
     const auto* const line_end =
         static_cast<const char*>(std::memchr(at, '\n', static_cast<std::size_t>(end - at)));
@@ -355,13 +498,19 @@ const char* CsvDecoder::read_lines(const char* at, const char* end, Decoded& out
 }
 
 void CsvDecoder::read_line(std::string_view line, Decoded& out) {
+  ++lines_;
   line = trimmed(line);
   if (is_comment(line)) return;
   Fields fields;
-  const auto count = split(line, fields);
-  const auto row = read_row(std::span(fields).first(count), columns_, power_);
+  const auto count = split(line, false, fields);
+  const auto row = read_row(std::span(fields).first(count));
+  rows_.count(1);
   if (!row) {
+    constexpr std::size_t max_shown = 60;
     corruption_.note(position_, "line without an event");
+    rows_.add("line " + std::to_string(lines_) + ": \"" + std::string(line.substr(0, max_shown)) +
+              "\" (fields: " + std::to_string(count) +
+              ", expected: " + std::to_string(columns_.size()) + ")");
     return;
   }
   validator_.take(row->t.value, row->x, row->y, row->on, label_from(row->cause, row->object_class),

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "src/formats/event_table.hpp"
+
 namespace eventcamera {
 
 namespace {
@@ -32,11 +34,11 @@ struct Number {
 std::optional<Number> parsed(std::string_view text) {
   std::size_t at = 0;
   const auto more = [&] { return at < text.size(); };
-  const auto take_sign = [&] {
+  const auto read_sign = [&] {
     const bool is_sign = more() && (text[at] == '-' || text[at] == '+');
     return is_sign && text[at++] == '-';
   };
-  Number number{.negative = take_sign()};
+  Number number{.negative = read_sign()};
   // Up to 19 digits are exact in 64 bits.
   constexpr auto room = std::numeric_limits<std::uint64_t>::max() / 10 - 1;
   bool any = false;
@@ -59,7 +61,7 @@ std::optional<Number> parsed(std::string_view text) {
   if (more() && (text[at] == 'e' || text[at] == 'E')) {
     ++at;
     number.has_fraction = true;
-    const bool down = take_sign();
+    const bool down = read_sign();
     const auto rest = text.substr(at);
     if (rest.empty() || !std::ranges::all_of(rest, is_digit)) return std::nullopt;
     number.power += down ? -read_exponent(rest) : read_exponent(rest);
@@ -77,7 +79,7 @@ std::optional<Decimal> rounded_down(const Number& number) {
     if (digits > max / 10) return std::nullopt;
     digits *= 10;
   }
-  // Cuts off digits, which are rest / scale.
+  // Cuts off digits: the fraction is rest / scale.
   auto rest = 0.0;
   auto scale = 1.0;
   for (; power < 0 && digits != 0; ++power, scale *= 10) {
@@ -87,12 +89,8 @@ std::optional<Decimal> rounded_down(const Number& number) {
   whole = whole && rest == 0;
   if (digits >= max && !whole) return std::nullopt;
   if (digits > max) return std::nullopt;
-  const auto next = static_cast<double>(digits) + 1;
-  constexpr double max_uncertainty = 0.0005;  // three more digits are always believed
-  const bool is_next = scale - rest <= scale * std::min(next * 0x1p-53, max_uncertainty);
-  const bool is_this =
-      rest <= scale * std::min(static_cast<double>(digits) * 0x1p-53, max_uncertainty);
-  const bool up = negative ? !whole && !is_this : is_next;
+  const double rounding_up = has_fraction ? max_rounding_up * scale : 0;
+  const bool up = negative ? !whole && rest > rounding_up : scale - rest <= rounding_up;
   const auto value = static_cast<std::int64_t>(digits + (up ? 1 : 0));
   return Decimal{negative ? -value : value, whole, has_fraction};
 }

@@ -26,7 +26,7 @@ class PlainLines {
     bool on;
   };
 
-  /// `columns` are t, x, y and p in any order. `power` is that of ten from the time unit to
+  /// `columns` are t, x, y and p in any order. The time unit is 10^`power`
   /// microseconds.
   PlainLines(const Columns& columns, char separator, int power)
       : separator_(separator), power_(power) {
@@ -114,8 +114,7 @@ class PlainLines {
       at += digits.count;
       if (digits.count == 8) at += read_digits(at).count;
       const auto fraction = digits.value * powers_of_ten[8 - digits.count];
-      if (fraction % 100 == 99) return false;  // may be a whole microsecond in a double
-      value += fraction / 100;
+      value += (fraction + static_cast<std::uint64_t>(100 * max_rounding_up)) / 100;
     } else if (power_ == 3) {
       if (value > max_value) return false;
       value *= 1000;

@@ -1,42 +1,100 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-/// Output: streams, their pads, and the data pushed from them.
+#include "gst/recording/reader/reader_output.hpp"
+
 #include <algorithm>
+#include <string>
 #include <utility>
 
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/reader/event_reader.hpp"
 #include "gst/recording/sensor_events.hpp"
 
+GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
 #define GST_CAT_DEFAULT event_reader_debug
 
 using eventcamera::Microseconds;
 using eventcamera::RecordingReader;
 using eventcamera::StreamKind;
 
-/// Reads and pushes one item. May throw.
-GstFlowReturn EventReader::step() {
-  const auto output = recording_->next();
-  if (bytes_ && bytes_->failed()) return bytes_->flow();
-  update_progress();
-  if (!output) return nothing_ready;
-  return std::visit([this](const auto& item) { return push(item); }, *output);
+ReaderOutput::ReaderOutput(GstElement* element, GstPad* sink, const EventReaderFormat& format,
+                           Guarded<FormatSettings>& settings, ReaderTimeline& timeline)
+    : element_(element),
+      sink_(sink),
+      format_(format),
+      settings_(settings),
+      timeline_(timeline),
+      warn_of_assumption_(event_reader_debug) {}
+
+ReaderOutput::~ReaderOutput() {
+  drop_waiting();
+  gst_clear_event(&stream_start_);
+  gst_flow_combiner_free(combiner_);
+}
+
+void ReaderOutput::drop_waiting() {
+  for (GstEvent* event : std::exchange(waiting_, {})) gst_event_unref(event);
+}
+
+void ReaderOutput::reset() {
+  drop_waiting();
+  gst_clear_event(&stream_start_);
+  set_recording(nullptr);
+  warn_of_assumption_.reset();
+  for (auto& pad : pads_) {
+    pad->reset();
+    if (!format_.has_many_streams) continue;
+    gst_flow_combiner_remove_pad(combiner_, pad->get());
+    if (pad->is_added()) gst_element_remove_pad(element_, pad->get());
+  }
+  if (format_.has_many_streams) {
+    pads_.clear();
+    has_no_more_pads_ = false;
+  }
+  gst_flow_combiner_reset(combiner_);
+  group_ = GST_GROUP_ID_INVALID;
+  seqnum_ = GST_SEQNUM_INVALID;
+}
+
+void ReaderOutput::set_recording(std::shared_ptr<RecordingReader> recording) {
+  recording_ = std::move(recording);
+  pad_of_stream_.clear();
+  is_due_ = true;
+}
+
+void ReaderOutput::start_stream(GstEvent* stream_start) {
+  gst_event_replace(&stream_start_, stream_start);
+  for (auto& pad : pads_) pad->reset();
+  group_ = GST_GROUP_ID_INVALID;
+  is_due_ = true;
+}
+
+void ReaderOutput::interrupt() {
+  for (auto& pad : pads_) pad->interrupt();
+  is_due_ = true;
+}
+
+void ReaderOutput::interrupt_data() {
+  for (auto& pad : pads_) pad->interrupt_data();
+}
+
+void ReaderOutput::flush() {
+  drop_waiting();
+  gst_flow_combiner_reset(combiner_);
+  interrupt();
+}
+
+void ReaderOutput::expect_segment() {
+  for (auto& pad : pads_) pad->need_segment(false);
 }
 
 /// New streams are known.
-GstFlowReturn EventReader::push(const RecordingReader::Start& /*start*/) {
-  update_duration();
-  GST_DEBUG_OBJECT(element_,
-                   "%" G_GSIZE_FORMAT " streams, origin %" GST_TIME_FORMAT
-                   ", duration %" GST_TIME_FORMAT,
-                   recording_->streams().size(), GST_TIME_ARGS(nanoseconds(recording_->origin())),
-                   GST_TIME_ARGS(duration()));
-  post_skipped();
-  return begin_output();
+GstFlowReturn ReaderOutput::push(const RecordingReader::Start& /*start*/) {
+  is_due_ = true;
+  return begin();
 }
 
-GstFlowReturn EventReader::push(const RecordingReader::Chunk& chunk) {
-  if (output_due_)
-    if (const GstFlowReturn begun = begin_output(); begun != GST_FLOW_OK) return begun;
+GstFlowReturn ReaderOutput::push(const RecordingReader::Chunk& chunk) {
+  if (const GstFlowReturn begun = begin(); begun != GST_FLOW_OK) return begun;
   auto& pad = *pad_of_stream_.at(chunk.stream);
   if (!send_caps(chunk.stream)) return handle_refused_size(chunk.stream);
   const GstClockTime pts = nanoseconds(recording_->origin()) + nanoseconds(chunk.start);
@@ -45,12 +103,14 @@ GstFlowReturn EventReader::push(const RecordingReader::Chunk& chunk) {
                  "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
                  chunk.events.size(), GST_TIME_ARGS(pts), GST_TIME_ARGS(duration));
   if (chunk.events.empty()) return combined(pad, pad.push_gap(pts, duration));
-  return combined(pad, pad.push(chunk.events, chunk.labels, pts, duration));
+  auto memory = pad.spare_memory();
+  recording_->swap_memory(chunk.stream, memory);
+  const auto count = chunk.events.size();
+  return combined(pad, pad.push(std::move(memory), count, chunk.labels, pts, duration));
 }
 
-GstFlowReturn EventReader::push(const RecordingReader::TimedFrame& item) {
-  if (output_due_)
-    if (const GstFlowReturn begun = begin_output(); begun != GST_FLOW_OK) return begun;
+GstFlowReturn ReaderOutput::push(const RecordingReader::TimedFrame& item) {
+  if (const GstFlowReturn begun = begin(); begun != GST_FLOW_OK) return begun;
   auto& pad = *pad_of_stream_.at(item.stream);
   GstVideoInfo info;
   if (!frame_video_info(item.frame, &info)) return GST_FLOW_OK;
@@ -62,9 +122,8 @@ GstFlowReturn EventReader::push(const RecordingReader::TimedFrame& item) {
 
 /// Sends triggers or IMU samples with the first stream of events, if there is one.
 template <class Sample>
-GstFlowReturn EventReader::push_to_first(std::span<const Sample> samples) {
-  if (output_due_)
-    if (const GstFlowReturn begun = begin_output(); begun != GST_FLOW_OK) return begun;
+GstFlowReturn ReaderOutput::push_to_first(std::span<const Sample> samples) {
+  if (const GstFlowReturn begun = begin(); begun != GST_FLOW_OK) return begun;
   std::vector<Sample> of_stream(samples.begin(), samples.end());
   for (auto& sample : of_stream) sample.t += std::max<Microseconds>(recording_->origin(), 0);
   const auto& streams = recording_->streams();
@@ -77,19 +136,19 @@ GstFlowReturn EventReader::push_to_first(std::span<const Sample> samples) {
   return GST_FLOW_OK;
 }
 
-GstFlowReturn EventReader::push(const eventcamera::TriggerItem& item) {
+GstFlowReturn ReaderOutput::push(const eventcamera::TriggerItem& item) {
   return push_to_first(item.triggers);
 }
 
-GstFlowReturn EventReader::push(const eventcamera::ImuItem& item) {
+GstFlowReturn ReaderOutput::push(const eventcamera::ImuItem& item) {
   return push_to_first(item.samples);
 }
 
-GstFlowReturn EventReader::combined(ReaderPad& pad, GstFlowReturn result) {
+GstFlowReturn ReaderOutput::combined(ReaderPad& pad, GstFlowReturn result) {
   return gst_flow_combiner_update_pad_flow(combiner_, pad.get(), result);
 }
 
-ReaderPad& EventReader::pad_of(std::size_t index) {
+ReaderPad& ReaderOutput::pad_of(std::size_t index) {
   auto& found = pad_of_stream_[index];
   if (found != nullptr) return *found;
   const auto& stream = recording_->streams()[index];
@@ -112,21 +171,20 @@ ReaderPad& EventReader::pad_of(std::size_t index) {
   return *found;
 }
 
-/// Sends all events that must precede data.
-GstFlowReturn EventReader::begin_output() {
-  output_due_ = false;
+GstFlowReturn ReaderOutput::begin() {
+  if (!std::exchange(is_due_, false)) return GST_FLOW_OK;
   start_streams();
   const auto& streams = recording_->streams();
   for (std::size_t i = 0; i < streams.size(); ++i) {
     if (!streams[i].shown) continue;
     const bool has_size = find_size(i);
     if (!has_size || !send_caps(i)) {
-      output_due_ = true;
+      is_due_ = true;
       return has_size ? pad_of(i).refusal() : GST_FLOW_ERROR;
     }
     send_segment(pad_of(i));
   }
-  for (GstEvent* event : std::exchange(held_, {})) push_to_pads(event);
+  for (GstEvent* event : std::exchange(waiting_, {})) push_to_pads(event);
   // Writers must know these streams before the first buffer.
   if (format_.has_triggers) push(eventcamera::TriggerItem{});
   if (std::ranges::any_of(streams,
@@ -137,9 +195,9 @@ GstFlowReturn EventReader::begin_output() {
 
 /// Starts streams and adds their pads. With many streams, pads have caps before they are added,
 /// except where the linked element may determine the sensor size, as with a single pad.
-void EventReader::start_streams() {
+void ReaderOutput::start_streams() {
   const auto& streams = recording_->streams();
-  const bool is_upstreams = is_timed() && stream_start_ != nullptr;
+  const bool is_upstreams = timeline_.is_timed() && stream_start_ != nullptr;
   bool is_any_new = false;
   for (std::size_t i = 0; i < streams.size(); ++i) {
     if (!streams[i].shown) continue;
@@ -156,7 +214,7 @@ void EventReader::start_streams() {
       pad.start_stream(gst_event_ref(stream_start_));
     else
       pad.start_stream(element_, group_);
-    if (is_timed()) pad.need_segment(false);
+    if (timeline_.is_timed()) pad.need_segment(false);
     if (!format_.has_many_streams) continue;
     if (streams[i].size_from == RecordingReader::SizeFrom::file) {
       send_caps(i);
@@ -165,17 +223,7 @@ void EventReader::start_streams() {
     pad.send_tags(recording_->format_name(), streams[i].info.source);
   }
   if (!is_any_new) return;
-  if (!is_upstreams) {
-    GstStreamCollection* const collection = gst_stream_collection_new(nullptr);
-    for (auto& pad : pads_)
-      if (GstStream* const stream = gst_pad_get_stream(pad->get()))
-        gst_stream_collection_add_stream(collection, stream);
-    gst_element_post_message(element_,
-                             gst_message_new_stream_collection(GST_OBJECT(element_), collection));
-    for (auto& pad : pads_)
-      gst_pad_push_event(pad->get(), gst_event_new_stream_collection(collection));
-    gst_object_unref(collection);
-  }
+  if (!is_upstreams) post_collection();
   for (auto& pad : pads_) {
     if (pad->is_added()) continue;
     gst_flow_combiner_add_pad(combiner_, pad->get());
@@ -184,12 +232,25 @@ void EventReader::start_streams() {
   if (!std::exchange(has_no_more_pads_, true)) gst_element_no_more_pads(element_);
 }
 
-/// If the file does not state the sensor size, uses that of the properties, else the size in
-/// downstream's caps, else one that most events fit into. False if no sensor is so large.
-bool EventReader::find_size(std::size_t index) {
+/// Announces the streams to applications and downstream.
+void ReaderOutput::post_collection() {
+  GstStreamCollection* const collection = gst_stream_collection_new(nullptr);
+  for (auto& pad : pads_)
+    if (GstStream* const stream = gst_pad_get_stream(pad->get()))
+      gst_stream_collection_add_stream(collection, stream);
+  gst_element_post_message(element_,
+                           gst_message_new_stream_collection(GST_OBJECT(element_), collection));
+  for (auto& pad : pads_)
+    gst_pad_push_event(pad->get(), gst_event_new_stream_collection(collection));
+  gst_object_unref(collection);
+}
+
+/// If the file does not state the sensor size, uses the properties, else downstream's caps, else a
+/// size that most events fit into. False if no sensor is so large.
+bool ReaderOutput::find_size(std::size_t index) {
   const auto& stream = recording_->streams()[index];
   if (stream.size_from != RecordingReader::SizeFrom::assumption) return true;
-  if (const auto size = format_settings_.copy().sensor; size.width > 0 && size.height > 0) {
+  if (const auto size = settings_.copy().sensor; size.width > 0 && size.height > 0) {
     recording_->set_size(index, size);
     return true;
   }
@@ -227,7 +288,7 @@ bool EventReader::find_size(std::size_t index) {
   return true;
 }
 
-bool EventReader::send_caps(std::size_t index) {
+bool ReaderOutput::send_caps(std::size_t index) {
   const auto& stream = recording_->streams()[index];
   auto& pad = pad_of(index);
   if (stream.info.kind == StreamKind::events) {
@@ -242,7 +303,7 @@ bool EventReader::send_caps(std::size_t index) {
 }
 
 /// Handles downstream's refusal of a sensor size that has grown.
-GstFlowReturn EventReader::handle_refused_size(std::size_t index) {
+GstFlowReturn ReaderOutput::handle_refused_size(std::size_t index) {
   const GstFlowReturn refusal = pad_of(index).refusal();
   if (refusal == GST_FLOW_FLUSHING) return refusal;
   const auto text = in_pixels(recording_->streams()[index].info.size);
@@ -255,13 +316,8 @@ GstFlowReturn EventReader::handle_refused_size(std::size_t index) {
   return GST_FLOW_ERROR;
 }
 
-void EventReader::send_segment(ReaderPad& pad) {
-  GstSegment segment;
-  {
-    const auto shared = shared_.lock();
-    shared->segment.duration = shared->duration;
-    segment = shared->segment;
-  }
+void ReaderOutput::send_segment(ReaderPad& pad) {
+  GstSegment segment = timeline_.segment();
   const GstClockTime origin = nanoseconds(recording_->origin());
   segment.start += origin;
   segment.position += origin;
@@ -269,30 +325,21 @@ void EventReader::send_segment(ReaderPad& pad) {
   pad.send_segment(segment, seqnum_);
 }
 
-/// Marks the next output as discontinuous.
-void EventReader::interrupt_output() {
-  for (auto& pad : pads_) pad->interrupt();
-  output_due_ = true;
-}
-
 /// Posts a message with the seqnum of the current seek.
-void EventReader::post_with_seqnum(GstMessage* message) {
+void ReaderOutput::post_with_seqnum(GstMessage* message) {
   if (seqnum_ != GST_SEQNUM_INVALID) gst_message_set_seqnum(message, seqnum_);
   gst_element_post_message(element_, message);
 }
 
-/// Posts SEGMENT_START if a segment seek was requested: a bin posts SEGMENT_DONE once all elements
-/// that posted this have ended.
-void EventReader::post_segment_start() {
-  const auto segment = shared_.lock()->segment;
+void ReaderOutput::post_segment_start() {
+  const auto segment = timeline_.segment();
   if ((segment.flags & GST_SEGMENT_FLAG_SEGMENT) != 0)
     post_with_seqnum(gst_message_new_segment_start(GST_OBJECT(element_), GST_FORMAT_TIME,
                                                    static_cast<gint64>(segment.position)));
 }
 
-/// Ends the streams with EOS, or the segment with SEGMENT_DONE if a segment seek was requested.
-void EventReader::end_output(bool failed) {
-  const auto segment = shared_.lock()->segment;
+void ReaderOutput::end(bool failed) {
+  const auto segment = timeline_.segment();
   if (failed || (segment.flags & GST_SEGMENT_FLAG_SEGMENT) == 0) {
     push_to_pads(with_seqnum(gst_event_new_eos(), seqnum_));
     return;
@@ -304,7 +351,14 @@ void EventReader::end_output(bool failed) {
 }
 
 /// Takes ownership of `event`.
-void EventReader::push_to_pads(GstEvent* event) {
+void ReaderOutput::push_to_pads(GstEvent* event) {
   for (auto& pad : pads_) gst_pad_push_event(pad->get(), gst_event_ref(event));
   gst_event_unref(event);
+}
+
+void ReaderOutput::forward(GstEvent* event) {
+  if (is_due_)
+    waiting_.push_back(event);
+  else
+    push_to_pads(event);
 }
