@@ -531,11 +531,12 @@ TEST(RecordingReader, GuessesTheSizeOfASensor) {
   }
 }
 
-/// A file that tells no size, whose events move out of what their first second fits into.
+/// A file that does not state its size, whose events move out of the size that the first ones fit
+/// into. It has more rows than the decoder samples.
 File growing_file() {
   Events events;
-  for (int i = 0; i < 3000; ++i)
-    events.push_back(AbsoluteEvent::at(i / 3, i / 5, Microseconds{1000} * i,
+  for (int i = 0; i < 60'000; ++i)
+    events.push_back(AbsoluteEvent::at(i / 60, i / 100, Microseconds{50} * i,
                                        i % 2 == 0 ? Polarity::off : Polarity::on));
   NpyEncoder encoder;
   return {"growing", recordings::encode(encoder, events),
@@ -566,7 +567,7 @@ TEST(RecordingReader, GrowsAnAssumedSensorBeforeTheEventsThatNeedIt) {
   }
   reader.finish();
   take_all();
-  EXPECT_EQ(events, 3000U);
+  EXPECT_EQ(events, 60'000U);
   EXPECT_EQ(reader.counts().outside, 0U);
   ASSERT_GE(sizes.size(), 3U);
   EXPECT_EQ(sizes.front(), (SensorSize{128, 128}));
