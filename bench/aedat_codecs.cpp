@@ -64,7 +64,7 @@ std::size_t decode_aedat4(const std::vector<std::uint8_t>& bytes) {
     decoder.push(piece);
     take();
   });
-  decoder.finish();
+  decoder.drain();
   take();
   return decoded;
 }

@@ -111,7 +111,7 @@ void register_mcap(const Recording& recording, BagCompression compression, const
         decoder.push(piece);
         take();
       });
-      decoder.finish();
+      decoder.drain();
       take();
     });
     if (decoded != recording.events.size()) state.SkipWithError("events are missing");

@@ -14,10 +14,7 @@
 
 #include "bench/methods.hpp"
 #include "bench/scenes.hpp"
-#include "src/gl/dense_simulator.hpp"
-#include "src/gl/diff_simulator.hpp"
-#include "src/gl/frame_simulator.hpp"
-#include "src/gl/sparse_simulator.hpp"
+#include "src/gl/simulator.hpp"
 #include "tests/gl/egl_context.hpp"
 #include "tests/simulate/scene.hpp"
 

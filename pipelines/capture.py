@@ -2,6 +2,7 @@
 """Options of the event servers, and their source: a camera or a test scene, until Ctrl-C."""
 import argparse
 import ipaddress
+import re
 import signal
 import socket
 import threading
@@ -20,7 +21,7 @@ def option_parser(program, description, address, port):
     parser = argparse.ArgumentParser(
         prog=program, description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--device", help="camera, such as /dev/video0 (default: a test scene)")
-    parser.add_argument("--simulator", default="eventsim-diff",
+    parser.add_argument("--simulator", default="eventsim-diff", type=for_webcams,
                         help='simulator and its properties, such as "eventsim-sparse positive-threshold=5"'
                         " (default: %(default)s)")
     parser.add_argument("--address", type=ipaddress.ip_address, default=address,
@@ -30,6 +31,11 @@ def option_parser(program, description, address, port):
     parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
                         help="print the version and exit")
     return parser
+
+
+def for_webcams(simulator):
+    """A simulator that skips frames that a camera repeats, unless its properties say otherwise."""
+    return re.sub(r"^((gl)?eventsim-\S+)", r"\1 skip-repeated=true", simulator)
 
 
 def find_elements(names, packages):

@@ -26,7 +26,7 @@ MACHINE_ERRORS = Gst.ResourceError.NO_SPACE_LEFT, Gst.ResourceError.WRITE, Gst.R
 
 
 class Refused(Exception):
-    """A video cannot be simulated, and trying again makes no difference."""
+    """A video cannot be simulated, and a retry would not help."""
 
 
 class NpyFile:

@@ -17,7 +17,8 @@ try:
     from gi.repository import GLib, GstVideo  # noqa: F401
     from gst_eventcamera.pipeline import Gst, Pipeline, events_of, quoted
     from gst_eventcamera.recordings import buffer_of
-    from gst_eventcamera.sources import LUMA, SINK
+    from gst_eventcamera.sources import SINK
+    from gst_eventcamera.video import VideoFile
 except (ImportError, ValueError) as missing:
     sys.exit(f"error: {missing}\nInstall python3-gst-eventcamera, a Debian package of gst-eventsim, or in a checkout"
              " run the programs of pipelines/")
@@ -30,6 +31,9 @@ PAST_FRAMES = 5
 
 # A pixel within this many grey levels of white, of 255, counts as overexposed.
 WHITE_MARGIN = 5
+
+# Of red, green and blue in luma, by BT.709.
+RGB_WEIGHTS = 0.2126, 0.7152, 0.0722
 
 # Limit of times in seconds, so that nanoseconds fit a GStreamer clock time.
 MAX_SECONDS = 1e9
@@ -72,10 +76,19 @@ class Video(Sensor):
     def luma(self, frame):
         """The luma of a frame, by row and column; 255 is the maximum of its format."""
         info = self.info
-        depth = np.uint8 if info.finfo.depth[0] == 8 else np.dtype("<u2")
-        plane = np.frombuffer(frame.buffer.extract_dup(0, info.stride[0] * self.height), depth)
-        grey = plane.reshape(self.height, -1)[:, :self.width].astype(float)
-        return grey if info.finfo.depth[0] == 8 else grey / 257
+        data = frame.buffer.extract_dup(0, frame.buffer.get_size())
+
+        def component(i):
+            plane, depth = info.finfo.plane[i], info.finfo.depth[i]
+            order = "<" if info.finfo.flags & GstVideo.VideoFormatFlags.LE else ">"
+            values = np.ndarray((self.height, self.width), np.uint8 if depth == 8 else f"{order}u2", data,
+                                info.offset[plane] + info.finfo.poffset[i],
+                                (info.stride[plane], info.finfo.pixel_stride[i]))
+            return values * (255 / ((1 << depth + info.finfo.shift[i]) - 1))
+
+        if info.finfo.flags & GstVideo.VideoFormatFlags.RGB:
+            return sum(weight * component(i) for i, weight in enumerate(RGB_WEIGHTS))
+        return component(0)
 
     def overexposed(self, frame):
         """Which pixels of a frame are white, by row and column."""
@@ -205,19 +218,22 @@ def read_pictures(path, start, end):
 def decode(path, start, end):
     """The frames of a time span, and a few before it."""
     video = Video()
-    for sample in samples_of(f"filesrc location={quoted(path)} ! decodebin ! videoconvert ! {LUMA} ! {SINK}"):
-        buffer = sample.get_buffer()
-        if not video.frames:
-            video.caps = sample.get_caps().to_string()
-            info = sample.get_caps().get_structure(0)
-            video.width, video.height = info.get_value("width"), info.get_value("height")
-            video.origin = buffer.pts
-        elif video.frames[-1].time - video.origin >= end > 0:
-            break
-        if buffer.pts - video.origin <= start:
-            del video.frames[:-PAST_FRAMES]
-        # A decoder waits for its few buffers to come back.
-        video.frames.append(Frame(buffer.pts, buffer.copy_deep()))
+    sinks = (pad for pad in Gst.ElementFactory.find("eventsim-dvs").get_static_pad_templates()
+             if pad.direction == Gst.PadDirection.SINK)
+    with VideoFile(path, f"capsfilter caps=\"{next(sinks).get_caps().to_string()}\" ! {SINK}") as pipeline:
+        for sample in pipeline.samples():
+            buffer = sample.get_buffer()
+            if not video.frames:
+                video.caps = sample.get_caps().to_string()
+                info = sample.get_caps().get_structure(0)
+                video.width, video.height = info.get_value("width"), info.get_value("height")
+                video.origin = buffer.pts
+            elif video.frames[-1].time - video.origin >= end > 0:
+                break
+            if buffer.pts - video.origin <= start:
+                del video.frames[:-PAST_FRAMES]
+            # A decoder waits for its few buffers to come back.
+            video.frames.append(Frame(buffer.pts, buffer.copy_deep()))
     if not video.frames:
         raise RuntimeError(f"{path}: no video frames; name a video, or a text file of lines \"seconds picture\"")
     return video

@@ -71,6 +71,9 @@ if ! has "${simulator[0]-}"; then
   echo "error: no simulator \"${simulator[*]}\"; list them: gst-inspect-1.0 eventsim" >&2
   exit 1
 fi
+if [[ ${simulator[0]} =~ ^(gl)?eventsim- ]]; then # skips frames that a camera repeats
+  simulator=("${simulator[0]}" skip-repeated=true "${simulator[@]:1}")
+fi
 remote=${PIPEWIRE_REMOTE:-pipewire-0}
 if [[ $remote != /* ]]; then remote=${PIPEWIRE_RUNTIME_DIR:-${XDG_RUNTIME_DIR:-/run/user/$(id -u)}}/$remote; fi
 if [ ! -S "$remote" ]; then

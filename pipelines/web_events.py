@@ -59,6 +59,15 @@ def is_address(host):
     return True
 
 
+def refuse(message, status):
+    """Answers a request at its headers and closes the connection: libsoup would read, and keep, its body first."""
+    connection = message.steal_connection()
+    reason = Soup.Status.get_phrase(status)
+    connection.get_output_stream().write_all(
+        f"HTTP/1.1 {int(status)} {reason}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n".encode())
+    connection.close()
+
+
 class Viewer:
     """A browser: its WebSocket, and the WebRTC connection negotiated through it. Calls `need_key_frame`,
     from any thread, when the browser needs one to decode, and `end` when it has disconnected."""
@@ -233,16 +242,18 @@ class Server:
             is_cross_origin = origin is not None and urlsplit(origin).netloc != host
         except ValueError as cause:
             print(f"Refused a malformed request: {cause}", file=sys.stderr)
-            message.set_status(Soup.Status.BAD_REQUEST, None)
+            refuse(message, Soup.Status.BAD_REQUEST)
             return
         if is_cross_origin or not (name in self._hosts or is_address(name)):
-            message.set_status(Soup.Status.FORBIDDEN, None)
+            refuse(message, Soup.Status.FORBIDDEN)
+        elif message.get_method() not in ("GET", "HEAD"):
+            refuse(message, Soup.Status.METHOD_NOT_ALLOWED)
+        elif headers.get_one("Content-Length") or headers.get_one("Transfer-Encoding"):
+            refuse(message, Soup.Status.REQUEST_ENTITY_TOO_LARGE)
 
     def _serve_page(self, _, message, path, query):
         if path != "/":
             message.set_status(Soup.Status.NOT_FOUND, None)
-        elif message.get_method() not in ("GET", "HEAD"):
-            message.set_status(Soup.Status.METHOD_NOT_ALLOWED, None)
         else:
             with open(PAGE, "rb") as page:
                 message.set_status(Soup.Status.OK, None)

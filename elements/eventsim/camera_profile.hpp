@@ -8,9 +8,9 @@
 /// Properties and their values, as text.
 using ProfileEntries = std::vector<std::pair<std::string, std::string>>;
 
-/// Reads the properties of `element` from a camera profile, which event-calibrate writes: a key
-/// file (as of GLib) of at most 64 KiB with a group of the element's name. Throws
-/// std::runtime_error, which names the file and the reason.
+/// Reads the properties of `element` from a camera profile, which event-calibrate writes: a
+/// GKeyFile of at most 64 KiB with a group of the element's name. Throws std::runtime_error, which
+/// names the file and the reason.
 ProfileEntries read_camera_profile(const std::string& path, const char* element);
 
 /// Does the same with the text of a profile. The error gives the reason only.

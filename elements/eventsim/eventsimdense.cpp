@@ -23,6 +23,8 @@
  * gst-launch-1.0 filesrc location=drive.mp4 ! decodebin ! eventsim-dense flow=dis-hq ! videoconvert
  * ! vp8enc deadline=1 ! webmmux ! filesink location=events.webm
  * ]|
+ *
+ * Since: 0.1
  */
 #include "features.hpp"
 #include "gst/simulator/dense_properties.hpp"
@@ -66,6 +68,7 @@ static const EventSimulatorMethod dense = {
     .long_name = "Event camera simulator: dense interpolation",
     .description = "Turns video into events: interpolates frames with dense optical flow",
     .threshold = 2,
+    .denoises = true,
     .interpolates = true,
     .has_flow = true,
     .create = in_system_memory<eventcamera::make_dense_simulator>,

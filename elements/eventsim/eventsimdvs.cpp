@@ -16,8 +16,7 @@
  * is a change of light by 22 %; linear has the same range from black to white as lin-log, ln(255)
  * = 5.54, so 0.2 is 9.2 grey levels of 8-bit video.
  *
- * If a static or dark scene fires because of a webcam's sensor noise, denoise removes the noise and
- * keeps the edges.
+ * Noise of the frame camera is found and removed by default; see #GstEventSimDvs:denoise.
  *
  * The same video, settings and seed give the same events for any number of threads.
  *
@@ -39,6 +38,8 @@
  * gst-launch-1.0 videotestsrc pattern=ball num-buffers=100 ! eventsim-dvs preset=v2e-noisy
  * threshold-sigma=0.03 seed=7 ! evtenc format=EVT3 ! filesink location=ball.raw
  * ]|
+ *
+ * Since: 0.1
  */
 #include <algorithm>
 #include <bitset>
@@ -79,7 +80,7 @@ static GType upsampling_type() {
       {static_cast<int>(Upsampling::linear),
        "Linear interpolation per pixel, in units of the response", "linear"},
       {static_cast<int>(Upsampling::motion),
-       "Motion along dense optical flow, in steps of a pixel, longer where much moves", "motion"},
+       "Motion along dense optical flow, in steps of a pixel, or more if it is fast", "motion"},
       {0, nullptr, nullptr},
   };
   return enum_type("GstEventSimDvsUpsampling", values);
@@ -98,6 +99,9 @@ static GType refractory_reset_type() {
 
 static GType preset_type() {
   static const GEnumValue values[] = {
+      {static_cast<int>(DvsPreset::standard),
+       "A typical event camera: logarithmic, with motion between frames, for any frame camera",
+       "standard"},
       {static_cast<int>(DvsPreset::ideal), "No noise, no delay; lin-log", "ideal"},
       {static_cast<int>(DvsPreset::esim), "ESIM: like ideal, with a logarithmic response", "esim"},
       {static_cast<int>(DvsPreset::v2e_clean), "v2e, clean: threshold mismatch only", "v2e-clean"},
@@ -139,11 +143,7 @@ struct PixelProperty {
 };
 
 const PixelProperty pixel_properties[] = {
-    {"denoise", "Denoise",
-     "Remove camera noise from each frame first: smooth differences between neighbouring pixels of "
-     "up to this size, and keep larger ones such as edges (grey levels, white is 255; 0 = off, 8 "
-     "suits noisy webcams)",
-     &DvsSettings::denoise, 0, 255, controllable},
+    {"denoise", "Denoise", denoise_blurb, &DvsSettings::denoise, -1, 255, controllable},
     {"linear-light", "Linear light",
      "Invert the sRGB transfer function (IEC 61966-2-1) first, to recover the light that reached "
      "the camera; otherwise luma is used as light",
@@ -167,8 +167,8 @@ const PixelProperty pixel_properties[] = {
     {"upsampling", "Upsampling", "Model of light between two frames", &DvsSettings::upsampling, 0,
      0, fixed, upsampling_type},
     {"max-interpolated-frames", "Maximum interpolated frames",
-     "Maximum number of frames interpolated between two frames with upsampling=motion; without "
-     "this limit, up to 4 pixels of motion have steps of a pixel, and more have longer ones",
+     "Maximum number of frames interpolated between two frames with upsampling=motion. Without "
+     "this limit, steps are a pixel for motion of up to 4 pixels, and longer for more",
      &DvsSettings::max_interpolated_frames, 0, 254},
     {"cutoff-frequency", "Cutoff frequency",
      "Bandwidth of the photoreceptor at white; darker pixels are slower (Hz; 0 = no limit)",
@@ -211,7 +211,7 @@ const PixelProperty pixel_properties[] = {
      "of real cameras saturate in this way at strong edges",
      &DvsSettings::adaptation, 0, 10, controllable},
     {"adaptation-time", "Adaptation time",
-     "Time in which the growth by one event is gone, at a constant rate (ns)",
+     "Time in which the growth by one event decays to 0, at a constant rate (ns)",
      &DvsSettings::adaptation_time, 1000, max_time, controllable},
     {"refractory-period", "Refractory period",
      "Time after an event during which the pixel cannot fire (ns)", &DvsSettings::refractory_period,
@@ -295,10 +295,10 @@ Overrides read_profile(const std::string& path, GObjectClass* klass) {
 
 /// User-settable values.
 struct Settings {
-  DvsPreset preset = DvsPreset::ideal;
+  DvsPreset preset = DvsPreset::standard;
   std::string profile;
   Overrides of_profile;       ///< override the preset
-  std::string profile_error;  ///< why the profile could not be read, if so
+  std::string profile_error;  ///< reason why the profile could not be read; empty if it was
   Overrides of_properties;    ///< override both
 
   DvsSettings dvs_settings() const {
@@ -349,20 +349,19 @@ static GParamSpec* spec_of(const PixelProperty& s, Value value) {
 static void install_properties(GObjectClass* klass) {
   const Settings defaults;
   Properties<settings_of> properties(klass);
-  properties.add(
-      &Settings::preset,
-      g_param_spec_enum("preset", "Preset",
-                        "Camera model: sets all properties of the pixel, except those that are set "
-                        "explicitly, before or after",
-                        preset_type(), static_cast<int>(defaults.preset), mutable_playing_flags));
+  properties.add(&Settings::preset,
+                 g_param_spec_enum(
+                     "preset", "Preset",
+                     "Camera model: sets all properties of the pixel that are not set explicitly, "
+                     "before or after",
+                     preset_type(), static_cast<int>(defaults.preset), mutable_playing_flags));
   properties.add(
       [klass](Settings& settings, const GValue* value) { settings.set_profile(value, klass); },
       [](Settings& settings, GValue* value) { write_value(settings.profile, value); },
       g_param_spec_string(
           "profile", "Camera profile",
-          "File of settings that event-calibrate fitted to a camera, which override "
-          "those of the preset, but not those that are set explicitly, before or "
-          "after",
+          "File of settings that event-calibrate fitted to a camera. They override the preset, but "
+          "not properties that are set explicitly, before or after",
           "", mutable_ready_flags));
   for (std::size_t i = 0; i < std::size(pixel_properties); ++i) {
     const auto add = [&](auto member) {

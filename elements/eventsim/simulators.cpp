@@ -23,12 +23,15 @@
  * |[
  * gst-launch-1.0 videotestsrc pattern=ball ! eventsim-frame ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventSimulatorMethod frame = {
     .type_name = "GstEventSimFrame",
     .long_name = "Event camera simulator: difference frame",
     .description = "Turns video into events: thresholds the difference of successive frames",
     .threshold = 20,
+    .denoises = true,
     .create = in_system_memory<eventcamera::make_frame_simulator>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventsim_frame, "eventsim-frame", GST_RANK_NONE,
@@ -52,6 +55,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventsim_frame, "eventsim-frame", GST_RANK_NONE,
  * gst-launch-1.0 videotestsrc pattern=ball num-buffers=300 ! eventsim-sparse !
  * eventnpyenc ! filesink location=ball.npy
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventSimulatorMethod sparse = {
     .type_name = "GstEventSimSparse",
@@ -60,6 +65,7 @@ static const EventSimulatorMethod sparse = {
         "Turns video into events: tracks only the pixels that changed to interpolate "
         "frames",
     .threshold = 10,
+    .denoises = true,
     .interpolates = true,
     .create = in_system_memory<eventcamera::make_sparse_simulator>,
 };
@@ -83,6 +89,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventsim_sparse, "eventsim-sparse", GST_RANK_NONE,
  * |[
  * gst-launch-1.0 v4l2src ! eventsim-diff ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventSimulatorMethod diff = {
     .type_name = "GstEventSimDiff",
@@ -91,6 +99,7 @@ static const EventSimulatorMethod diff = {
         "Turns video into events: tracks what changed from one difference frame to the "
         "next",
     .threshold = 20,
+    .denoises = true,
     .interpolates = true,
     .create = in_system_memory<eventcamera::make_diff_simulator>,
 };

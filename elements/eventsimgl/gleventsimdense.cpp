@@ -15,10 +15,12 @@
  * gst-launch-1.0 videotestsrc pattern=ball num-buffers=100 ! glupload ! gleventsim-dense !
  * eventstats ! fakesink
  * ]|
+ *
+ * Since: 0.1
  */
 #include "gst/glsimulator/gleventsimulator.hpp"
 #include "gst/simulator/dense_properties.hpp"
-#include "src/gl/dense_simulator.hpp"
+#include "src/gl/simulator.hpp"
 
 using eventcamera::FlowMethod;
 using eventcamera::gl::DenseSimulator;

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// Simulators without properties of their own: a table of methods.
 #include "gst/glsimulator/gleventsimulator.hpp"
-#include "src/gl/diff_simulator.hpp"
-#include "src/gl/frame_simulator.hpp"
-#include "src/gl/sparse_simulator.hpp"
+#include "src/gl/simulator.hpp"
 
 /**
  * SECTION:element-gleventsim-frame
@@ -19,6 +17,8 @@
  * |[
  * gst-launch-1.0 videotestsrc num-buffers=100 ! gleventsim-frame ! eventstats ! fakesink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventSimulatorMethod frame = {
     .type_name = "GstGLEventSimFrame",
@@ -46,6 +46,8 @@ GST_ELEMENT_REGISTER_DEFINE(gleventsim_frame, "gleventsim-frame", GST_RANK_NONE,
  * gst-launch-1.0 videotestsrc pattern=ball num-buffers=100 ! glupload ! gleventsim-sparse !
  * glimagesink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventSimulatorMethod sparse = {
     .type_name = "GstGLEventSimSparse",
@@ -74,6 +76,8 @@ GST_ELEMENT_REGISTER_DEFINE(gleventsim_sparse, "gleventsim-sparse", GST_RANK_NON
  * gst-launch-1.0 videotestsrc pattern=ball num-buffers=100 ! glupload ! gleventsim-diff !
  * eventstats ! fakesink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventSimulatorMethod diff = {
     .type_name = "GstGLEventSimDiff",

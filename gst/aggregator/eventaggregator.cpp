@@ -58,7 +58,7 @@ GstFlowReturn EventAggregator::push_gap(GstClockTime start, GstClockTime duratio
   GstPad* const src = GST_AGGREGATOR_SRC_PAD(element_);
   if (segment_sent_) return push_event(src, gst_event_new_gap(start, duration));
   if (!gst_pad_has_current_caps(src)) return GST_FLOW_OK;
-  // GstAggregator sends the segment with a buffer only.
+  // gst_aggregator_push_mandatory_events() sends the segment only before a buffer or EOS.
   OwnedBuffer empty(gst_buffer_new());
   GST_BUFFER_PTS(empty.get()) = start;
   GST_BUFFER_DURATION(empty.get()) = duration;
@@ -84,14 +84,16 @@ static gboolean forward(GstAggregator* element, GstEvent* event) {
 }
 
 /// Answers a caps query on a pad whose buffers pass through with the caps that downstream accepts.
-static void answer_caps_of_passed(GstAggregator* aggregator, GstAggregatorPad* pad,
-                                  GstQuery* query) {
+static void answer_caps_of_passed(EventAggregator& self, GstAggregator* aggregator,
+                                  GstAggregatorPad* pad, GstQuery* query) {
   GstCaps* filter = nullptr;
   gst_query_parse_caps(query, &filter);
   const OwnedCaps ours(gst_pad_get_pad_template_caps(GST_PAD(pad)));
-  const OwnedCaps taken(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(aggregator), filter));
-  const OwnedCaps result(
-      gst_caps_intersect_full(taken.get(), ours.get(), GST_CAPS_INTERSECT_FIRST));
+  const OwnedCaps taken(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(aggregator), ours.get()));
+  OwnedCaps result = self.input_caps(
+      OwnedCaps(gst_caps_intersect_full(taken.get(), ours.get(), GST_CAPS_INTERSECT_FIRST)));
+  if (filter != nullptr)
+    result.reset(gst_caps_intersect_full(result.get(), filter, GST_CAPS_INTERSECT_FIRST));
   gst_query_set_caps_result(query, result.get());
 }
 
@@ -225,7 +227,7 @@ struct EventAggregatorFunctions {
     }
     GST_DEBUG_OBJECT(pad, "accepted %" GST_PTR_FORMAT, caps);
     if (is_passed(self, pad)) {
-      self.main_caps_.reset(gst_caps_ref(caps));
+      self.main_caps_ = self.output_caps(caps);
       gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(self.element_));
     }
     return true;
@@ -279,7 +281,8 @@ struct EventAggregatorFunctions {
       GST_WARNING_OBJECT(element, "does not flush: refused %" GST_PTR_FORMAT, event.get());
       return FALSE;
     }
-    // GstAggregator flushes before it forwards a seek, and never resumes if that fails.
+    // gst_aggregator_do_seek() stops the source pad's task before it forwards a flushing seek, and
+    // does not start it again if that fails.
     bool all_would = true;
     for_each_sink_pad(element, [&](GstAggregatorPad* pad) {
       if (would_seek(GST_PAD(pad), request)) return;
@@ -303,8 +306,8 @@ struct EventAggregatorFunctions {
     return PARENT_AGGREGATOR_CLASS->src_event(element, event);
   }
 
-  /// Answers with the range of the main pad, or of the first one. GstAggregator's default is "not
-  /// seekable".
+  /// Answers with the range of the main pad, or of the first one.
+  /// gst_aggregator_default_src_query() answers "not seekable".
   static gboolean answer_seeking(const EventAggregator& self, GstQuery* query) {
     bool is_first = true;
     bool all_can = true;
@@ -330,8 +333,9 @@ struct EventAggregatorFunctions {
                : PARENT_AGGREGATOR_CLASS->src_query(element, query);
   }
 
-  /// Answers ALLOCATION queries at once. GstAggregator would do so after the buffers before them,
-  /// which may wait for another pad, while upstream of both, such as a tee, waits for the answer.
+  /// Answers ALLOCATION queries at once. gst_aggregator_default_sink_query_pre_queue() queues them
+  /// behind buffers, which may wait for another pad while the upstream of both, such as a tee,
+  /// waits for the answer.
   static gboolean sink_query_pre_queue(GstAggregator* element, GstAggregatorPad* pad,
                                        GstQuery* query) {
     if (GST_QUERY_TYPE(query) == GST_QUERY_ALLOCATION)
@@ -344,7 +348,7 @@ struct EventAggregatorFunctions {
   static gboolean sink_query(GstAggregator* element, GstAggregatorPad* pad, GstQuery* query) {
     if (!is_passed(of(element), pad) || GST_QUERY_TYPE(query) != GST_QUERY_CAPS)
       return PARENT_AGGREGATOR_CLASS->sink_query(element, pad, query);
-    answer_caps_of_passed(element, pad, query);
+    answer_caps_of_passed(of(element), element, pad, query);
     return TRUE;
   }
 
@@ -408,15 +412,6 @@ void gst_event_aggregator_add_pads(GstEventAggregator* self) {
   }
 }
 
-/// Iterates over linked sink pads only. A latency query is sent to the internal links of the source
-/// pad and fails if one of them fails; GstAggregator would then treat a live source as not live.
-static GstIterator* iterate_linked_pads(GstPad*, GstObject* element) {
-  const auto compare = [](gconstpointer item, gconstpointer) {
-    return gst_pad_is_linked(GST_PAD(g_value_get_object(static_cast<const GValue*>(item)))) ? 0 : 1;
-  };
-  return gst_iterator_filter(gst_element_iterate_sink_pads(GST_ELEMENT(element)), compare, nullptr);
-}
-
 static void finalize(GObject* object) {
   std::destroy_at(&priv_of(object));
   G_OBJECT_CLASS(gst_event_aggregator_parent_class)->finalize(object);
@@ -425,7 +420,6 @@ static void finalize(GObject* object) {
 static void gst_event_aggregator_init(GstEventAggregator* self) {
   new (&priv_of(self)) GstEventAggregatorPrivate;
   GstPad* const src = GST_AGGREGATOR_SRC_PAD(self);
-  gst_pad_set_iterate_internal_links_function(src, iterate_linked_pads);
   gst_pad_add_probe(
       src,
       static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),

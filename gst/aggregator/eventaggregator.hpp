@@ -23,14 +23,14 @@
 /// seekable range, and a seek must flush, because the pads reach it at different times. A seek is
 /// forwarded to all pads, or to none if one of them would refuse it.
 ///
-/// Only for the source pad's thread, or while it does not run.
+/// Functions are called by the source pad's task, or in state changes while it does not run.
 class EventAggregator {
  public:
   struct Role {
     const char* verb;  ///< what the element does with events, for messages: "draw"
     /// Name of the main pad; null if pads are requested.
     const char* main_pad = "sink";
-    /// Buffers of the main pad pass through, with its caps.
+    /// Buffers of the main pad pass through, with its caps or those of output_caps().
     bool passes_main_pad = true;
   };
 
@@ -50,6 +50,10 @@ class EventAggregator {
 
   /// Returns false to reject `caps`. May throw.
   virtual bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) = 0;
+  /// Caps that the output has if the main pad, whose buffers pass through, has `input`. May throw.
+  virtual OwnedCaps output_caps(GstCaps* input) { return OwnedCaps(gst_caps_ref(input)); }
+  /// Caps of the main pad, whose buffers pass through, for which the output can have `output`.
+  virtual OwnedCaps input_caps(OwnedCaps output) const { return output; }
   /// Handles a new segment of the main pad, before the pad stores it. May throw.
   virtual void handle_segment(const GstSegment&) {}
   /// Like GstAggregatorClass::aggregate. Returns GST_FLOW_EOS once no more output follows because a

@@ -40,7 +40,7 @@ inline void store_segment_end(GstAggregatorPad* pad, GstEvent* gap) {
                             unref_event);
 }
 
-/// The SEGMENT_DONE event that a pad has reached, or null.
+/// SEGMENT_DONE event that a pad has reached; null if none.
 inline OwnedEvent segment_end_of(GstAggregatorPad* pad) {
   const auto ref = [](gpointer event, gpointer) -> gpointer {
     return event != nullptr ? gst_event_ref(GST_EVENT(event)) : nullptr;

@@ -42,9 +42,9 @@ struct Report {
   std::string text;
 };
 
-/// True if an element posts an error again without a state change in between. A refused sticky
-/// event is sent again before each following buffer and event.
-inline bool repeats_error(GstElement* element, const std::string& text) {
+/// Records the last error of an element. False if it is the same as before, without a state change
+/// in between: a refused sticky event is sent again before each following buffer and event.
+inline bool record_error(GstElement* element, const std::string& text) {
   static const GQuark quark = g_quark_from_static_string("event-last-error");
   GST_OBJECT_LOCK(element);
   const auto error = std::to_string(element->state_cookie) + ": " + text;
@@ -52,14 +52,14 @@ inline bool repeats_error(GstElement* element, const std::string& text) {
   const bool repeats = last != nullptr && last == error;
   if (!repeats) g_object_set_qdata_full(G_OBJECT(element), quark, g_strdup(error.c_str()), g_free);
   GST_OBJECT_UNLOCK(element);
-  return repeats;
+  return !repeats;
 }
 
 /// Like GST_ELEMENT_ERROR and GST_ELEMENT_WARNING, with code and text as values. A repeated error
 /// is posted once. Invalid UTF-8, such as quoted bytes of a file, becomes U+FFFD.
 inline void post_message(gpointer element, GstMessageType type, const Report& report,
                          const std::string& cause, CallSite at = CallSite()) {
-  if (type == GST_MESSAGE_ERROR && repeats_error(GST_ELEMENT(element), report.text)) return;
+  if (type == GST_MESSAGE_ERROR && !record_error(GST_ELEMENT(element), report.text)) return;
   gst_element_message_full(GST_ELEMENT(element), type, report.code.domain, report.code.code,
                            g_utf8_make_valid(report.text.c_str(), -1),
                            g_utf8_make_valid(cause.c_str(), -1), at.file, at.function, at.line);

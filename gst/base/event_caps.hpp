@@ -14,8 +14,14 @@ static_assert(GST_EVENT_CAMERA_MAX_SIDE == eventcamera::max_side);
 /// Caps of an event stream in memory format.
 #define EVENT_CAPS GST_EVENT_CAMERA_MEDIA_TYPE ", format = (string) XYTP, " SIZE_CAPS
 
-/// Property of decodebin to get events, which it would otherwise draw as video.
+/// Property of decodebin to get events: are_final_caps() of gstdecodebin2.c stops at these caps.
 #define ASK_FOR_EVENTS "caps=\"application/x-event-camera,format=XYTP\""
 
 /// Caps of events in memory format, from a sensor of this size, with a variable framerate.
-OwnedCaps event_caps(int width, int height);
+inline OwnedCaps event_caps(int width, int height) {
+  GstEventCameraInfo info = {};
+  info.width = width;
+  info.height = height;
+  info.fps_d = 1;
+  return OwnedCaps(gst_event_camera_info_to_caps(&info));
+}

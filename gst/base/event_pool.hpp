@@ -10,8 +10,8 @@
 /// Memory is freed when no interval has needed as much for a while, or when too much is idle.
 GstBufferPool* event_pool_new();
 
-/// Gives an empty buffer of such a pool `size` > 0 bytes to write. Throws std::bad_alloc. Not
-/// thread-safe.
+/// Allocates `size` > 0 bytes to write in an empty buffer of such a pool. Throws std::bad_alloc.
+/// Not thread-safe.
 void event_pool_reserve(GstBuffer* buffer, gsize size);
 
 /// Event buffers of one stream, from a private pool. Not thread-safe.

@@ -11,6 +11,7 @@ struct Unref {
   void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
   void operator()(GstBufferPool* pool) const { gst_object_unref(pool); }
   void operator()(GstCaps* caps) const { gst_caps_unref(caps); }
+  void operator()(GstElement* element) const { gst_object_unref(element); }
   void operator()(GstEvent* event) const { gst_event_unref(event); }
   void operator()(GstPad* pad) const { gst_object_unref(pad); }
 };
@@ -22,5 +23,6 @@ struct UnrefObject {
 using OwnedBuffer = std::unique_ptr<GstBuffer, Unref>;
 using OwnedBufferPool = std::unique_ptr<GstBufferPool, Unref>;
 using OwnedCaps = std::unique_ptr<GstCaps, Unref>;
+using OwnedElement = std::unique_ptr<GstElement, Unref>;
 using OwnedEvent = std::unique_ptr<GstEvent, Unref>;
 using OwnedPad = std::unique_ptr<GstPad, Unref>;

@@ -61,7 +61,7 @@ void keep_metas(GstBuffer* frame, GstBuffer* picture) {
   gst_buffer_foreach_meta(frame, keep, picture);
 }
 
-bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps) {
+bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps, guint kept) {
   GstVideoInfo drawn;
   if (!gst_video_info_from_caps(&drawn, caps)) return false;
   GstBufferPool* pool = nullptr;
@@ -71,6 +71,8 @@ bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps) {
   const bool offered = gst_query_get_n_allocation_pools(query) > 0;
   if (offered) gst_query_parse_nth_allocation_pool(query, 0, &pool, &size, &min, &max);
   size = MAX(size, static_cast<guint>(GST_VIDEO_INFO_SIZE(&drawn)));
+  min += kept;
+  if (max > 0) max += kept;
 
   const auto configure = [&] {
     GstStructure* config = gst_buffer_pool_get_config(pool);

@@ -5,7 +5,8 @@
 
 #include "src/render/palette.hpp"
 
-/// Video formats that events can be drawn in, the most common first.
+/// Video formats that events can be drawn in, the most common first, and those with colours.
+#define COLOUR_FORMATS "{ BGRx, RGBx, xRGB, xBGR, BGRA, RGBA, ARGB, ABGR, RGB, BGR }"
 #define DRAWN_VIDEO_FORMATS "{ BGRx, RGBx, xRGB, xBGR, BGRA, RGBA, ARGB, ABGR, RGB, BGR, GRAY8 }"
 
 /// Pixel layout of a video of DRAWN_VIDEO_FORMATS.
@@ -20,6 +21,6 @@ GType palette_type();
 void keep_metas(GstBuffer* frame, GstBuffer* picture);
 
 /// For decide_allocation(): uses downstream's buffer pool if it offers one that takes such buffers,
-/// else a new video pool.
+/// else a new video pool. `kept` is the number of buffers that the element keeps.
 /// False if `caps` are not video.
-bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps);
+bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps, guint kept = 0);

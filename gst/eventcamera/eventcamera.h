@@ -207,7 +207,7 @@ void gst_event_camera_unmap(GstEventCameraMap* map);
  * @GST_EVENT_CAMERA_CAUSE_EXPOSURE_PULSE: the start or end of a frame's exposure, in cameras that
  *     also capture frames
  *
- * What made a simulated pixel fire. Later versions may add causes.
+ * Why a simulated pixel fired. Later versions may add causes.
  *
  * Since: 0.1
  */
@@ -600,7 +600,8 @@ GBytes* gst_event_camera_unpack(GstBuffer* buffer);
  *
  * Writes the voxel grid of events, the same as the element `eventtensor` makes of a window: each
  * event adds its polarity, +1 or -1, to the two nearest of @bins instants, in proportion to their
- * closeness. The first instant is the time of the first event, the last one that of the last event.
+ * closeness. The first instant is the time of the first event, the last instant the time of the
+ * last event.
  *
  * Returns: %FALSE if an event is outside the sensor or earlier than the one before it; @grid is
  * then unspecified

@@ -40,15 +40,21 @@ struct State {
   Microseconds delay = 0;  ///< added to the times that the filter sees
 };
 
+/// State from start to stop.
+struct Stream {
+  std::optional<State> state;
+  EventFaults faults{"filter", GST_CAT_DEFAULT};
+};
+
 }  // namespace
 
 struct GstEventFilterPrivate {
+  explicit GstEventFilterPrivate(GstBaseTransform* element)
+      : stream(GST_BASE_TRANSFORM_SINK_PAD(element)) {}
+
   std::unique_ptr<EventFilter> impl;
   Guarded<Counters> counters;
-
-  // Only for the streaming thread, or while it does not run.
-  std::optional<State> state;
-  EventFaults faults{"filter", GST_CAT_DEFAULT};
+  StreamLocked<Stream> stream;
 };
 
 G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventFilter, gst_event_filter, GST_TYPE_BASE_TRANSFORM,
@@ -89,7 +95,7 @@ static auto reported(gpointer self, const Work& work) {
 /// Skips a buffer that cannot be filtered.
 static GstFlowReturn reject(gpointer self, EventFault fault, GstBuffer* buffer) {
   auto& priv = priv_of(self);
-  priv.faults.warn(self, fault, buffer);
+  priv.stream->faults.warn(self, fault, buffer);
   const auto events = gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent);
   const auto counters = priv.counters.lock();
   counters->received += events;
@@ -102,8 +108,8 @@ static GstFlowReturn reject(gpointer self, EventFault fault, GstBuffer* buffer) 
 /// a filter that must not see time go back.
 static Microseconds continued(gpointer self, LabelledEvents events, Microseconds start) {
   auto& priv = priv_of(self);
-  auto& passed = priv.state->passed;
-  auto& delay = priv.state->delay;
+  auto& passed = priv.stream->state->passed;
+  auto& delay = priv.stream->state->delay;
   if (events.events.empty()) return start;
   const Microseconds overlap = passed - (start + events.events.front().t);
   if (overlap > 1) {
@@ -133,7 +139,7 @@ static void align_events(GstBuffer* buffer) {
 
 static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer) {
   auto& priv = priv_of(transform);
-  if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
+  if (!priv.stream->state) return GST_FLOW_NOT_NEGOTIATED;
   const auto interval = interval_of(buffer);
   if (!interval) return reject(transform, interval_fault(buffer), buffer);
   if (gst_buffer_get_size(buffer) % sizeof(GstEventCameraEvent) != 0)
@@ -148,8 +154,8 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
                            : GstClockTime{G_MAXUINT32};
     eventcamera::InvalidEvents invalid;
     const auto valid = eventcamera::keep_valid(
-        all, priv.state->sensor, static_cast<guint32>(std::min(max_t, GstClockTime{G_MAXUINT32})),
-        invalid);
+        all, priv.stream->state->sensor,
+        static_cast<guint32>(std::min(max_t, GstClockTime{G_MAXUINT32})), invalid);
     const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
     const auto kept = priv.impl->filter(valid, continued(transform, valid, start));
     mapped.reset();
@@ -163,7 +169,7 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
       counters->dropped += valid.events.size() - passed;
       counters->rejected += received - valid.events.size();
     }
-    priv.faults.warn(transform, invalid, buffer);
+    priv.stream->faults.warn(transform, invalid, buffer);
     GST_LOG_OBJECT(transform,
                    "%" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT " events kept at %" GST_TIME_FORMAT,
                    passed, received, GST_TIME_ARGS(interval->start));
@@ -191,9 +197,9 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   auto& priv = priv_of(transform);
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_events(transform, event, "filter"))
     return FALSE;
-  if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && priv.state) {
+  if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && priv.stream->state) {
     reported(transform, [&] { priv.impl->forget(); });
-    priv.state->passed = State{}.passed;
+    priv.stream->state->passed = State{}.passed;
   }
   return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
 }
@@ -208,14 +214,16 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
     return FALSE;
   const SensorSize sensor{from.width, from.height};
   const SensorSize output{to.width, to.height};
-  if (priv.state && priv.state->sensor == sensor && priv.state->output == output) return TRUE;
+  if (priv.stream->state && priv.stream->state->sensor == sensor &&
+      priv.stream->state->output == output)
+    return TRUE;
   GST_DEBUG_OBJECT(transform, "%dx%d pixels in, %dx%d out", from.width, from.height, to.width,
                    to.height);
-  priv.state.reset();
+  priv.stream->state.reset();
   return reported(transform,
                   [&] {
                     priv.impl->start(sensor, output);
-                    priv.state = State{.sensor = sensor, .output = output};
+                    priv.stream->state = State{.sensor = sensor, .output = output};
                   })
              ? TRUE
              : FALSE;
@@ -229,8 +237,7 @@ static gboolean start(GstBaseTransform* transform) {
 static gboolean stop(GstBaseTransform* transform) {
   auto& priv = priv_of(transform);
   reported(transform, [&] { priv.impl->stop(); });
-  priv.state.reset();
-  priv.faults.reset();
+  priv.stream.reset();
   return TRUE;
 }
 
@@ -249,7 +256,7 @@ static void finalize(GObject* object) {
 }
 
 static void gst_event_filter_init(GstEventFilter* self) {
-  new (&priv_of(self)) GstEventFilterPrivate;
+  new (&priv_of(self)) GstEventFilterPrivate(GST_BASE_TRANSFORM(self));
   gst_base_transform_set_in_place(GST_BASE_TRANSFORM(self), TRUE);
   gst_base_transform_set_gap_aware(GST_BASE_TRANSFORM(self), TRUE);
 }

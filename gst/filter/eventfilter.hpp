@@ -16,7 +16,8 @@
 /// Implementation of an element that filters events in place. Each subclass of GstEventFilter owns
 /// one, which lives as long as the element.
 ///
-/// Only for the streaming thread, or while it does not run. Any call may throw.
+/// Called under the stream lock of the sink pad, or in a state change after streaming has stopped.
+/// Any call may throw.
 class EventFilter {
  public:
   virtual ~EventFilter() = default;

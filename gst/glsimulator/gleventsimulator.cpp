@@ -4,7 +4,6 @@
 #include <memory>
 
 #include "gst/glsimulator/shared_context.hpp"
-#include "gst/glsimulator/texture_simulator.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(gl_event_simulator_debug);
 #define GST_CAT_DEFAULT gl_event_simulator_debug

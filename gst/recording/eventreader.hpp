@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "gst/recording/format_settings.hpp"
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 /// A recording format, and the element that reads it: bytes in, streams of events and video out.
 ///
@@ -38,8 +38,8 @@ struct EventReaderFormat {
   void (*add_properties)(FormatProperties& properties) = nullptr;
 
   /// Creates a reader for a file or a stream with these caps; `caps` is null if unknown. May throw.
-  std::unique_ptr<eventcamera::RecordingDecoder> (*make_decoder)(const GstCaps* caps,
-                                                                 const FormatSettings& settings);
+  std::unique_ptr<eventcamera::Decoder> (*make_decoder)(const GstCaps* caps,
+                                                        const FormatSettings& settings);
 };
 
 /// Returns the element type that reads `format`, which must have static storage duration.

@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/eventwriter.hpp"
 
-#include <algorithm>
-#include <cstdint>
-#include <optional>
-#include <span>
-#include <string>
+#include <memory>
 #include <utility>
-#include <vector>
 
 #include "gst/base/authors.hpp"
-#include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
@@ -20,18 +14,11 @@
 #include "gst/base/types.hpp"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/sensor_events.hpp"
-#include "gst/recording/stream_header.hpp"
 #include "gst/recording/writable_events.hpp"
-#include "src/formats/waiting_items.hpp"
+#include "gst/recording/written_file.hpp"
 
-GST_DEBUG_CATEGORY_STATIC(event_writer_debug);
+GST_DEBUG_CATEGORY(event_writer_debug);
 #define GST_CAT_DEFAULT event_writer_debug
-
-using eventcamera::AbsoluteEvent;
-using eventcamera::Encoder;
-using eventcamera::Microseconds;
-using eventcamera::Trigger;
-using eventcamera::WaitingItems;
 
 namespace {
 
@@ -39,24 +26,6 @@ namespace {
 struct Settings {
   EventWriterFormat::Choice choice;
   guint mtu = G_MAXUINT;
-};
-
-/// Alignment of words in bytes; none crosses a multiple of it.
-constexpr std::size_t word_bytes = 8;
-
-/// Maximum bytes per event, including time words.
-constexpr std::size_t max_event_bytes = 32;
-
-/// State of the file being written, from caps to stop.
-struct State {
-  GstEventCameraInfo info;
-  OwnedCaps caps;      ///< output caps
-  OwnedBuffer header;  ///< pending header; null once pushed, or if the format has none
-  std::unique_ptr<Encoder> encoder;
-  bool written = false;
-  WaitingItems<Trigger> triggers = {};
-  Microseconds last = 0;              ///< time of the last encoded item
-  std::uint64_t pauses_reported = 0;  ///< removed microseconds that a warning reported
 };
 
 }  // namespace
@@ -68,11 +37,8 @@ struct GstEventWriterPrivate {
   Guarded<Settings> settings;
   GstPad* sink = nullptr;
   GstPad* src = nullptr;
-
-  // Accessed by the streaming thread only, or while there is none.
-  std::optional<State> state;
   WritableEvents writable;
-  std::vector<guint8> bytes;  ///< encoded but not yet pushed
+  std::unique_ptr<WrittenFile> file;  ///< from caps to stop
 };
 
 #define GST_TYPE_EVENT_WRITER (gst_event_writer_get_type())
@@ -116,21 +82,10 @@ static GstFlowReturn reported(GstEventWriter* self, const Work& work) {
 /// Begins a file. May throw.
 static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, OwnedCaps caps) {
   auto& priv = priv_of(self);
-  priv.bytes.clear();
-  priv.writable.begin_file({info.width, info.height});
   auto encoder =
       format_of(self).create({info.width, info.height}, priv.settings.copy().choice, caps.get());
-  encoder->encode({}, priv.bytes);
-  OwnedBuffer header;
-  if (!priv.bytes.empty()) {
-    header.reset(copied_buffer(std::as_bytes(std::span(priv.bytes))));
-    caps = with_stream_header(std::move(caps), header.get());
-    priv.bytes.clear();
-  }
-  priv.state.emplace(State{.info = info,
-                           .caps = std::move(caps),
-                           .header = std::move(header),
-                           .encoder = std::move(encoder)});
+  priv.file = std::make_unique<WrittenFile>(priv.writable, priv.src, info, std::move(encoder),
+                                            std::move(caps));
 }
 
 /// Caps of this sensor that downstream accepts.
@@ -165,7 +120,7 @@ static GstFlowReturn negotiate(GstEventWriter* self, const GstEventCameraInfo& i
   GST_DEBUG_OBJECT(self, "writing the events of %dx%d pixels as %" GST_PTR_FORMAT, info.width,
                    info.height, fixed.get());
   begin_file(self, info, std::move(fixed));
-  return gst_pad_push_event(priv.src, gst_event_new_caps(priv.state->caps.get()))
+  return gst_pad_push_event(priv.src, gst_event_new_caps(priv.file->caps()))
              ? GST_FLOW_OK
              : GST_FLOW_NOT_NEGOTIATED;
 }
@@ -200,228 +155,25 @@ static gboolean sink_query(GstPad* pad, GstObject* parent, GstQuery* query) {
 
 /* data */
 
-/// Maximum bytes per buffer.
-static std::size_t capacity(guint mtu) {
-  return mtu / word_bytes * word_bytes;
-}
-
-static GstFlowReturn push_header(GstEventWriter* self, GstClockTime pts) {
-  auto& state = *priv_of(self).state;
-  const OwnedBuffer header = std::move(state.header);
-  if (!header) return GST_FLOW_OK;
-  GstBuffer* const buffer = gst_buffer_copy(header.get());  // the original belongs to the caps
-  GST_BUFFER_PTS(buffer) = pts;
-  state.written = true;
-  return gst_pad_push(priv_of(self).src, buffer);
-}
-
-/// Pushes the encoded bytes in one buffer, or in several if the words of a silence exceed one. Only
-/// the last has a duration, because the interval continues after the others. May throw.
-static GstFlowReturn push_bytes(GstEventWriter* self, GstClockTime pts, GstClockTime duration) {
-  auto& priv = priv_of(self);
-  const auto room = capacity(priv.settings.copy().mtu);
-  std::span<const guint8> bytes = priv.bytes;
-  GstFlowReturn result = GST_FLOW_OK;
-  while (!bytes.empty() && result == GST_FLOW_OK) {
-    const auto piece = bytes.first(std::min(bytes.size(), room));
-    bytes = bytes.subspan(piece.size());
-    GstBuffer* const buffer = copied_buffer(std::as_bytes(piece));
-    GST_BUFFER_PTS(buffer) = pts;
-    if (bytes.empty()) GST_BUFFER_DURATION(buffer) = duration;
-    GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " bytes at %" GST_TIME_FORMAT, piece.size(),
-                   GST_TIME_ARGS(pts));
-    priv.state->written = true;
-    result = gst_pad_push(priv.src, buffer);
-  }
-  priv.bytes.clear();
-  return result;
-}
-
-/// Returns the number of leading events that fit into `room` bytes. Limited to events so close in
-/// time that no words for pauses are written between them.
-static std::size_t count_that_fits(std::span<const AbsoluteEvent> events, std::size_t room) {
-  constexpr Microseconds close = 1000;
-  events = events.first(std::min(events.size(), room / max_event_bytes));
-  const auto end = std::ranges::find_if(
-      events, [&](const auto& event) { return event.t - events.front().t > close; });
-  return static_cast<std::size_t>(end - events.begin());
-}
-
-/// Encodes events, and pushes each full buffer. `start` is the start time of the next buffer. May
-/// throw.
-static GstFlowReturn encode(GstEventWriter* self, std::span<const AbsoluteEvent> events,
-                            GstClockTime& start) {
-  auto& priv = priv_of(self);
-  const auto mtu = priv.settings.copy().mtu;
-  const auto room = capacity(mtu);
-  while (!events.empty()) {
-    const auto count = mtu == G_MAXUINT
-                           ? events.size()
-                           : count_that_fits(events, room - std::min(room, priv.bytes.size()));
-    if (count == 0) {
-      const auto end = std::max(start, static_cast<GstClockTime>(events.front().t) * GST_USECOND);
-      const GstFlowReturn result = push_bytes(self, start, end - start);
-      if (result != GST_FLOW_OK) return result;
-      start = end;
-    }
-    priv.state->encoder->encode(events.first(count), priv.bytes);
-    if (count > 0) priv.state->last = events[count - 1].t;
-    events = events.subspan(count);
-  }
-  return GST_FLOW_OK;
-}
-
-/// Encodes triggers, without those that come too late. May throw.
-static void encode_triggers(GstEventWriter* self, std::span<const Trigger> triggers) {
-  auto& priv = priv_of(self);
-  auto& state = *priv.state;
-  for (const auto& trigger : triggers) {
-    if (trigger.t < state.last || !state.encoder->encode_trigger(trigger, priv.bytes)) {
-      GST_LOG_OBJECT(self,
-                     "left out a trigger of input %u at %" G_GINT64_FORMAT
-                     " us: late, or the format has none",
-                     unsigned{trigger.id}, gint64{trigger.t});
-      continue;
-    }
-    state.last = trigger.t;
-    ++priv.writable.written().lock()->triggers;
-  }
-}
-
-static void encode_all_triggers(GstEventWriter* self) {
-  encode_triggers(self, priv_of(self).state->triggers.take_before(eventcamera::after_all_items));
-}
-
-/// Encodes events, and the triggers among them. May throw.
-static GstFlowReturn encode_all(GstEventWriter* self, std::span<const AbsoluteEvent> events,
-                                GstClockTime& start) {
-  if (events.empty()) return GST_FLOW_OK;
-  std::span<const Trigger> triggers = priv_of(self).state->triggers.take_before(events.back().t);
-  GstFlowReturn result = GST_FLOW_OK;
-  while (!events.empty() && result == GST_FLOW_OK) {
-    const auto due = std::ranges::lower_bound(triggers, events.front().t, {}, &Trigger::t);
-    encode_triggers(self, {triggers.begin(), due});
-    triggers = {due, triggers.end()};
-    const auto next = triggers.empty() ? events.back().t : triggers.front().t;
-    const auto end = std::ranges::upper_bound(events, next, {}, &AbsoluteEvent::t);
-    const auto count = static_cast<std::size_t>(end - events.begin());
-    result = encode(self, events.first(count), start);
-    events = events.subspan(count);
-  }
-  return result;
-}
-
-/// Warns of the first pause that is removed, and at the end of the file of the total, if there are
-/// more.
-static void warn_of_pauses(GstEventWriter* self, bool at_end) {
-  auto& state = *priv_of(self).state;
-  const auto left_out = state.encoder->left_out();
-  const auto reported = state.pauses_reported;
-  if (left_out == reported || (reported > 0 && !at_end)) return;
-  state.pauses_reported = left_out;
-  const auto seconds = std::to_string(left_out / 1'000'000) + " s";
-  post_message(
-      self, GST_MESSAGE_WARNING,
-      {GST_STREAM_ERROR_ENCODE,
-       (reported == 0 ? "Left out a pause of " + seconds + ", which is"
-                      : "Left out pauses of " + seconds + " in total, which are") +
-           " too long for this format: later timestamps are shifted back by that much. Write "
-           "AEDAT4, HDF5, NumPy or text to keep them."},
-      "the clock of the format cannot represent " + std::to_string(left_out) + " us");
-}
-
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   auto* self = GST_EVENT_WRITER(parent);
   auto& priv = priv_of(self);
   const OwnedBuffer buffer(taken);
-  if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
-  GstClockTime start = GST_BUFFER_PTS(taken);
-  return reported(self, [&] {
-    GstFlowReturn result = GST_FLOW_OK;
-    const bool encoded = priv.writable.write(taken, [&](const auto& events) {
-      if (result == GST_FLOW_OK) result = push_header(self, start);
-      if (result != GST_FLOW_OK) return;
-      const auto labels = priv.state->encoder->label(priv.writable.labels());
-      priv.writable.written().lock()->labels += labels;
-      result = encode_all(self, events, start);
-    });
-    if (!encoded) return GST_FLOW_ERROR;
-    warn_of_pauses(self, false);
-    if (result != GST_FLOW_OK) return result;
-    GstClockTime duration = GST_BUFFER_DURATION(taken);
-    if (GST_CLOCK_TIME_IS_VALID(duration))
-      duration -= std::min(duration, start - GST_BUFFER_PTS(taken));
-    return push_bytes(self, start, duration);
-  });
-}
-
-/// Overwrites part of the header. May throw.
-static GstFlowReturn push_patch(GstEventWriter* self, eventcamera::FilePatch patch) {
-  auto& priv = priv_of(self);
-  GST_DEBUG_OBJECT(self, "completing the header: %" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT,
-                   patch.bytes.size(), patch.position);
-  if (!peer_can_seek(priv.src, GST_FORMAT_BYTES)) {
-    GST_ELEMENT_WARNING(self, STREAM, ENCODE,
-                        ("The file header lacks the number of events. Write to a sink that can "
-                         "seek, such as filesink, to complete it."),
-                        ("downstream does not seek in bytes"));
-    return GST_FLOW_OK;
-  }
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_BYTES);
-  segment.start = patch.position;
-  gst_pad_push_event(priv.src, gst_event_new_segment(&segment));
-  priv.bytes = std::move(patch.bytes);
-  return push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
-}
-
-/// A stream without buffers may have no segment.
-static void ensure_segment(GstPad* src) {
-  if (has_segment(src)) return;
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  gst_pad_push_event(src, gst_event_new_segment(&segment));
+  if (!priv.file) return GST_FLOW_NOT_NEGOTIATED;
+  return reported(self, [&] { return priv.file->write(taken, priv.settings.copy().mtu); });
 }
 
 static void end_file(GstEventWriter* self) {
   auto& priv = priv_of(self);
-  if (!priv.state) return;
+  if (!priv.file) return;
   priv.writable.end_file();
-  ensure_segment(priv.src);
-  reported(self, [&] {
-    GstFlowReturn result = push_header(self, GST_CLOCK_TIME_NONE);
-    if (result != GST_FLOW_OK) return result;
-    encode_all_triggers(self);
-    for (bool more = true; more && result == GST_FLOW_OK;) {
-      more = priv.state->encoder->finish(priv.bytes);
-      result = push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
-    }
-    warn_of_pauses(self, true);
-    auto patch = priv.state->encoder->patch();
-    return result == GST_FLOW_OK && patch ? push_patch(self, *std::move(patch)) : result;
-  });
-}
-
-/// Queues triggers for the events of their interval. Pushes them if too many are queued, since the
-/// stream then has no events. May throw.
-static GstFlowReturn queue_triggers(GstEventWriter* self, std::span<const Trigger> triggers) {
-  auto& priv = priv_of(self);
-  if (!priv.state) return GST_FLOW_OK;
-  priv.state->triggers.push(triggers);
-  if (!priv.state->triggers.is_full()) return GST_FLOW_OK;
-  ensure_segment(priv.src);
-  const auto first = std::max<Microseconds>(*priv.state->triggers.first(), 0);
-  const auto start = static_cast<GstClockTime>(first) * GST_USECOND;
-  if (const GstFlowReturn result = push_header(self, start); result != GST_FLOW_OK) return result;
-  encode_all_triggers(self);
-  priv.writable.advance_to(priv.state->last);
-  return push_bytes(self, start, GST_CLOCK_TIME_NONE);
+  reported(self, [&] { return priv.file->end(priv.settings.copy().mtu); });
 }
 
 /// False for words without a header, which have the sensor's size in their caps and may follow
 /// those of another sensor.
-static bool is_file(const State& state) {
-  return gst_structure_has_name(gst_caps_get_structure(state.caps.get(), 0),
+static bool is_file(const WrittenFile& file) {
+  return gst_structure_has_name(gst_caps_get_structure(file.caps(), 0),
                                 GST_EVENT_CAMERA_MEDIA_TYPE) == FALSE;
 }
 
@@ -434,10 +186,10 @@ static gboolean handle_caps(GstEventWriter* self, GstEvent* event) {
     GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are not event caps", caps);
     return FALSE;
   }
-  if (priv.state && priv.state->info.width == info.width && priv.state->info.height == info.height)
+  if (priv.file && priv.file->info().width == info.width && priv.file->info().height == info.height)
     return TRUE;
-  if (priv.state && priv.state->written) {
-    if (is_file(*priv.state) && !priv.writable.accepts({info.width, info.height})) return FALSE;
+  if (priv.file && priv.file->has_begun()) {
+    if (is_file(*priv.file) && !priv.writable.accepts({info.width, info.height})) return FALSE;
     end_file(self);
   }
   return reported(self, [&] { return negotiate(self, info); }) == GST_FLOW_OK;
@@ -445,24 +197,12 @@ static gboolean handle_caps(GstEventWriter* self, GstEvent* event) {
 
 /// After a flush: filesink has truncated the file, and a decoder expects a header.
 static void start_over(GstEventWriter* self) {
-  const auto& state = priv_of(self).state;
-  if (!state) return;
+  const auto& file = priv_of(self).file;
+  if (!file) return;
   reported(self, [&] {
-    begin_file(self, state->info, OwnedCaps(gst_caps_ref(state->caps.get())));
+    begin_file(self, file->info(), OwnedCaps(gst_caps_ref(file->caps())));
     return GST_FLOW_OK;
   });
-}
-
-/// Warns of events that are lost without the end of the stream.
-static void warn_of_pending(GstEventWriter* self) {
-  const auto pending = priv_of(self).state->encoder->pending();
-  if (pending == 0) return;
-  const Report report{GST_STREAM_ERROR_ENCODE,
-                      "Lost " + std::to_string(pending) + " event" + (pending == 1 ? "" : "s") +
-                          ", and the file is incomplete, because the stream was stopped before its "
-                          "end. Send EOS first, as gst-launch-1.0 -e does."};
-  GST_WARNING_OBJECT(self, "%s", report.text.c_str());
-  post_message(self, GST_MESSAGE_WARNING, report, "the format is written at the end of the stream");
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
@@ -485,7 +225,11 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
     case GST_EVENT_CUSTOM_DOWNSTREAM:
       if (const auto triggers = triggers_of(event)) {
         gst_event_unref(event);
-        return reported(self, [&] { return queue_triggers(self, *triggers); }) == GST_FLOW_OK;
+        auto& priv = priv_of(self);
+        if (!priv.file) return TRUE;
+        return reported(self, [&] {
+                 return priv.file->write(*triggers, priv.settings.copy().mtu);
+               }) == GST_FLOW_OK;
       }
       break;
     default:
@@ -501,12 +245,11 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
       GST_ELEMENT_CLASS(gst_event_writer_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     auto& priv = priv_of(GST_EVENT_WRITER(element));
-    if (priv.state) {
+    if (priv.file) {
       priv.writable.end_file();
-      warn_of_pending(GST_EVENT_WRITER(element));
+      priv.file->warn_of_pending();
     }
-    priv.state.reset();
-    priv.bytes.clear();
+    priv.file.reset();
   }
   return result;
 }

@@ -4,7 +4,7 @@
 #include <gst/video/video.h>
 
 #include "gst/base/event_caps.hpp"
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 /// Caps of the video frames of recordings.
 #define RECORDED_VIDEO_CAPS                                                    \

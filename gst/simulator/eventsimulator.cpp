@@ -86,6 +86,12 @@ static gboolean propose_allocation(GstBaseTransform* transform, GstQuery* decide
   gst_allocation_params_init(&params);
   params.align = 63;  // vectors of pixels do not straddle cache lines
   gst_query_add_allocation_param(query, nullptr, &params);
+  GstCaps* caps = nullptr;
+  GstVideoInfo video;
+  gst_query_parse_allocation(query, &caps, nullptr);
+  if (caps != nullptr && gst_video_info_from_caps(&video, caps))  // the last frame may be held
+    gst_query_add_allocation_pool(query, nullptr, static_cast<guint>(GST_VIDEO_INFO_SIZE(&video)),
+                                  2, 0);
   return PARENT_TRANSFORM_CLASS->propose_allocation(transform, decide, query);
 }
 
@@ -103,7 +109,7 @@ static gboolean decide_allocation(GstBaseTransform* transform, GstQuery* query) 
   gst_query_parse_allocation(query, &caps, nullptr);
   if (!event_simulator_draws(caps))
     decide_on_event_pool(query);
-  else if (!decide_on_drawn_pool(query, caps))
+  else if (!decide_on_drawn_pool(query, caps, 1))  // the last picture
     return FALSE;
   return PARENT_TRANSFORM_CLASS->decide_allocation(transform, query);
 }
@@ -185,6 +191,9 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
         gst_event_unref(event);
         return TRUE;
       }
+      break;
+    case GST_EVENT_TAG:
+      simulation.check_orientation(event);
       break;
     case GST_EVENT_STREAM_START:
     case GST_EVENT_FLUSH_STOP:
@@ -289,6 +298,19 @@ static void install_thresholds(GObjectClass* klass, double grey_levels) {
                           0, 255, grey_levels, controllable_flags));
 }
 
+const char* const denoise_blurb =
+    "Remove camera noise from each frame first: smooth differences between neighbouring pixels of "
+    "up to this size, and keep larger ones such as edges (grey levels, white is 255; 0 = off, "
+    "-1 = automatic: four standard deviations of the noise, found where successive frames differ "
+    "least)";
+
+static void install_denoise(GObjectClass* klass) {
+  Properties<settings_of>(klass).add(
+      [](SimulatorSettings& settings) -> double& { return settings.simulation.denoise; },
+      g_param_spec_double("denoise", "Denoise", denoise_blurb, eventcamera::automatic_denoise, 255,
+                          eventcamera::Settings().denoise, controllable_flags));
+}
+
 static void install_interpolated_frames(GObjectClass* klass) {
   Properties<settings_of>(klass).add(
       [](SimulatorSettings& settings) -> int& { return settings.simulation.interpolated_frames; },
@@ -321,6 +343,15 @@ static void install_settings(GObjectClass* klass) {
       g_param_spec_enum("palette", "Palette", "Colours of event frames (accumulated-event video)",
                         palette_type(), static_cast<int>(SimulatorSettings().palette),
                         mutable_playing_flags));
+  properties.add(
+      &SimulatorSettings::skip_repeated,
+      g_param_spec_boolean("skip-repeated", "Skip repeated",
+                           "Compare frames, and treat one that equals the last, changed one as a "
+                           "repetition: its interval continues, and the last picture is drawn "
+                           "again. For webcams and editors that repeat frames to raise the "
+                           "framerate. Frames that are flagged GAP or have the memory of the last "
+                           "one are always repetitions",
+                           FALSE, mutable_playing_flags));
 }
 
 static void install_write_flow(GObjectClass* klass) {
@@ -346,6 +377,7 @@ static GstStructure* stats_of(GObject* object) {
   const auto stats = simulation_of(object).stats.copy();
   return gst_structure_new("application/x-event-simulator-stats", "frames", G_TYPE_UINT64,
                            stats.frames, "skipped-frames", G_TYPE_UINT64, stats.skipped_frames,
+                           "repeated-frames", G_TYPE_UINT64, stats.repeated_frames,
                            "processing-time", G_TYPE_UINT64, stats.processing_time, nullptr);
 }
 
@@ -360,7 +392,7 @@ static void install_qos_properties(GObjectClass* klass) {
                            TRUE, mutable_playing_flags));
   install_stats(klass, stats_of,
                 "Counters since start: frames (processed), skipped-frames (due to qos), "
-                "processing-time (of all processed frames, ns)");
+                "repeated-frames (by upstream), processing-time (of all processed frames, ns)");
 }
 
 static void install_base_properties(GObjectClass* klass) {
@@ -437,6 +469,7 @@ static void method_class_init(gpointer klass, gpointer row) {
   GST_EVENT_SIMULATOR_CLASS(klass)->method = &method;
   method.video.install_pads(GST_ELEMENT_CLASS(klass));
   if (method.threshold) install_thresholds(object_class, *method.threshold);
+  if (method.denoises) install_denoise(object_class);
   if (method.interpolates) install_interpolated_frames(object_class);
   if (method.labels) install_label(object_class);
   if (method.has_flow) install_write_flow(object_class);

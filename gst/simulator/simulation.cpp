@@ -80,6 +80,8 @@ bool Simulation::set_caps(GstCaps* in, GstCaps* out) {
       state_->video = video;
       state_->frames->set_video(video);
     }
+    stream_.repeated.reset();  // the last frame may have another format
+    stream_.picture.reset();
     state_->draws = event_simulator_draws(out);
     if (state_->draws) state_->frames->set_drawn_video(drawn);
   });
@@ -210,6 +212,28 @@ void Simulation::warn_of_times(const char* what) {
       "an interval needs a PTS at both ends");
 }
 
+/// Returns the time of a frame: its PTS. Decoders give a frame the PTS of the one before if the
+/// timestamps of a file are not in the order of its frames, or are missing, as in GIF. Then it
+/// follows after the duration of the last frame; in the middle of a stream, the first one after
+/// half of that, because the next frame often has the right time.
+Nanoseconds Simulation::time_of(GstBuffer* frame) {
+  const GstClockTime pts = GST_BUFFER_PTS(frame);
+  const auto time = static_cast<Nanoseconds>(pts);
+  const auto before = std::exchange(stream_.last_pts, pts);
+  GstClockTime duration = std::exchange(stream_.last_duration, GST_BUFFER_DURATION(frame));
+  if (duration == 0 || duration > GST_SECOND) duration = interval_;
+  const auto last = state_->simulator().last_time();
+  const bool is_late_enough = last && time - *last >= Nanoseconds{event_resolution};
+  if (!before || pts < *before || !last || is_late_enough || duration == 0) return time;
+  stream_.warn_of_equal_times(
+      element_,
+      {GST_STREAM_ERROR_FORMAT,
+       "Bad video timestamps: frames have the same one. Spacing them by their durations."},
+      "a frame is not later than the one before");
+  const bool is_one_of_many = *last > time || !stream_.pushed_until;
+  return *last + static_cast<Nanoseconds>(is_one_of_many ? duration : duration / 2);
+}
+
 /// Returns why the interval since the last frame cannot end at `time`; null if it can.
 const char* Simulation::fault_of_time(Nanoseconds time) const {
   const auto last = state_->simulator().last_time();
@@ -236,12 +260,62 @@ void Simulation::check_interlacing(GstBuffer* frame) {
       std::string("interlace-mode=") + gst_video_interlace_mode_to_string(mode));
 }
 
+/// Pad that sends to `sink`, within bins; null if there is none.
+static OwnedPad source_of(GstPad* sink) {
+  OwnedPad peer(gst_pad_get_peer(sink));
+  while (peer && GST_IS_PROXY_PAD(peer.get())) {
+    GstPad* const inner = GST_IS_GHOST_PAD(peer.get())
+                              ? gst_ghost_pad_get_target(GST_GHOST_PAD(peer.get()))
+                              : GST_PAD(gst_proxy_pad_get_internal(GST_PROXY_PAD(peer.get())));
+    const bool is_source = GST_IS_GHOST_PAD(peer.get());
+    peer.reset(inner);
+    if (peer && !is_source) peer.reset(gst_pad_get_peer(inner));
+  }
+  return peer;
+}
+
+/// True if an element upstream turns or flips the video. The tags do not tell: videoflip 1.22
+/// leaves them unchanged.
+static bool is_turned_before(GstPad* sink) {
+  constexpr int max_elements = 64;
+  OwnedPad source = source_of(sink);
+  for (int i = 0; i < max_elements && source; ++i) {
+    const OwnedElement element(gst_pad_get_parent_element(source.get()));
+    if (!element) return false;
+    if (GST_IS_VIDEO_DIRECTION(element.get())) {
+      gint direction = GST_VIDEO_ORIENTATION_IDENTITY;
+      g_object_get(element.get(), "video-direction", &direction, nullptr);
+      if (direction != GST_VIDEO_ORIENTATION_IDENTITY) return true;
+    }
+    const OwnedPad next(gst_element_get_static_pad(element.get(), "sink"));
+    source = next ? source_of(next.get()) : nullptr;
+  }
+  return false;
+}
+
+void Simulation::check_orientation(GstEvent* tags) {
+  GstTagList* list = nullptr;
+  gst_event_parse_tag(tags, &list);
+  const gchar* orientation = nullptr;
+  if (!gst_tag_list_peek_string_index(list, GST_TAG_IMAGE_ORIENTATION, 0, &orientation) ||
+      g_str_equal(orientation, "rotate-0") ||
+      is_turned_before(GST_BASE_TRANSFORM_SINK_PAD(element_)))
+    return;
+  stream_.warn_of_orientation(
+      element_,
+      {GST_STREAM_ERROR_FORMAT,
+       "The video is rotated, and so are its events. Insert videoflip video-direction=auto "
+       "upstream."},
+      std::string("image-orientation=") + orientation);
+}
+
 /* discontinuities */
 
 /// Makes the next frame a first frame. May throw.
 void Simulation::forget_frames() {
   stream_.gap.reset();
   stream_.motion.reset();
+  stream_.repeated.reset();
   if (!state_) return;
   push_interval(state_->frames->finish());
   if (!state_->simulator().last_time()) return;
@@ -262,17 +336,20 @@ void Simulation::start_timeline() {
   stream_.flow = GST_FLOW_OK;
   reported([&] { start_over(); });
   stream_.next_time.reset();
+  stream_.last_pts.reset();
 }
 
 void Simulation::interrupt() {
   reported([&] { start_over(); });
+  stream_.last_pts.reset();
   stream_.discontinuous = true;
 }
 
 void Simulation::skip_frame(GstClockTime pts) {
   GST_DEBUG_OBJECT(element_, "downstream is late: skipped the frame at %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(pts));
-  stream_.motion.reset();  // it ends at the frame that was skipped
+  stream_.motion.reset();    // it ends at the frame that was skipped
+  stream_.repeated.reset();  // the next frame may repeat it
   ++stats.lock()->skipped_frames;
 }
 
@@ -367,14 +444,20 @@ GstFlowReturn Simulation::push_frame(OwnedBuffer frame) {
 void Simulation::simulate(OwnedBuffer frame) {
   const GstClockTime pts = GST_BUFFER_PTS(frame.get());
   check_interlacing(frame.get());
-  hold_last_frame(pts);
-  sync_controlled_properties(pts);
   if (pts > G_MAXINT64) {
     warn_of_times("the PTS of a frame is out of range");
     forget_frames();
     return;
   }
-  const auto time = static_cast<Nanoseconds>(pts);
+  const Nanoseconds time = time_of(frame.get());
+  const bool compare = settings.copy().skip_repeated;
+  const auto kind = stream_.repeated.kind_of(frame.get(), time, compare, state_->video);
+  if (kind == RepeatedFrames::Kind::repeated) {
+    stream_.repeated.add(frame.get(), time, compare, kind);
+    return repeat(frame.get(), time);
+  }
+  hold_last_frame(static_cast<GstClockTime>(time));
+  sync_controlled_properties(static_cast<GstClockTime>(time));
   if (const char* fault = fault_of_time(time)) {
     warn_of_times(fault);
     forget_frames();
@@ -387,6 +470,7 @@ void Simulation::simulate(OwnedBuffer frame) {
                    GST_TIME_ARGS(pts), GST_TIME_ARGS(static_cast<GstClockTime>(*until)));
     return;
   }
+  stream_.repeated.add(frame.get(), time, compare, kind);
   auto& frames = *state_->frames;
   const auto start = state_->simulator().last_time();
   const SimulatorSettings current = begin_interval();
@@ -423,7 +507,21 @@ void Simulation::draw_frame(const SimulatorSettings& current, const KnownFlow& f
                          eventcamera::palette(current.palette), prepared);
     return GST_FLOW_OK;
   });
-  if (picture) stream_.flow = push_buffer(std::move(picture), pts, duration);
+  if (!picture) return;
+  stream_.picture.reset(gst_buffer_ref(picture.get()));
+  stream_.flow = push_buffer(std::move(picture), pts, duration);
+}
+
+/// Continues the interval in a frame that repeats the last one, or draws the last picture again.
+/// May throw.
+void Simulation::repeat(GstBuffer* frame, Nanoseconds time) {
+  ++stats.lock()->repeated_frames;
+  keep_flow(frame);
+  if (!stream_.picture) return;
+  stream_.pushed_until = time;
+  OwnedBuffer again(gst_buffer_copy(stream_.picture.get()));
+  GST_BUFFER_FLAG_UNSET(again.get(), GST_BUFFER_FLAG_DISCONT);
+  stream_.flow = push_buffer(std::move(again), GST_BUFFER_PTS(frame), GST_BUFFER_DURATION(frame));
 }
 
 /* gaps */
@@ -488,7 +586,14 @@ void Simulation::finish() {
 }
 
 void Simulation::end() {
-  if (state_) reported([&] { hold_last_frame(GST_CLOCK_TIME_NONE); });
+  if (!state_) return;
+  reported([&] {
+    hold_last_frame(GST_CLOCK_TIME_NONE);
+    const auto last = state_->simulator().last_time();
+    const auto repeated = stream_.repeated.last_time();
+    if (!state_->draws && last && repeated && *last < *repeated)
+      hold_until(*repeated, GST_SEQNUM_INVALID);
+  });
 }
 
 /// Releases the frame of a finished interval, and pushes the events: a GAP if there are none. May

@@ -13,6 +13,7 @@
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/simulator/eventsimulator.hpp"
+#include "gst/simulator/repeated_frames.hpp"
 #include "gst/simulator/video_simulator.hpp"
 #include "src/core/image.hpp"
 
@@ -22,19 +23,21 @@ GST_DEBUG_CATEGORY_EXTERN(event_simulator_debug);
 struct SimulatorSettings {
   eventcamera::Settings simulation;
   eventcamera::PaletteName palette = eventcamera::PaletteName::dark;
-  bool write_flow = false;  ///< add the flow of each interval to its buffer
+  bool write_flow = false;     ///< add the flow of each interval to its buffer
+  bool skip_repeated = false;  ///< compare pictures to find repeated frames
 };
 
 /// Counters of the property stats.
 struct SimulatorStats {
   guint64 frames = 0;
   guint64 skipped_frames = 0;
+  guint64 repeated_frames = 0;
   guint64 processing_time = 0;  ///< ns
 };
 
-/// Duration of the intervals of a stream, which is the latency of their events. Starts with that of
-/// the caps. Rises to the second longest of the last intervals, so that one pause does not delay
-/// all that follows; falls once all of them are clearly shorter. Jitter does not change it.
+/// Duration of the intervals of a stream, which is the latency of their events. Starts with the
+/// caps' duration. Rises to the second longest of the last intervals, so that one pause does not
+/// delay all that follows; falls once all of them are clearly shorter. Jitter does not change it.
 class IntervalDuration {
  public:
   using Nanoseconds = eventcamera::Nanoseconds;
@@ -57,7 +60,7 @@ class IntervalDuration {
 /// pushes events or pictures. A failure is reported, and drops the simulator; the next frame makes
 /// another.
 ///
-/// Called with the stream lock of the sink pad, or while there is no streaming thread.
+/// GstBaseTransform calls all functions but the last ones under the stream lock of the sink pad.
 class Simulation {
  public:
   using Nanoseconds = eventcamera::Nanoseconds;
@@ -78,6 +81,8 @@ class Simulation {
   /// earlier than its end, because a GAP can overtake frames that a decoder still holds. Returns
   /// false if the event must be forwarded instead: for drawn video, and before a first frame.
   bool hold_through(GstEvent* gap);
+  /// Warns about rotated video, which its tags tell.
+  void check_orientation(GstEvent* tags);
   /// Finishes and pushes the pending interval.
   void finish();
   /// Finishes, with the events of the last gap: no frames follow.
@@ -127,11 +132,17 @@ class Simulation {
     std::optional<Gap> gap;                      ///< since the last frame
     std::unique_ptr<GBytes, UnrefBytes> motion;  ///< known, from the last frame to the next one
     std::optional<GstClockTime> next_time;       ///< end of the last frame
-    std::optional<bool> is_live;                 ///< upstream's answer, once asked
+    std::optional<GstClockTime> last_pts;        ///< of the last frame
+    GstClockTime last_duration = 0;  ///< of the last frame, GST_CLOCK_TIME_NONE = unknown
+    RepeatedFrames repeated;
+    OwnedBuffer picture;          ///< drawn last, for repeated frames
+    std::optional<bool> is_live;  ///< upstream's answer, once asked
     IntervalDuration interval;
     WarnOnce warn_of_no_pts{event_simulator_debug};
     WarnOnce warn_of_times{event_simulator_debug};
+    WarnOnce warn_of_equal_times{event_simulator_debug};
     WarnOnce warn_of_interlacing{event_simulator_debug};
+    WarnOnce warn_of_orientation{event_simulator_debug};
   };
 
   const EventSimulatorMethod& method() const {
@@ -148,6 +159,7 @@ class Simulation {
 
   OwnedBuffer with_time(OwnedBuffer frame);
   std::optional<GstClockTime> time_of_arrival();
+  Nanoseconds time_of(GstBuffer* frame);
   const char* fault_of_time(Nanoseconds time) const;
   void check_interlacing(GstBuffer* frame);
   void warn_of_times(const char* what);
@@ -160,6 +172,7 @@ class Simulation {
   void start_over();
   void simulate(OwnedBuffer frame);
   void draw_frame(const SimulatorSettings& current, const KnownFlow& flow, OwnedBuffer frame);
+  void repeat(GstBuffer* frame, Nanoseconds time);
   void hold_last_frame(GstClockTime next);
   void hold_until(Nanoseconds end, guint32 seqnum);
 

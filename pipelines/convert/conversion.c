@@ -108,7 +108,7 @@ static GstStructure* stats_of(GstElement* pipeline, const char* name) {
   return stats;
 }
 
-/* Prints what the file that is written cannot store. */
+/* Prints the content that the output format cannot store. */
 static void print_left_out(const Conversion* self) {
   static const struct {
     const char* field;
@@ -307,7 +307,7 @@ static gboolean run(Conversion* self) {
   return ok;
 }
 
-/* Adds what counts the events, and what crops. */
+/* Adds the counter of events, and the crop filter. */
 static void probe(Conversion* self) {
   const gboolean crops = is_cropped(self->part);
   g_autoptr(GstElement) last =

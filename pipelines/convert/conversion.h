@@ -13,7 +13,7 @@ typedef struct {
   guint width, height, x, y;
 } Region;
 
-/* What is converted of a recording. */
+/* Part of a recording to convert. */
 typedef struct {
   gdouble from, to; /* seconds after its start; to G_MAXDOUBLE for all */
   Region region;    /* of the sensor; without a width for all */

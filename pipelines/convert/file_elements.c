@@ -56,9 +56,9 @@ static const FileElement* reader_of(const GstCaps* caps) {
   return NULL;
 }
 
-/* False, with an error printed, for a pipe or device: what is read from it to recognise it would be
- * lost. Opening a pipe might wait forever, so this looks before. Files that are missing, and
- * directories, have errors of their own. */
+/* False, with an error printed, for a pipe or device: the bytes read to recognise it would be lost.
+ * Called before opening, which might block on a pipe. Missing files and directories have errors of
+ * their own. */
 static gboolean can_read_twice(const char* path) {
   struct stat in;
   if (stat(path, &in) != 0 || S_ISREG(in.st_mode) || S_ISDIR(in.st_mode)) return TRUE;

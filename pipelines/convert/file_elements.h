@@ -39,7 +39,7 @@ enum {
   OPTION_COUNT
 };
 
-/* The values that are given; NULL for the others. */
+/* Values of the options; NULL if not given. */
 typedef struct {
   gchar* values[OPTION_COUNT];
 } ElementOptions;

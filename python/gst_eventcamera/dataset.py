@@ -16,8 +16,9 @@ from .events import Events
 from .frames import Frames
 from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, duration_of, events_of, property_limits, quoted
 from .recipe import PICTURES, TENSORS, Recipe, Value, Window, is_picture
-from .sources import LUMA, SINK
+from .sources import SINK
 from .tensors import TENSOR_CAPS, tensor_of
+from .video import VideoFile, VideoPipeline
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,16 +88,16 @@ class DatasetVideo:
             parameters["n-threads"] = threads
         line = recipe.line(parameters)
         with contextlib.ExitStack() as stack:
+            # The line may begin and end with caps, which need an element between them and others.
+            rest = f"identity ! {line} ! identity ! {EVENT_CAPS} ! {rest}"
             if recipe.window:
-                source = "appsrc name=window format=time"
+                made: Pipeline = VideoPipeline("appsrc name=window format=time", rest)
             elif os.path.isdir(self.path):
-                source = _numbered_pictures(self.path, stack.enter_context(tempfile.TemporaryDirectory()), recipe)
+                folder = stack.enter_context(tempfile.TemporaryDirectory())
+                made = VideoPipeline(_numbered_pictures(self.path, folder, recipe), rest)
             else:
-                source = f"filesrc location={quoted(self.path)} ! decodebin"
-            pipeline = stack.enter_context(Pipeline(
-                # The line may begin and end with caps, which need an element between them and others.
-                f"{source} ! videoconvert name=decoded ! {LUMA} ! identity ! {line} ! identity ! {EVENT_CAPS}"
-                f" ! {rest}"))
+                made = VideoFile(self.path, rest)
+            pipeline = stack.enter_context(made)
             if recipe.window:
                 _feed(pipeline, _moving_window(_scaled_picture(self.path, recipe.window), recipe.window), recipe)
             yield pipeline
@@ -161,10 +162,9 @@ def _numbered_pictures(path: str, folder: str, recipe: Recipe) -> str:
 def _scaled_picture(path: str, window: Window) -> np.ndarray:
     """A picture, scaled and cropped to hold the window in each of its positions."""
     width, height = window.width + window.distance, window.height + window.distance
-    with Pipeline(f"filesrc location={quoted(path)} ! decodebin ! videoconvert"
-                  f" ! aspectratiocrop aspect-ratio={width}/{height} ! videoscale"
-                  f" ! video/x-raw,format=GRAY8,width={width},height={height},pixel-aspect-ratio=1/1 ! {SINK}"
-                  ) as pipeline:
+    with VideoFile(path, f"aspectratiocrop aspect-ratio={width}/{height} ! videoconvert ! videoscale"
+                   f" ! video/x-raw,format=GRAY8,width={width},height={height},pixel-aspect-ratio=1/1 ! {SINK}"
+                   ) as pipeline:
         sample = next(pipeline.samples(), None)
     if sample is None:
         raise PipelineError(f"{path} has no picture that can be decoded")

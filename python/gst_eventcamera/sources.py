@@ -6,32 +6,34 @@ import os
 from typing import Iterator
 
 from .events import Events
-from .pipeline import EVENT_CAPS, Pipeline, events_of, expect_limits, quoted
+from .pipeline import EVENT_CAPS, Pipeline, events_of, expect_limits
+from .video import VideoFile
 
 SINK = "appsink name=out sync=false max-buffers=4"
 
-# Formats that simulators read directly, so that a decoder's luma is unchanged.
-LUMA = "video/x-raw,format=(string){GRAY8,I420,YV12,NV12,NV21,Y42B,Y444,GRAY16_LE}"
+
+OUTPUT = f"{EVENT_CAPS} ! {SINK}"
 
 
-def _chunks(description: str) -> Iterator[Events]:
-    with Pipeline(f"{description} ! {EVENT_CAPS} ! {SINK}") as pipeline:
+def _chunks(playing: Pipeline) -> Iterator[Events]:
+    with playing as pipeline:
         pipeline.gaps_as_buffers()
         for sample in pipeline.samples():
             yield events_of(sample)
 
 
-def simulate(video: str | os.PathLike[str], simulator: str = "eventsim-dvs denoise=8") -> Iterator[Events]:
+def simulate(video: str | os.PathLike[str], simulator: str = "eventsim-dvs") -> Iterator[Events]:
     """Yields the events that an event camera would have seen, one array per pair of consecutive frames of a video.
 
     video: a file that GStreamer plays.
     simulator: an element and its properties, such as "eventsim-dvs preset=davis346 seed=7"; further
         elements may follow it, such as "eventsim-dvs ! eventdenoise".
 
+    The simulator gets the frames as they are decoded, upright and deinterlaced; a looping GIF is played once.
     Only the current array is in memory. Raises PipelineError if the file cannot be read, an element or property
     does not exist, or a number is not within the limits of its property."""
     expect_limits(simulator)
-    return _chunks(f"filesrc location={quoted(video)} ! decodebin ! videoconvert ! {LUMA} ! {simulator}")
+    return _chunks(VideoFile(video, f"{simulator} ! {OUTPUT}"))
 
 
 def live(pipeline: str) -> Iterator[Events]:
@@ -39,4 +41,4 @@ def live(pipeline: str) -> Iterator[Events]:
 
     Leaving the loop, by break, an exception or Ctrl-C, stops the pipeline. The pipeline waits while the loop is
     busy, but live sources drop events that are not read in time. Raises PipelineError."""
-    return _chunks(pipeline)
+    return _chunks(Pipeline(f"{pipeline} ! {OUTPUT}"))

@@ -22,7 +22,7 @@ _voxel_grid.argtypes = [ndpointer(EVENT, ndim=1, flags="C"), ctypes.c_size_t, ct
 
 def voxel_grid(events: np.ndarray, bins: int = 5, width: int = 0, height: int = 0) -> np.ndarray:
     """The voxel grid of events: each adds its polarity, +1 or -1, to the two nearest of `bins` instants, from
-    the time of the first event to that of the last one, in proportion to their closeness.
+    the time of the first event to the time of the last, in proportion to their closeness.
 
     events: an array with the fields t, x, y and p, sorted by t; shape (events,).
     bins: 1 to 256.

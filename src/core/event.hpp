@@ -39,7 +39,7 @@ struct Event {
 };
 static_assert(sizeof(Event) == 8);
 
-/// Returns those of sorted events, with times relative to `start`, that are not later than `end`.
+/// Returns the leading events that are not later than `end`; their times are relative to `start`.
 inline std::span<const Event> events_until(std::span<const Event> events, Microseconds start,
                                            Microseconds end) {
   const auto first_after =
@@ -62,7 +62,7 @@ inline constexpr auto is_before = [](const Event& a, const Event& b) {
 /// Sorts events with is_before(). Events of different spans of 2^span_bits microseconds must
 /// already be in order.
 inline void sort_within_spans(std::span<Event> events, int span_bits) {
-  constexpr std::ptrdiff_t near = 32;  // cheaper to move an event by than to sort its span
+  constexpr std::ptrdiff_t near = 32;  // moving an event this far is cheaper than sorting
   for (auto next = events.begin();;) {
     next = std::is_sorted_until(next, events.end(), is_before);
     if (next == events.end()) return;
@@ -85,7 +85,7 @@ inline void sort_within_spans(std::span<Event> events, int span_bits) {
   }
 }
 
-/// What made a simulated pixel fire (docs/methods.md, Causes of events).
+/// Why a simulated pixel fired (docs/methods.md, Causes of events).
 enum class Cause : std::uint8_t { unknown, light, leak, shot_noise, hot_pixel, exposure_pulse };
 
 /// Event with a 64-bit time. Its label takes the space that alignment leaves.

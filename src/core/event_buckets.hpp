@@ -13,9 +13,8 @@
 
 namespace eventcamera {
 
-/// Events of one interval as kernels produce them, by step (StepBuckets) or by time (TimeSlices),
-/// and by band of rows, so that threads can fill or draw bands concurrently. Written in order, they
-/// are the sorted events of the interval.
+/// Events of one interval, grouped by band of rows and by step (StepBuckets) or time (TimeSlices):
+/// threads fill and draw bands concurrently. write_to() sorts them.
 class EventBuckets {
  public:
   virtual ~EventBuckets() = default;
@@ -37,15 +36,15 @@ class EventBuckets {
   EventBuckets(const EventBuckets&) = default;
   EventBuckets& operator=(const EventBuckets&) = default;
 
-  /// Writes the sorted events [first, last) to out + first. Events of a FiredPixels or of a time
-  /// slice are written if the first of them is in that range.
+  /// Writes the sorted events [first, last) to out + first. A FiredPixels or a time slice is
+  /// written whole, by the call whose range holds its first event.
   virtual void write_part(std::size_t first, std::size_t last, Event* out) const = 0;
 
   std::size_t bands_ = 1;
 };
 
-/// A bucket per step and band: a list of events, or the pixels that fire in the step, one bit each,
-/// which become events when they are written. Each thread fills its own buckets.
+/// A bucket per step and band: a list of events, or a bit per fired pixel, expanded to an event
+/// when written. Each thread fills its own buckets.
 class StepBuckets final : public EventBuckets {
  public:
   /// Empties the buckets but keeps their memory.

@@ -15,10 +15,9 @@ class EventValidator {
  public:
   EventValidator(int width, int height) : width_(width), height_(height) {}
 
-  /// Calls take() for each event; event times are relative to `start`. An event that is earlier
-  /// than the previous one, or than passed(), gets that time; events outside the sensor, and those
-  /// later than `max_t`, are dropped. `labels` has one for each event, or is empty. Returns what
-  /// was dropped.
+  /// Calls take() for each event; times are relative to `start`. A late event, before the previous
+  /// one or before passed(), gets that time; events outside the sensor or after `max_t` are
+  /// dropped. `labels` is empty or has one label per event. Returns the numbers of dropped events.
   template <class Take>
   InvalidEvents take(std::span<const Event> events, Microseconds start, Microseconds max_t,
                      const Take& take, std::span<const Label> labels = {}) {

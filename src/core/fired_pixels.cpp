@@ -15,7 +15,7 @@ namespace {
 
 using Places = hn::CappedTag<std::uint32_t, 8>;
 
-/// Writes the events of the pixels of a byte; always 8, those past the fired ones are garbage.
+/// Writes 8 events for a byte of pixels; only the first ones, one per fired pixel, are valid.
 void write_byte(std::uint32_t first_place, unsigned fired, unsigned on, hn::Vec<Places> t,
                 Event* out) {
   const Places places;

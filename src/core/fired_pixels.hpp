@@ -12,8 +12,7 @@
 
 namespace eventcamera {
 
-/// Pixels that fire at the same time, in raster order, as bits; events are written from them
-/// directly to their destination.
+/// Bit set of the pixels that fire at one time, in raster order; expanded to events when written.
 class FiredPixels {
  public:
   /// 16 pixels of row y, from x on; at least one fires.

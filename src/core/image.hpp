@@ -43,7 +43,7 @@ struct ImageView {
 ///
 /// Rows start on a cache line. At least 64 bytes and 16 pixels past the end of a row (and its
 /// margin) may be read and written, so that kernels can load and store whole vectors up to the end
-/// of any row. They are initially 0. A page of memory is only taken when a pixel in it is written.
+/// of any row. They are initially 0. Pages are allocated on the first write.
 template <class Pixel>
 class Image {
  public:

@@ -35,7 +35,7 @@ bool convert(Microseconds start, Microseconds latest, std::span<const AbsoluteEv
     out[i] = {static_cast<std::uint32_t>(t), events[i].x, events[i].y_p};
   };
   std::size_t i = 0;
-  if (!events.empty()) convert_one(i++);  // the others have one before them
+  if (!events.empty()) convert_one(i++);  // the first has no predecessor
   for (; i + lanes <= events.size(); i += lanes) {
     hn::Vec<decltype(words)> before, times, pixels;
     hn::LoadInterleaved2(words, in + 2 * i - 2, before, pixels);

@@ -7,8 +7,8 @@
 
 namespace eventcamera {
 
-/// Converts events to times after `start`, the start of their interval, modulo 2^32. Returns false
-/// if an event is earlier than the one before it, or the first one earlier than `latest`.
+/// Converts event times to offsets from `start`, modulo 2^32. Returns false if times decrease, or
+/// begin before `latest`.
 bool to_interval_times(Microseconds start, Microseconds latest,
                        std::span<const AbsoluteEvent> events, Event* out);
 

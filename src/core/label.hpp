@@ -12,7 +12,7 @@ namespace eventcamera {
 
 static_assert(max_side <= int{coordinate_bits} + 1);
 
-/// An event with its cause in the spare bits of its coordinates, as simulators carry it until
+/// Stores a cause in the spare bits of an event's coordinates, where simulators carry it until
 /// events are written. is_before() ignores these bits.
 constexpr Event with_cause(Event event, Cause cause) {
   const auto bits = static_cast<unsigned>(cause);
@@ -21,12 +21,12 @@ constexpr Event with_cause(Event event, Cause cause) {
   return event;
 }
 
-/// The cause that with_cause() added.
+/// Cause stored by with_cause().
 constexpr Cause cause_of(const Event& event) {
   return static_cast<Cause>((event.x >> 14 & 3) | (event.y_p >> 12 & 4));
 }
 
-/// The event before with_cause().
+/// Event without the cause stored by with_cause().
 constexpr Event without_cause(Event event) {
   event.x &= coordinate_bits;
   event.y_p &= coordinate_bits | 0x8000;
@@ -43,7 +43,7 @@ struct Label {
 };
 static_assert(sizeof(Label) == 4);
 
-/// Label that an event of a labelled stream carries.
+/// Label of an event of a labelled stream.
 constexpr Label label_of(const AbsoluteEvent& event) {
   return {.object_class = event.object_class, .cause = event.cause};
 }
@@ -56,20 +56,20 @@ constexpr void set_label(AbsoluteEvent& event, const Label& label) {
 /// Sorted events of an interval and, if they are labelled, a label for each.
 struct LabelledEvents {
   std::span<Event> events;
-  std::span<Label> labels;  ///< as many as events, or empty
+  std::span<Label> labels;  ///< one per event, or empty
 
   /// Moves the events for which keep(Event&) is true to the front, in order and with their labels,
   /// and returns them. `keep` is called once for each event, in order, and may change it.
   template <class Keep>
   LabelledEvents keep_if(Keep keep) const {
-    // In local variables, which no store can change.
+    // Locals, which stores cannot alias.
     Event* const event = events.data();
     Label* const label = labels.empty() ? nullptr : labels.data();
     const std::size_t size = events.size();
     std::size_t kept = 0;
     for (std::size_t i = 0; i < size; ++i) {
       Event next = event[i];
-      const bool is_kept = keep(next);  // in one place only, where compilers inline it
+      const bool is_kept = keep(next);  // a single call site is inlined
       event[kept] = next;
       if (label != nullptr) label[kept] = label[i];
       kept += static_cast<std::size_t>(is_kept);

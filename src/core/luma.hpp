@@ -22,7 +22,7 @@ struct LumaView {
   LumaFormat format;
   const void* data = nullptr;
   std::ptrdiff_t stride = 0;  ///< bytes from one row to the next
-  bool is_narrow = false;     ///< white is 235/255 of that of the format
+  bool is_narrow = false;     ///< limited range: white is 235/255 of full scale
 
   /// Pixel must be std::uint8_t if format.bits is 8, std::uint16_t otherwise.
   template <class Pixel>

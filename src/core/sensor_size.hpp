@@ -13,7 +13,7 @@ struct SensorSize {
   friend constexpr bool operator==(const SensorSize&, const SensorSize&) = default;
 };
 
-/// The size in messages: "640 x 480 pixels".
+/// Text for messages: "640 x 480 pixels".
 inline std::string in_pixels(const SensorSize& size) {
   return std::to_string(size.width) + " x " + std::to_string(size.height) + " pixels";
 }

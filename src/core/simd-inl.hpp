@@ -50,8 +50,9 @@ HWY_INLINE hn::Vec<Tag> iota(Tag tag, hn::TFromD<Tag> first) {
   return hn::Add(hn::Load(tag, numbers.data()), hn::Set(tag, first));
 }
 
-/// Moves the lanes of a mask to the front; what follows them is undefined. For 4 and 8 bytes. With
-/// GCC 12, hn::Compress() copies its table to the stack each time, except where it needs none.
+/// Moves the lanes of a mask to the front; the remaining lanes are undefined. Lanes have 4 or 8
+/// bytes. Used instead of hn::Compress(), whose table GCC 12 copies to the stack on each call,
+/// except on targets without a table.
 template <class Tag>
 class FirstLanes {
  public:
@@ -82,7 +83,7 @@ class FirstLanes {
   decltype(hn::IndicesFromVec(Tag(), hn::Zero(Integers()))) indices_;
 };
 
-/// Picks lanes from two vectors of floats that follow each other in memory.
+/// Table lookup in two consecutive vectors of floats.
 template <class Floats>
 class Lookup {
  public:

@@ -56,7 +56,7 @@ void ThreadPool::run(int count, Round round, const void* body) {
     shares_[i].end = first;
   }
   if (workers_.empty() || count < 2) {
-    take_rounds(0);
+    run_rounds(0);
   } else {
     inside_ = 0;
     {
@@ -64,16 +64,16 @@ void ThreadPool::run(int count, Round round, const void* body) {
       ++loops_;
     }
     wake_.notify_all();
-    take_rounds(0);
-    if (!soon([this] { return close(); })) {
+    run_rounds(0);
+    if (!soon([this] { return try_close(); })) {
       std::unique_lock lock(mutex_);
-      done_.wait(lock, [this] { return close(); });
+      done_.wait(lock, [this] { return try_close(); });
     }
   }
   if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
 }
 
-bool ThreadPool::enter() {
+bool ThreadPool::try_enter() {
   int inside = inside_;
   while (inside != closed)
     if (inside_.compare_exchange_weak(inside, inside + 1)) return true;
@@ -86,12 +86,12 @@ void ThreadPool::leave() {
   done_.notify_one();
 }
 
-bool ThreadPool::close() {
+bool ThreadPool::try_close() {
   int nobody = 0;
   return inside_.compare_exchange_strong(nobody, closed);
 }
 
-void ThreadPool::take_rounds(int thread) {
+void ThreadPool::run_rounds(int thread) {
   try {
     const auto own = static_cast<std::size_t>(thread);
     for (std::size_t i = 0; i < shares_.size(); ++i) {
@@ -115,8 +115,8 @@ void ThreadPool::work(int thread) {
     }
     if (stop_) return;
     seen = loops_;
-    if (!enter()) continue;
-    take_rounds(thread);
+    if (!try_enter()) continue;
+    run_rounds(thread);
     leave();
   }
 }

@@ -13,9 +13,8 @@ namespace eventcamera {
 
 /// Pool of threads for parallel loops. Must be called from one thread at a time.
 ///
-/// The loops of a frame follow each other closely and may be shorter than the wake-up time of a
-/// thread. So threads yield for a while before they sleep, and a loop does not wait for threads
-/// that arrive too late.
+/// The loops of a frame follow each other closely and can be shorter than a thread's wake-up time.
+/// So threads yield for a while before they sleep, and a loop does not wait for late threads.
 ///
 /// Any thread may run any round of a loop. Each round must write only its own data; the result is
 /// then the same for any number of threads.
@@ -40,8 +39,8 @@ class ThreadPool {
   }
 
  private:
-  /// The rounds that a thread takes before it takes those of others. They are the same in each loop
-  /// over an image, so it often finds its data in its cache.
+  /// Rounds that a thread runs before it helps other threads: the same in each loop over an image,
+  /// so that their data are often in its cache.
   struct alignas(64) Share {
     std::atomic<int> next = 0;
     int end = 0;
@@ -50,11 +49,11 @@ class ThreadPool {
   using Round = void (*)(const void* body, int i, int thread);
 
   void run(int count, Round round, const void* body);
-  void take_rounds(int thread);
+  void run_rounds(int thread);
   void work(int thread);
-  bool enter();
+  bool try_enter();
   void leave();
-  bool close();
+  bool try_close();
   void join_workers();
 
   std::vector<std::thread> workers_;

@@ -8,10 +8,10 @@
 namespace eventcamera {
 namespace {
 
-/// Writes the sorted events of a time slice of 2^slice_bits microseconds, which visit_lists(visit)
-/// passes to visit(std::span<const Event>, const Event& last) in lists, with the last event of the
-/// array that a list is in. A bin holds the events of a microsecond, or of more, so that there are
-/// at most a few times as many bins as events.
+/// Counting sort of a time slice of 2^slice_bits microseconds. visit_lists(visit) passes its events
+/// to visit(std::span<const Event>, const Event& last) in lists, with the last event of the array
+/// that holds the list. Bins are a microsecond or longer: at most a few times as many bins as
+/// events.
 template <class VisitLists>
 void write_slice(const VisitLists& visit_lists, int slice_bits, std::span<Event> out) {
   constexpr int max_bins_bits = 12;

@@ -27,7 +27,7 @@ class TimeSlices final : public EventBuckets {
  private:
   void write_part(std::size_t first, std::size_t last, Event* out) const override;
 
-  static constexpr int max_slices_bits = 8;  ///< so many that a slice fits into a cache
+  static constexpr int max_slices_bits = 8;  ///< a slice fits into a cache
 
   /// On its own cache line, because threads fill neighbouring bands concurrently.
   struct alignas(64) Band {

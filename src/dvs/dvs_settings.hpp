@@ -22,7 +22,7 @@ enum class Response {
 /// Model of light between two frames.
 enum class Upsampling {
   linear,  ///< linear interpolation per pixel, in units of the response
-  motion,  ///< motion along the optical flow, in steps of a pixel, longer where much moves
+  motion,  ///< motion along the optical flow, in steps of a pixel, or more if it is fast
 };
 
 /// Reference level of a pixel after an event.
@@ -34,7 +34,7 @@ enum class RefractoryReset {
 /// Parameters of a pixel array. Every stage except response and upsampling is off if its parameters
 /// are 0.
 struct DvsSettings {
-  double denoise = 0;                  ///< maximum noise amplitude in the frames; white is 255
+  double denoise = 0;                  ///< Settings::denoise
   bool linear_light = false;           ///< undo the sRGB transfer function first
   bool exposure_compensation = false;  ///< divide out the gain of the frame camera's exposure
   Response response = Response::lin_log;
@@ -59,7 +59,7 @@ struct DvsSettings {
   double dead_pixels = 0;      ///< fraction of all pixels
 
   double adaptation = 0;                     ///< growth of the thresholds by an event, a fraction
-  Nanoseconds adaptation_time = 10'000'000;  ///< time in which the growth from one event fades
+  Nanoseconds adaptation_time = 10'000'000;  ///< decay time of the growth from one event
 
   Nanoseconds refractory_period = 0;
   RefractoryReset refractory_reset = RefractoryReset::level;
@@ -78,6 +78,7 @@ struct DvsSettings {
 
 /// Named sets of settings; their values are in presets.cpp.
 enum class DvsPreset {
+  standard,   ///< a typical event camera, for frames of any camera
   ideal,      ///< no noise, no delay
   esim,       ///< ESIM
   v2e_clean,  ///< v2e, its model "clean"

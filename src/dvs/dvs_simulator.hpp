@@ -8,14 +8,13 @@
 
 // Guide to this folder, from frames to events; the equations are in docs/methods.md.
 //
-//   denoise.cpp           removes the noise of the frame camera
 //   light_response.cpp    response of the photoreceptor to luma, without the exposure that
 //                         exposure_gain.cpp finds
 //   moving_light.cpp      number of steps between two frames for each tile, and the luma of moving
 //                         pixels at each step
 //   sub_intervals.cpp     timeline: divides the interval into sub-intervals at steps and exposure
 //                         pulses, with tables of bandwidth and noise, which depend on the light
-//   pixel_model.cpp       what pixels have in common, and how they differ
+// pixel_model.cpp       parameters shared by all pixels, and their mismatch
 //   pixel_array.cpp       state of all pixels
 //   row_filter.cpp        advances pixels that cannot fire, usually most of them; the others,
 //                         candidates, are solved: they get the exact times of their events

@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
-// The functions of elementary.hpp for vectors. Included once per SIMD target, after
-// foreach_target.h.
+// SPDX-License-Identifier: LGPL-2.1-or-later Vector versions of elementary.hpp. Included once per
+// SIMD target, after foreach_target.h.
 #if defined(EVENTCAMERA_ELEMENTARY_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef EVENTCAMERA_ELEMENTARY_INL
 #undef EVENTCAMERA_ELEMENTARY_INL

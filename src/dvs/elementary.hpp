@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
-// Elementary functions that are identical on every machine, branch-free and inline. Those of
-// elementary-inl.hpp are the same for vectors.
+// SPDX-License-Identifier: LGPL-2.1-or-later Elementary functions with the same results on every
+// machine, branch-free and inline. elementary-inl.hpp has the vector versions.
 #pragma once
 
 #include <algorithm>

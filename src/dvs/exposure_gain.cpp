@@ -21,15 +21,15 @@ int block_count(int side) {
   return (side + block_side - 1) / block_side;
 }
 
-/// The upper one of two; `values` must not be empty.
+/// Median, the upper one of an even number of `values`, which must not be empty.
 double median(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
 
-/// Logarithm of the gain of a block, whose pixels are usable if they are in both frames; NaN if
-/// less than half of a whole block's pixels are.
+/// Logarithm of a block's gain; NaN if fewer than half of a whole block's pixels are usable in both
+/// frames.
 template <class Pixel>
 double block_gain(const ImageView<Pixel>& last, const ImageView<Pixel>& now, const Box& block,
                   const std::vector<std::uint16_t>& light) {

@@ -15,12 +15,12 @@ inline int saturated_luma(int white) {
   return static_cast<int>(std::ceil(white * 235 / 255.0));
 }
 
-/// Estimates how a frame camera's exposure changed the light in its frames, which an event camera
-/// would not see.
+/// Estimates the gain by which a frame camera changed its exposure, which an event camera would not
+/// see.
 ///
 /// An exposure changes all light by the same factor; motion, a shadow or a lamp changes some places
 /// more than others. So the gain is the median of the gains of 4x4 regions, each of which is the
-/// median of its blocks of 8x8 pixels. It counts if at least eight regions have one, and three
+/// median of its blocks of 8x8 pixels. It is valid if at least eight regions have a gain, and three
 /// quarters of them agree with it. The reference implementation is `reference::exposure_gain()`.
 class ExposureGain {
  public:
@@ -31,8 +31,8 @@ class ExposureGain {
   /// For luma of 8 to 16 bits, whose light is light_of().
   ExposureGain(int bits, bool linear_light);
 
-  /// Returns the gain of the light from one frame to the next; 1 if there is none that counts. The
-  /// same for any number of threads.
+  /// Returns the gain from one frame to the next; 1 if it is not valid. The same for any number of
+  /// threads.
   double between(const ImageView<std::uint8_t>& last, const ImageView<std::uint8_t>& now,
                  ThreadPool& threads);
   double between(const ImageView<std::uint16_t>& last, const ImageView<std::uint16_t>& now,
@@ -46,7 +46,7 @@ class ExposureGain {
   std::vector<double> gains_;         ///< logarithms, by block; NaN if unknown
 };
 
-/// Changes a frame to how it would look with `gain` times the exposure. Saturated pixels stay so.
+/// Scales a frame to `gain` times its exposure. Saturated pixels stay saturated.
 void expose(Image<std::uint8_t>& frame, int bits, bool linear_light, double gain,
             ThreadPool& threads);
 void expose(Image<std::uint16_t>& frame, int bits, bool linear_light, double gain,

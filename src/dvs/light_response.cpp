@@ -9,8 +9,8 @@ namespace {
 /// Limit of the gain since the first frame, in case many estimates err in the same direction.
 constexpr double max_total_gain = 64;
 
-/// Factor of the light of bright luma, which is `overexposed_light` at white and falls to 1 over 20
-/// of 255 grey levels below.
+/// Light factor of bright luma: `overexposed_light` at white, falling to 1 over the 20 (of 255)
+/// grey levels below.
 double overexposure_of(double luma, bool is_narrow, double overexposed_light) {
   constexpr double width = 20.0 / 255;
   const double white = is_narrow ? 235.0 / 255 : 1;

@@ -27,7 +27,7 @@ inline double luma_of(double light, bool linear_light) {
   return light <= 0.04045 / 12.92 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
 }
 
-/// Response of the photoreceptor to the luma of frames, in which it divides out the exposure.
+/// Response of the photoreceptor to the luma of frames, with the exposure divided out.
 class LightResponse {
  public:
   explicit LightResponse(int frame_bits) : frame_bits_(frame_bits) {}
@@ -42,14 +42,14 @@ class LightResponse {
   /// The next frame has the exposure 1.
   void restart();
 
-  /// Adapts to the exposure of a frame, if settings say so. Returns its gain since the last frame.
+  /// Updates the exposure if `exposure_compensation` is set. Returns its gain since the last frame.
   template <class Pixel>
   double compensate(const ImageView<Pixel>& last, const ImageView<Pixel>& now, ThreadPool& threads);
 
   /// Exposure of the last frame; the first frame has 1.
   double gain() const { return gain_; }
 
-  /// Bit depth of the luma that pixels see: frames of 8 bits have 16 while they move.
+  /// Bit depth of the pixels' luma: 8-bit frames have 16 bits while they move.
   int bits() const {
     return settings_.upsampling == Upsampling::motion && frame_bits_ == 8 ? 16 : frame_bits_;
   }

@@ -103,8 +103,8 @@ class Pixels {
   std::size_t count_;
 };
 
-/// Vectors of candidates that are solved in turns: a processor overlaps their operations, which
-/// those from one crossing of a pixel to the next cannot be.
+/// Vectors of candidates that are solved in turns: the processor overlaps their operations, while
+/// successive crossings of one pixel depend on each other.
 constexpr std::size_t max_vectors = 16;
 
 /// Adds events of vectors of pixels.
@@ -184,8 +184,8 @@ struct Growth {
   Values left;  ///< until the sub-interval ends
 };
 
-/// Time until signals that start at `value`, and have this slope, reach thresholds; infinite if
-/// they do not before the sub-interval ends, in `left` microseconds.
+/// Time until signals that start at `value` with this slope reach the thresholds; infinite if later
+/// than `left`, the rest of the sub-interval in microseconds.
 HWY_INLINE Values wait(Values value, Values slope, Values threshold, Values left) {
   const auto is_beyond = hn::Ge(value, threshold);
   const auto meets =
@@ -195,7 +195,7 @@ HWY_INLINE Values wait(Values value, Values slope, Values threshold, Values left
   return hn::IfThenElse(hn::Or(is_beyond, meets), found, hn::Inf(Doubles()));
 }
 
-/// The same for thresholds that have grown, and fall.
+/// The same for grown thresholds, which fall.
 HWY_INLINE Values wait(Values value, Values slope, Values threshold, const Growth& growth) {
   const auto one = all(1);
   const auto margin = all(rounding);
@@ -214,8 +214,8 @@ HWY_INLINE Values wait(Values value, Values slope, Values threshold, const Growt
   return hn::IfThenElse(hn::Or(is_beyond, hn::Or(meets, reaches)), found, hn::Inf(Doubles()));
 }
 
-/// Signals that are straight lines, of a vector of pixels. Their thresholds may vary: by
-/// adaptation, and by jitter without mismatch.
+/// Straight-line signals of a vector of pixels. Thresholds may vary by adaptation, or by jitter if
+/// there is no mismatch.
 template <bool thresholds_vary>
 class Lines {
  public:

@@ -110,7 +110,7 @@ struct BlockMotions {
   bool are_close(int k) const { return x.are_close(k) && y.are_close(k); }
 };
 
-/// 16-bit luma of two samples of 8-bit frames, in 1/4096 of a grey level; `weight` is that of the
+/// 16-bit luma of two samples of 8-bit frames, in 1/4096 of a grey level; `weight` applies to the
 /// later one.
 std::uint16_t blended_luma(std::int32_t earlier, std::int32_t later, int weight) {
   const std::int32_t sum = earlier * 256 + (later - earlier) * weight;
@@ -359,10 +359,10 @@ HWY_EXPORT(move_light_8);
 
 namespace {
 
-/// Steps of a tile in which pixels move by up to `max_motion` pixels. Between steps the luma is a
-/// straight line; where it bends, events err by a time in proportion to the motion, and to the
-/// inverse square of the steps. So from `fine` pixels on, steps grow with the square root of the
-/// motion, and the error stays the same.
+/// Number of steps of a tile whose pixels move by up to `max_motion` pixels. Luma is linear between
+/// steps; where it bends, the error of event times is proportional to the motion and to the inverse
+/// square of the steps. So from `fine` pixels on, steps grow with the square root of the motion,
+/// which keeps the error constant.
 int steps_for(float max_motion, int max_steps) {
   constexpr float fine = 4;
   const float steps = max_motion <= fine ? max_motion : std::sqrt(fine * max_motion);

@@ -12,8 +12,8 @@
 
 namespace eventcamera {
 
-/// Tiles of a frame, each of which moves in steps of its own, so that one long vector does not
-/// divide the time of a whole frame.
+/// Tiles of a frame, each with its own number of steps, so that one fast object does not subdivide
+/// the whole frame.
 class MotionTiles {
  public:
   /// Pixels of a tile; at the right and lower border it may have fewer.

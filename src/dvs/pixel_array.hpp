@@ -61,8 +61,8 @@ class PixelArray {
   /// Starts over with these settings, all pixels ready to fire; settle() must follow.
   void start(const DvsSettings& settings, ThreadPool& threads);
 
-  /// Changes settings mid-stream; pixels keep their state. Thresholds that events have drawn move
-  /// by as much as those that were drawn first.
+  /// Changes settings mid-stream; pixels keep their state. Thresholds drawn by events shift by as
+  /// much as the initial ones.
   void change(const DvsSettings& settings, ThreadPool& threads);
 
   /// Resets the pixels as if this frame had been shown for a long time, and draws their initial

@@ -58,11 +58,11 @@ class Adaptation {
   double rate_;
 };
 
-/// Ways to solve pixels: solve_pixels(), or a faster one for settings that allow it.
+/// Pixel solvers: solve_pixels(), or a faster one if the settings allow it.
 enum class Solver { pixels, lines, row };
 
-/// Pixels with these settings: what they have in common, and how they differ, which the seed
-/// determines. Times are microseconds.
+/// Pixels with these settings: shared parameters, and the mismatch that the seed determines. Times
+/// are microseconds.
 class PixelModel {
  public:
   explicit PixelModel(const DvsSettings& settings);

@@ -60,8 +60,8 @@ class UnsolvedPixels {
   std::vector<double> memory_;
 };
 
-/// Candidates of a row, and what they are advanced through a sub-interval with. One per thread: it
-/// keeps its memory. Model and events are set for each band.
+/// Candidates of a row, and the parameters to advance them through a sub-interval. One per thread,
+/// to keep its memory; model and events are set for each band.
 struct RowToSolve {
   const PixelModel* model = nullptr;
   IntervalEvents::Band events;
@@ -79,8 +79,8 @@ struct RowToSolve {
     return left > 0 && left < min_gap ? left + sub_interval->next_rounding : left;
   }
 
-  /// Cause of a crossing by pixel x, whose threshold is falling at `fall`, in light to which its
-  /// signal answers with the slope `light`; both per microsecond (docs/methods.md).
+  /// Cause of a crossing by pixel x (docs/methods.md). `fall` is the rate at which its threshold
+  /// falls, `light` the slope of its signal due to light; both per microsecond.
   Cause cause_of_crossing(int x, Polarity polarity, double light, double fall) const {
     const double sign = polarity == Polarity::on ? 1 : -1;
     const double leak = sign * pixels.leak[x];
@@ -109,9 +109,8 @@ void solve_pixels(RowToSolve& row);
 /// the others is done afterwards.
 void solve_noisy_pixels(RowToSolve& row);
 
-/// Like solve_pixels(), for PixelModels that Solver::lines is for: signals are straight lines, and
-/// events are crossings without latency, after which the reference is the level. Many pixels at a
-/// time.
+/// Like solve_pixels(), for Solver::lines: straight-line signals without latency, whose reference
+/// after an event is the crossed level. Many pixels at a time.
 void solve_lines(RowToSolve& row);
 
 /// Like solve_pixels(), for thresholds that do not vary. Many pixels at a time.

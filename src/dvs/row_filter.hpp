@@ -39,7 +39,7 @@ class Candidates {
   float* column(Column column) { return memory_.data() + column * x.size(); }
   const float* column(Column column) const { return memory_.data() + column * x.size(); }
 
-  /// The last candidate takes the place of candidate i.
+  /// Removes candidate i; the last one takes its place.
   void remove(std::size_t i) {
     --count;
     x[i] = x[count];

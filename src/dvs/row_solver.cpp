@@ -133,7 +133,7 @@ class RowSolver {
   void solve() {
     begin();
     for (int i = 0; count_ > 0 && i < max_events; ++i) pass();
-    for (std::size_t i = 0; i < count_; ++i) give_up(i);
+    for (std::size_t i = 0; i < count_; ++i) store_at_end(i);
   }
 
  private:
@@ -347,7 +347,7 @@ class RowSolver {
     HWY_ALIGN std::uint64_t counters[max_lanes / 2] = {};
     for (std::size_t lane = 0; lane < std::min(lanes(), count_ - i); ++lane) {
       numbers[lane] = row_.pixels.number_of(x_of(i + lane));
-      // Noise draws its successor and its polarity before.
+      // Noise has drawn its next event and its polarity before.
       counters[lane] = unsolved_.draws[index_of(i + lane)] + 2 * (noise_bits >> lane & 1);
     }
     const RandomSeries<Doubles> random(row_.model->random, hn::Load(bits, numbers),
@@ -368,7 +368,7 @@ class RowSolver {
   }
   int x_of(std::size_t i) { return row_.candidates.x[index_of(i)]; }
 
-  /// Adds the event of a crossing by a pixel whose columns still are those before it.
+  /// Adds the event of a crossing by a pixel whose columns are not updated yet.
   void cross(std::size_t i, double t, double emitted, bool is_on) {
     const int x = x_of(i);
     const auto polarity = is_on ? Polarity::on : Polarity::off;
@@ -420,8 +420,8 @@ class RowSolver {
     pixels.noise_budget[x] = noise.left();
   }
 
-  /// Stores a pixel that has reached max_events.
-  void give_up(std::size_t i) {
+  /// Stores a pixel that has reached max_events, with its reference at the final signal.
+  void store_at_end(std::size_t i) {
     unsolved_.column(Column::reference)[i] = unsolved_.column(Column::end)[i];
     store(i);
   }

@@ -40,7 +40,7 @@ struct ShotNoise {
     return duration * (then / expected);
   }
 
-  /// Passes the next noise event, and draws the one after it.
+  /// Advances past the next noise event, and draws the following one.
   void draw(const Random& random, std::uint64_t pixel, std::uint64_t counter) {
     passed += budget;
     budget = draw_noise_budget(random, pixel, Random::Purpose::event, counter);

@@ -73,14 +73,14 @@ struct SubInterval {
   double rise;           ///< rise of all signals, units of the response
   std::uint64_t number;  ///< counted from the first frame
   double start;          ///< microseconds since the first frame
-  /// By how much more the start of the next interval is rounded down to microseconds than the start
-  /// of this one, if the sub-interval is the last; else 0.
+  /// Rounding error of the next interval's start, less this interval's, microseconds; 0 unless this
+  /// is the last sub-interval.
   double next_rounding;
   const ShadeTables* tables;
 };
 
-/// Time since the first frame. Divides each interval into equal steps, and splits these where pulse
-/// edges begin and end. One plan per number of steps.
+/// Timeline since the first frame. Divides each interval into equal steps, and splits these where
+/// pulse edges begin and end. One plan per number of steps.
 class Timeline {
  public:
   using Plan = std::vector<SubInterval>;  ///< in order of time

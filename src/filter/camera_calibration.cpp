@@ -51,11 +51,11 @@ class YamlParser {
 /// Maximum number of scalars of an entry that are kept: a 3x4 matrix and its description.
 constexpr std::size_t max_scalars = 20;
 
-/// The entries of the outermost mapping, each with all scalars in it, in order.
+/// Entries of the outermost mapping, each with its scalars in order.
 using Entries = std::map<std::string, std::vector<std::string>>;
 
 Entries entries_of(std::string_view yaml) {
-  // Not YAML, but how FileStorage begins.
+  // Written by OpenCV's FileStorage, but not valid YAML.
   if (yaml.starts_with("%YAML:")) yaml.remove_prefix(std::min(yaml.find('\n'), yaml.size()));
   YamlParser parser(yaml);
   Entries entries;

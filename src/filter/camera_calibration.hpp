@@ -23,7 +23,7 @@ struct CameraCalibration {
   double cx = 0;  ///< principal point, in pixels
   double cy = 0;
   std::array<double, 5> distortion{};
-  SensorSize size{};  ///< sides that the file does not say are 0
+  SensorSize size{};  ///< 0 if the file does not say
 
   /// A point of the picture, in pixels from the centre of the first one.
   struct Point {
@@ -31,11 +31,10 @@ struct CameraCalibration {
     double y;
   };
 
-  /// Returns where a point of the undistorted picture is in the distorted one.
+  /// Maps a point of the undistorted picture to the distorted one.
   Point distorted(Point point) const;
 
-  /// Returns where a point of the distorted picture is in the undistorted one; not a number if it
-  /// is nowhere.
+  /// Maps a point of the distorted picture to the undistorted one; NaN if there is no such point.
   Point undistorted(Point point) const;
 };
 

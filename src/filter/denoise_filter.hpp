@@ -17,16 +17,15 @@ enum class DenoiseMethod {
   baf,
   /// Spatio-temporal correlation filter (Guo and Delbruck 2022): at least min_neighbours fired.
   stcf,
-  /// The time since the last event of equal polarity of each of 24 neighbours, from 1 for none
-  /// down to 0 for the correlation time, adds up to the threshold.
+  /// The last events of equal polarity of 24 neighbours count from 1 if new down to 0 at the
+  /// correlation time; their sum reaches the threshold.
   time_kernel,
   /// Double window filter (Guo and Delbruck 2022), see DoubleWindow.
   dwf,
 };
 
-/// Drops events that have too little support by earlier ones. All events support, those that are
-/// dropped, too. A pixel takes 4 bytes, twice as many if polarities have to match, and none with
-/// dwf.
+/// Drops events with too little support by earlier events, dropped ones included. 4 bytes per
+/// pixel, 8 if polarities must match; none with dwf.
 class DenoiseFilter {
  public:
   struct Settings {
@@ -40,7 +39,7 @@ class DenoiseFilter {
     unsigned search_distance = 9;  ///< of dwf: pixels across plus pixels down
   };
 
-  /// The sum of time_kernel takes 32 bits.
+  /// Keeps the sum of time_kernel within 32 bits.
   static constexpr Nanoseconds max_correlation_time = 50'000'000'000;
 
   static Nanoseconds default_correlation_time(DenoiseMethod method);

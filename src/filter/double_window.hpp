@@ -21,7 +21,7 @@ class DoubleWindow {
 
   void clear();
 
-  /// Places of events, filled up to whole vectors with some that are far from all others.
+  /// Positions of events, padded to whole vectors with positions far from all others.
   struct Window {
     static constexpr std::size_t size = 36;
 

@@ -110,7 +110,7 @@ void EventMerger::merge(Inputs inputs, const MergedInterval& interval, LabelledE
       }
     }
     if (first == nullptr) return;
-    // All events of one microsecond of an input precede those of the inputs after it.
+    // All events of one microsecond of an input precede the events of later inputs.
     const auto until =
         std::min(std::max(other, first->next_time() + 1), first->end_of_part(interval.end)) -
         first->start_;

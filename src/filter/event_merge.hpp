@@ -21,25 +21,24 @@ class MergeInput {
   InvalidEvents load(std::span<const Event> events, std::span<const Label> labels,
                      SensorSize sensor, Microseconds length);
 
-  /// Sets when the interval starts in the merged stream, and the pixel where its sensor starts on
-  /// the merged one.
+  /// Sets the interval's start in the merged stream, and the sensor's position on the merged one.
   void place(Microseconds start, int x, int y);
 
-  /// Ends the interval, without its events that are not merged.
+  /// Ends the interval, and drops its events that are not merged.
   void unload();
   bool is_loaded() const { return loaded_; }
 
   Microseconds start() const { return start_; }
   Microseconds end() const { return start_ + length_; }
-  /// True if nothing is left after an interval of the merged stream that ends at `time`. One that
-  /// is an instant may still have events.
+  /// True if nothing is left after a merged interval that ends at `time`. An interval of length 0
+  /// may still have events.
   bool is_merged(Microseconds time) const { return end() <= time && next_ == events_.size(); }
 
  private:
   friend class EventMerger;
 
-  /// Time before which its events belong to an interval of the merged stream that ends at `end`:
-  /// those at `end` do only if its own interval ends, too.
+  /// Events before this time belong to a merged interval that ends at `end`. Events at `end` do so
+  /// only if this interval ends there, too.
   Microseconds end_of_part(Microseconds end) const;
   bool has_event_before(Microseconds time) const {
     return next_ < events_.size() && next_time() < time;
@@ -70,17 +69,15 @@ struct MergedInterval {
 
 /// Merges sorted streams into one, interval by interval. Intervals follow each other without
 /// overlap, and times do not change. Events of one microsecond are in the order of the inputs,
-/// those of one input in its order. (Only where an input has events at the very end of an interval,
-/// as those of simulators do, may these precede events of the same microsecond of inputs before
-/// it.)
+/// those of one input in its order. Only events at the very end of an interval, as simulators write
+/// them, may precede events of the same microsecond of earlier inputs.
 class EventMerger {
  public:
   using Inputs = std::span<MergeInput* const>;
 
   /// Returns the next interval, up to the earliest end of the inputs, of which there must be one;
-  /// all must be loaded. An interval without events ends where the next event or interval starts,
-  /// if that is needed for times of 32 bits, or nothing is known before. Unload the inputs that are
-  /// merged afterwards.
+  /// all must be loaded. An interval without events ends at the next event or interval if 32-bit
+  /// times require it, or if nothing is known before. Unload the merged inputs afterwards.
   MergedInterval next(Inputs inputs);
 
   /// Writes the events of that interval, relative to its start, and their labels if it is labelled.

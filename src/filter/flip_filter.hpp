@@ -9,8 +9,7 @@
 
 namespace eventcamera {
 
-/// One of the eight ways to lay a rectangle on itself: exchanges x and y, then mirrors what
-/// results.
+/// One of the eight orientations of a picture: transposes first, then mirrors.
 struct Orientation {
   bool transpose = false;  ///< (x, y) becomes (y, x)
   bool mirror_x = false;   ///< left becomes right

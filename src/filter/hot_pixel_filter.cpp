@@ -38,7 +38,7 @@ LabelledEvents HotPixelFilter::filter(LabelledEvents events, Microseconds start,
     const Microseconds time = start + event.t;
     if (time >= end) [[unlikely]] {
       learn(settings.ratio);
-      // Periods without any event say nothing of hot pixels.
+      // Periods without any event tell nothing about hot pixels.
       learning_end_ += (1 + (time - learning_end_) / period_) * period_;
       end = learning_end_;
     }
@@ -50,7 +50,7 @@ LabelledEvents HotPixelFilter::filter(LabelledEvents events, Microseconds start,
   });
 }
 
-/// Median of the events of the pixels around one; the upper one where their number is even.
+/// Median event count of the neighbours of a pixel; the upper one of an even number.
 std::uint32_t HotPixelFilter::median_around(int x, int y) const {
   std::array<std::uint32_t, 8> counts;
   auto end = counts.begin();

@@ -12,13 +12,12 @@
 
 namespace eventcamera {
 
-/// Drops the events of hot pixels: those that fire at least at a minimum rate, and a number of
-/// times as often as the median of their neighbours, in the last learning period. 4 bytes per
-/// pixel.
+/// Drops the events of hot pixels, which in the last learning period fired at `min_rate` or more
+/// and at least `ratio` times as often as the median of their neighbours. 4 bytes per pixel.
 class HotPixelFilter {
  public:
   struct Settings {
-    bool learn = true;                            ///< else hot pixels stay as they are
+    bool learn = true;                            ///< if false, the hot pixels do not change
     Nanoseconds learning_period = 1'000'000'000;  ///< at least 1 us, rounded down to microseconds
     double min_rate = 10;                         ///< events per second
     double ratio = 5;                             ///< to the median of the neighbours
@@ -28,8 +27,7 @@ class HotPixelFilter {
 
   LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings);
 
-  /// Forgets how often pixels fired in the learning period that is under way. Hot pixels stay: they
-  /// are the sensor's.
+  /// Restarts the learning period. Hot pixels stay: they belong to the sensor.
   void forget();
 
   /// Hot pixels in raster order.

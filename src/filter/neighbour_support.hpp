@@ -7,8 +7,8 @@
 
 namespace eventcamera {
 
-/// Decides on events by the last stamps of the pixels around, without their own, and then stamps
-/// their pixels. The correlation time is less than max_stamp_age.
+/// Decides on events by the stamps of their pixels' neighbours, then stamps their own pixels. The
+/// correlation time is less than max_stamp_age.
 
 /// Keeps an event if at least `needed` of 8 neighbours fired within the correlation time. Cells
 /// need a margin of 1.
@@ -17,8 +17,8 @@ void find_neighbour_support(const StampedBatch<Stamp>& batch, Stamp correlation_
 
 inline constexpr int kernel_radius = 2;
 
-/// Keeps an event if what is left of the correlation time since the last events of 24 neighbours
-/// adds up to `needed`; the sum must fit into 31 bits. Cells need a margin of kernel_radius.
+/// Keeps an event if the rests of the correlation time of 24 neighbours sum to at least `needed`;
+/// the sum must fit into 31 bits. Cells need a margin of kernel_radius.
 void find_kernel_support(const StampedBatch<Stamp>& batch, Stamp correlation_time,
                          std::uint32_t needed);
 

@@ -14,7 +14,7 @@ static std::string_view without_first(std::string_view text, std::string_view ch
   return text;
 }
 
-/// Takes a number off the front of `line`; max_side if there is none that a sensor can have.
+/// Parses and removes a number at the front of `line`; max_side if it is missing or too large.
 static int parse_number(std::string_view& line) {
   int number = 0;
   const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), number);

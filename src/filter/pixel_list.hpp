@@ -15,9 +15,9 @@ struct PixelPosition {
   friend constexpr bool operator==(const PixelPosition&, const PixelPosition&) = default;
 };
 
-/// Reads a list of pixels, one a line: column and row, separated by blanks or a comma. Empty lines
-/// and those that begin with # are comments. Throws std::invalid_argument, with the line, if it is
-/// anything else.
+/// Parses a list of pixels, one per line: column and row, separated by blanks or a comma. Empty
+/// lines and lines that begin with # are skipped. Throws std::invalid_argument with the offending
+/// line.
 std::vector<PixelPosition> parse_pixel_list(std::string_view text);
 
 /// Writes a list that parse_pixel_list() reads.

@@ -16,8 +16,8 @@ class PixelMask {
   /// Keeps no pixel. Throws std::bad_alloc.
   explicit PixelMask(SensorSize sensor);
 
-  /// Keeps the pixels that a PNG picture of the sensor's size shows brighter than mid-grey, in
-  /// front of black. Throws std::runtime_error if it is none, or has another size.
+  /// Keeps the pixels that are brighter than mid-grey in a PNG picture of the sensor's size, over a
+  /// black background. Throws std::runtime_error if it is not a PNG, or has another size.
   static PixelMask parse_png(std::string_view png, SensorSize sensor);
 
   void keep(int x, int y) {

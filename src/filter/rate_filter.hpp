@@ -11,10 +11,10 @@
 
 namespace eventcamera {
 
-/// Limits the event rate. Every n-th event is kept, with n from the number of events in the last
-/// reference period or so far in this one, so what is dropped is spread over the picture and over
-/// the period. A flood that begins within a period keeps up to half more events than its share;
-/// later periods pay back, at most half of theirs. Fractions of events add up.
+/// Limits the event rate. Keeps every n-th event, with n from the event count of the last reference
+/// period, or of this one so far, which spreads the drops over picture and period. A flood that
+/// begins within a period keeps up to 1.5 times its share; later periods repay that, with at most
+/// half of their share. Fractions of events accumulate.
 class RateFilter {
  public:
   struct Settings {
@@ -63,7 +63,7 @@ class RateFilter {
   double received_ = 0;                                          ///< events so far
   double kept_ = 0;
   double budget_ = 0;  ///< events to keep in this period
-  double debt_ = -1;   ///< events kept in the past beyond what was allowed, at least -1
+  double debt_ = -1;   ///< events kept in the past beyond the limit, at least -1
   double share_ = 0;   ///< of the next event that is kept
 };
 static_assert(Filter<RateFilter>);

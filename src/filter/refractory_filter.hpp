@@ -6,8 +6,8 @@
 
 namespace eventcamera {
 
-/// Keeps of each pixel's events those that a pixel with this refractory period fires: an event that
-/// is at least the period later than the last one kept. 4 bytes per pixel.
+/// Keeps the events that pixels with this refractory period would fire: at least the period after
+/// the pixel's last kept event. 4 bytes per pixel.
 class RefractoryFilter {
  public:
   struct Settings {

@@ -38,7 +38,7 @@ LabelledEvents ScaleFilter::filter(LabelledEvents events, Microseconds start,
 template <bool counts>
 LabelledEvents ScaleFilter::filter(LabelledEvents events, Microseconds start, unsigned min_events) {
   Microseconds previous = time_ - start;
-  Moment moment = moment_;  // a local variable, which no store can change
+  Moment moment = moment_;  // a local, which stores cannot alias
   const auto prefetch = [this](const Event& event) {
     __builtin_prefetch(&last_kept_[index(event)], 1);
     if constexpr (counts) __builtin_prefetch(&counts_[index(event)], 1);
@@ -55,7 +55,7 @@ LabelledEvents ScaleFilter::filter(LabelledEvents events, Microseconds start, un
     if constexpr (counts) {
       const unsigned count = counts_[place] + 1U;
       is_due = count >= min_events;
-      // Random pixels would mislead a branch.
+      // Branches on random pixels would be mispredicted.
       counts_[place] = static_cast<std::uint16_t>(count & (static_cast<unsigned>(is_due) - 1U));
     }
     auto& last_kept = last_kept_[place];

@@ -11,13 +11,13 @@
 
 namespace eventcamera {
 
-/// Scales a sensor. Events of one polarity that fall on one pixel of the output in one microsecond
-/// become one. Events of a sensor that keeps its size pass unchanged. Optionally only one of so
-/// many events of a polarity at a pixel of the output is kept. 8 bytes per pixel of the output.
+/// Scales a sensor. Events of one output pixel, polarity and microsecond become one, unless the
+/// sensor keeps its size. Optionally keeps one of every min_events events of an output pixel and
+/// polarity. 8 bytes per output pixel.
 class ScaleFilter {
  public:
   struct Settings {
-    /// Number of events that become one, the last of them; 1 to max_min_events.
+    /// Number of events of which the last is kept; 1 to max_min_events.
     unsigned min_events = 1;
   };
   static constexpr unsigned max_min_events = 65535;
@@ -27,7 +27,7 @@ class ScaleFilter {
 
   LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings);
 
-  /// Forgets the events that are counted.
+  /// Resets the counts.
   void forget();
 
  private:

@@ -5,15 +5,58 @@
 #include <array>
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
+#include "src/core/event.hpp"
 #include "src/core/image.hpp"
 #include "src/core/label.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/filter/prefetched.hpp"
-#include "src/filter/stamp_clock.hpp"
 
 namespace eventcamera {
+
+/// 30-bit time: microseconds after a moving epoch; 0 = never. Stamps are compared by age, now -
+/// stamp, which is exact below max_stamp_age. Older stamps, and `never`, saturate at max_stamp_age.
+using Stamp = std::uint32_t;
+
+inline constexpr int stamp_bits = 30;
+
+/// 9 minutes.
+inline constexpr Stamp max_stamp_age = Stamp{1} << (stamp_bits - 1);
+
+/// Maximum age that filters can compare.
+inline constexpr Nanoseconds max_filter_time = 500'000'000'000;
+static_assert(max_filter_time / 1000 < Microseconds{max_stamp_age});
+
+/// Microseconds of a time of at most max_filter_time, rounded up.
+constexpr Stamp in_stamps(Nanoseconds time) {
+  return static_cast<Stamp>((time + 999) / 1000);
+}
+
+/// A stamp after the epoch moves by `amount`.
+constexpr Stamp lowered(Stamp stamp, std::uint64_t amount) {
+  return stamp > amount ? static_cast<Stamp>(stamp - amount) : 0;
+}
+
+/// Stamps the times of one stream.
+class StampClock {
+ public:
+  /// Returns the stamp of `time`, at least max_stamp_age. Calls lower(amount) first if the epoch
+  /// moves, for the owner of stamps to lower them all.
+  template <class Lower>
+  Stamp at(Microseconds time, const Lower& lower) {
+    const auto stamp = static_cast<std::uint64_t>(time) - static_cast<std::uint64_t>(epoch_);
+    if (stamp < std::uint64_t{1} << stamp_bits) [[likely]]
+      return static_cast<Stamp>(stamp);
+    epoch_ = time - Microseconds{max_stamp_age};
+    lower(stamp - max_stamp_age);
+    return max_stamp_age;
+  }
+
+ private:
+  Microseconds epoch_ = -(Microseconds{1} << 62);  ///< the first time lowers all stamps to never
+};
 
 /// Whether pixels have a cell for all their events, or one for each polarity.
 enum class CellsPerPixel { one, one_per_polarity };

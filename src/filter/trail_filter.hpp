@@ -6,8 +6,8 @@
 
 namespace eventcamera {
 
-/// What to keep of a burst: successive events of a pixel, of one polarity and each less than the
-/// threshold after the one before.
+/// Part of a burst to keep. A burst is a run of events of one pixel and polarity, each less than
+/// the threshold after the previous one.
 enum class TrailMode {
   trail,           ///< the first event
   stc_cut_trail,   ///< the second event
@@ -15,7 +15,7 @@ enum class TrailMode {
 };
 
 /// The event trail filter of Prophesee's sensors (OpenEB, I_EventTrailFilterModule), per pixel. STC
-/// (spatio-temporal contrast) takes single events for noise. 4 bytes per pixel.
+/// (spatio-temporal contrast) treats single events as noise. 4 bytes per pixel.
 class TrailFilter {
  public:
   struct Settings {
@@ -32,7 +32,7 @@ class TrailFilter {
     const int keeps_all = settings.mode == TrailMode::stc_cut_trail ? 0 : 1;
     return last_.keep_if(events, start, [=](const Event& event, Stamp now, LastEvent* last) {
       const bool is_on = event.polarity() == Polarity::on;
-      // Random polarities would mislead branches.
+      // Branches on random polarities would be mispredicted.
       const int follows = static_cast<int>(is_on == last->is_on()) &
                           static_cast<int>(now - last->stamp() < threshold);
       const int is_second = follows & static_cast<int>(!last->follows());

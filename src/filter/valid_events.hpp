@@ -9,8 +9,8 @@
 
 namespace eventcamera {
 
-/// Drops the events that are outside the sensor, and those that are earlier than one before them or
-/// later than `max_t`. Returns the rest.
+/// Drops events that are outside the sensor, earlier than a previous one, or later than `max_t`.
+/// Returns the rest.
 inline LabelledEvents keep_valid(LabelledEvents events, SensorSize sensor, std::uint32_t max_t,
                                  InvalidEvents& invalid) {
   // The sign bit is set if any event is invalid; nearly always none is.

@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
+
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 
@@ -14,25 +17,123 @@ namespace {
 constexpr Microseconds max_lag = 500'000;
 /// Minimum length of a gap of such a stream. Queues of a second do not fill before.
 constexpr Microseconds min_gap = 250'000;
-/// Wrap period of the EVT3 clock, the shortest of all; those of the other formats are multiples of
-/// it.
+/// Wrap period of the EVT3 clock, the shortest of all; other formats have multiples of it.
 constexpr Microseconds clock_range = Microseconds{1} << 24;
 constexpr Microseconds always = std::numeric_limits<Microseconds>::min();
 
+/// Limit of the survey at the start of a file, in bytes.
+constexpr std::uint64_t max_surveyed_bytes = std::uint64_t{1} << 24;
+/// Limits of held items, in bytes of memory (4 million events) and in time.
+constexpr std::size_t max_held = std::size_t{1} << 26;
+constexpr Microseconds max_hold = 1'000'000;
+
+/// True for streams that play by themselves; others accompany them.
+constexpr bool is_shown(StreamKind kind) {
+  return kind == StreamKind::events || kind == StreamKind::frames;
+}
+
+/// Copies the content of an item to `memory`, and lets the item refer to it.
+template <class Some>
+void copy_content(Some& item, std::vector<std::byte>& memory) {
+  auto& [stream, content] = item;
+  const auto bytes = std::as_bytes(content);
+  memory.assign(bytes.begin(), bytes.end());
+  using Element = typename std::remove_reference_t<decltype(content)>::element_type;
+  content = {reinterpret_cast<Element*>(memory.data()), content.size()};
+}
+
+void copy_content(FrameItem& item, std::vector<std::byte>& memory) {
+  auto& frame = item.frame;
+  const auto* const pixels = reinterpret_cast<const std::byte*>(frame.pixels);
+  memory.assign(pixels, pixels + frame.height * frame.stride);
+  frame.pixels = reinterpret_cast<const std::uint8_t*>(memory.data());
+}
+
 }  // namespace
 
+/* bytes and items */
+
+void RecordingReader::Input::push(std::span<const std::uint8_t> bytes) {
+  const auto guard = lock();
+  decoder_->push(bytes);
+  position_ += bytes.size();
+  is_finished_ = false;
+}
+
+void RecordingReader::Input::finish() {
+  const auto guard = lock();
+  decoder_->drain();
+  is_finished_ = true;
+}
+
+std::optional<Item> RecordingReader::Input::decode() {
+  const auto guard = lock();
+  return decoder_->next();
+}
+
+std::optional<Item> RecordingReader::Input::next() {
+  if (replayed_) {
+    if (*replayed_ < held_.size()) return held_[(*replayed_)++].item;
+    clear_held();
+  }
+  while (true) {
+    if (const auto item = decode()) return item;
+    if (source_ == nullptr || is_finished_) return std::nullopt;
+    if (reads_itself_) {
+      is_finished_ = !source_->failed();
+      return std::nullopt;
+    }
+    const auto piece = source_->piece(position_);
+    if (!piece) return std::nullopt;
+    if (piece->empty())
+      finish();
+    else
+      push(*piece);
+  }
+}
+
+void RecordingReader::Input::discard() {
+  while (decode()) continue;
+}
+
+void RecordingReader::Input::hold(Item item) {
+  std::vector<std::byte> memory;
+  std::visit([&](auto& some) { copy_content(some, memory); }, item);
+  held_size_ += sizeof(Held) + memory.size();
+  held_.push_back({item, std::move(memory)});
+}
+
+void RecordingReader::Input::clear_held() {
+  held_.clear();
+  held_size_ = 0;
+  replayed_.reset();
+}
+
+void RecordingReader::Input::restart(const std::optional<SeekPoint>& seek_point) {
+  const auto guard = lock();
+  if (seek_point) {
+    decoder_->restart(*seek_point);
+  } else {
+    decoder_ = make_decoder_();
+    if (source_ != nullptr) reads_itself_ = decoder_->open(*source_);
+  }
+  position_ = seek_point ? seek_point->position : 0;
+  is_finished_ = false;
+  clear_held();
+}
+
+std::optional<SeekPoint> RecordingReader::Input::seek_point_before(Microseconds t) const {
+  const auto guard = lock();
+  return decoder_->seek_point_before(t);
+}
+
 RecordingReader::RecordingReader(MakeDecoder make_decoder, Microseconds chunk_length, Clock clock)
-    : input_(std::move(make_decoder)),
-      chunk_length_(chunk_length),
-      clock_(clock),
-      survey_(chunk_length) {
+    : input_(std::move(make_decoder)), chunk_length_(chunk_length), clock_(clock) {
   learn_streams();
   if (clock_ == Clock::file) return;
   begun_ = true;
   for (std::size_t i = 0; i < streams_.size(); ++i) show(i);
 }
-
-/* input */
 
 void RecordingReader::push(std::span<const std::uint8_t> bytes, std::optional<Interval> interval) {
   input_.push(bytes);
@@ -49,7 +150,7 @@ void RecordingReader::begin_times() {
   input_.expect_more();
   finishing_ = drained_ = false;
   shift_.reset();
-  for (std::size_t i = 0; i < streams_.size(); ++i) start_chunker(i);
+  for (auto& stream : streams_) start_chunker(stream);
   next_stream_ = 0;
   newest_ = 0;
   output_due_.reset();
@@ -57,11 +158,10 @@ void RecordingReader::begin_times() {
   imu_samples_.clear();
 }
 
-bool RecordingReader::reach(Microseconds t) {
+void RecordingReader::advance_to(Microseconds t) {
   auto& chunker = streams_.front().chunker;
-  if (shift_) chunker.reach(t - *shift_);
+  if (shift_) chunker.advance_to(t - *shift_);
   next_stream_ = 0;
-  return chunker.first().has_value();
 }
 
 std::optional<Item> RecordingReader::next_item() {
@@ -94,34 +194,171 @@ void RecordingReader::learn_streams() {
 
 /* the start of a file */
 
-/// Reads ahead. False if bytes cannot be read.
+/// Pull mode: reads the start of the file, up to 16 MiB or 4 million events, and holds its items.
+/// Looks for streams that begin later by the index of the file or, without one, by reading on
+/// until there are events. False if bytes cannot be read.
 bool RecordingReader::survey() {
   input_.restart(std::nullopt);
   streams_.clear();
   start_due_ = false;
-  survey_ = RecordingSurvey(chunk_length_);
-  if (!survey_.read(input_)) return false;
   learn_streams();
+  while (!is_surveyed()) {
+    const auto item = next_item();
+    if (!item && !input_.is_finished()) return false;
+    if (!item) break;
+    std::visit([this](const auto& some) { survey(some); }, *item);
+    input_.hold(*item);
+  }
+  const auto has_begun = [](const Stream& stream) {
+    return stream.info.kind == StreamKind::events && stream.first;
+  };
+  // The next items may be the first events.
+  bool has_moved = false;
+  while (!input_.decoder().knows_all_streams() && std::ranges::none_of(streams_, has_begun) &&
+         survey_next())
+    has_moved = true;
+  const bool is_whole = input_.is_finished();
+  for (auto& stream : streams_)
+    if (is_whole || !stream.first) finish_survey(stream);
+  const auto last = input_.decoder().last_time();
+  has_moved |= find_first_items();
+  if (input_.source().failed()) return false;
+  learn_duration(last, is_whole);
   begin();
-  duration_ = survey_.duration();
-  duration_is_exact_ = survey_.is_duration_exact();
-  if (start_ > 0 || survey_.has_moved())
+  if (start_ > 0 || has_moved)
     restart(seek_point_before(start_), start_, stop_);
   else
     begin_segment(start_, stop_);
   return true;
 }
 
+/// True if there is no need to read more: too much was read, or sizes, origin and duration are
+/// known.
+bool RecordingReader::is_surveyed() {
+  if (input_.held_size() >= max_held || input_.position() >= max_surveyed_bytes) return true;
+  const bool sizes_known = std::ranges::all_of(streams_, [](const Stream& stream) {
+    return stream.info.kind != StreamKind::events || stream.info.size.width > 0;
+  });
+  const auto last = sizes_known && is_origin_known() ? input_.decoder().last_time() : std::nullopt;
+  return last && *last < Chunker::max_time;
+}
+
+/// True if enough is known to begin: the first time of every stream, and enough events to guess
+/// unknown sensor sizes.
+bool RecordingReader::is_origin_known() const {
+  if (input_.held_size() >= max_held) return true;
+  bool awaited = false;
+  auto first = std::numeric_limits<Microseconds>::max();
+  auto last = std::numeric_limits<Microseconds>::min();
+  for (std::size_t i = 0; i < streams_.size(); ++i) {
+    const auto& stream = streams_[i];
+    if (!stream.first) {
+      awaited |= is_shown(stream.info.kind) && input_.decoder().end_of(i, Chunker::max_time) != 0;
+      continue;
+    }
+    const bool of_events = stream.info.kind == StreamKind::events;
+    if (of_events && stream.info.size.width <= 0) {
+      // All bytes are there: hold on, to guess from as many events as possible.
+      if (input_.is_finished()) return false;
+      awaited |= !stream.is_sampled;
+    }
+    first = std::min(first, *stream.first);
+    last = std::max(last, of_events ? *stream.latest : *stream.first);
+  }
+  return last >= first && (!awaited || last - first >= max_hold);
+}
+
+/// Earliest time of all streams.
+std::optional<Microseconds> RecordingReader::earliest() const {
+  std::optional<Microseconds> earliest;
+  for (const auto& stream : streams_)
+    if (stream.first) earliest = std::min(earliest.value_or(*stream.first), *stream.first);
+  return earliest;
+}
+
+/// Reads the next item without holding it. False if there is none.
+bool RecordingReader::survey_next() {
+  const auto item = next_item();
+  if (item) std::visit([this](const auto& some) { survey(some); }, *item);
+  return item.has_value();
+}
+
+void RecordingReader::survey(const EventItem& item) {
+  auto& stream = streams_[item.stream];
+  stream.used.include(item.events);
+  stream.chunker.push(item.events);
+  while (stream.chunker.next()) stream.is_sampled = true;
+  stream.first = stream.chunker.first();
+  if (stream.first) stream.latest = stream.chunker.latest();
+}
+
+void RecordingReader::survey(const FrameItem& item) {
+  auto& stream = streams_[item.stream];
+  const auto t = item.frame.t;
+  if (!Chunker::is_time(t)) return;
+  stream.first = std::min(stream.first.value_or(t), t);
+  stream.latest = std::max(stream.latest.value_or(t), t);
+  if (!stream.first_frame) stream.first_frame = item.frame;
+}
+
+/// Declares the end of a stream's events.
+void RecordingReader::finish_survey(Stream& stream) {
+  if (stream.info.kind != StreamKind::events) return;
+  stream.chunker.finish();
+  survey(EventItem{static_cast<std::size_t>(&stream - streams_.data()), {}});
+}
+
+/// Reads the first items of streams that begin later, where the file states where. True if it did.
+bool RecordingReader::find_first_items() {
+  bool has_moved = false;
+  for (std::size_t i = 0; i < streams_.size(); ++i) {
+    if (!is_shown(streams_[i].info.kind) || streams_[i].first) continue;
+    const auto start = input_.decoder().first_of(i);
+    if (!start) continue;
+    input_.restart(start);
+    has_moved = true;
+    while (!streams_[i].first && input_.position() - start->position < max_surveyed_bytes &&
+           survey_next())
+      continue;
+    finish_survey(streams_[i]);
+  }
+  return has_moved;
+}
+
+/// `stated` is the time of the last item if the file states it. Otherwise the duration follows from
+/// the surveyed part, exactly if that `is_whole`.
+void RecordingReader::learn_duration(std::optional<Microseconds> stated, bool is_whole) {
+  const auto start = earliest().value_or(0);
+  auto last = start - 1;
+  for (const auto& stream : streams_) last = std::max(last, stream.latest.value_or(last));
+  const auto length = last + 1 - start;
+  const bool is_stated = stated && *stated >= start && *stated < Chunker::max_time;
+  duration_is_exact_ = is_stated || is_whole;
+  duration_.reset();
+  if (is_stated) {
+    duration_ = *stated + 1 - start;
+  } else if (is_whole) {
+    duration_ = length;
+  } else if (!input_.reads_itself()) {
+    const auto position = input_.position();
+    const auto scale = static_cast<double>(std::max(input_.source().size(), position)) /
+                       static_cast<double>(std::max<std::uint64_t>(position, 1));
+    duration_ = static_cast<Microseconds>(
+        std::min(static_cast<double>(length) * scale, static_cast<double>(Chunker::max_time)));
+  }
+}
+
 /// Makes the earliest time of all streams the origin, and shows the streams.
 void RecordingReader::begin() {
-  origin_ = survey_.origin().value_or(0);
+  origin_ = earliest().value_or(0);
   begun_ = true;
   input_.replay();
   for (std::size_t i = 0; i < streams_.size(); ++i) {
     const auto& info = streams_[i].info;
     const bool is_stream_of_events =
         info.kind == StreamKind::events && (info.size != SensorSize{} || streams_.size() == 1);
-    if ((is_shown(info.kind) && survey_.stream(i).first) || is_stream_of_events) show(i);
+    streams_[i].chunker = Chunker(chunk_length_);
+    if ((is_shown(info.kind) && streams_[i].first) || is_stream_of_events) show(i);
   }
   if (!start_due_) throw UnsupportedFormat("the file has neither events nor frames");
 }
@@ -142,7 +379,6 @@ void RecordingReader::restart(const std::optional<SeekPoint>& seek_point, Micros
                               std::optional<Microseconds> stop) {
   input_.restart(seek_point);
   before_ = seek_point ? input_.decoder().corruption() : Corruption{};
-  if (!begun_) survey_ = RecordingSurvey(chunk_length_);
   begin_segment(start, stop);
 }
 
@@ -163,6 +399,11 @@ void RecordingReader::begin_segment(Microseconds start, std::optional<Microsecon
     stream.outside = 0;
     stream.chunker =
         begun_ ? Chunker(chunk_length_, origin_ + start, origin_) : Chunker(chunk_length_);
+    if (begun_) continue;
+    stream.first = stream.latest = std::nullopt;
+    stream.first_frame.reset();
+    stream.used = {};
+    stream.is_sampled = false;
   }
 }
 
@@ -170,27 +411,24 @@ void RecordingReader::begin_segment(Microseconds start, std::optional<Microsecon
 
 void RecordingReader::show(std::size_t index) {
   auto& stream = streams_[index];
-  const auto& surveyed = survey_.stream(index);
   stream.shown = true;
-  stream.first_frame = surveyed.first_frame;
   start_due_ = true;
   if (stream.info.kind != StreamKind::events) return;
   if (stream.info.size.width <= 0 || stream.info.size.height <= 0) {
-    stream.extent = surveyed.used.extent(surveyed.used.within() / 1000);
+    stream.extent = stream.used.extent(stream.used.within() / 1000);
     stream.info.size = sensor_with(stream.extent, stream.info.mirrored);
     stream.size_from = SizeFrom::assumption;
-    stream.is_implausible = surveyed.used.are_implausible(corruption().outside);
+    stream.is_implausible = stream.used.are_implausible(corruption().outside);
   }
-  start_chunker(index);
+  start_chunker(stream);
 }
 
 /// Chunks begin at the start of the segment, except that chunks of words, and of the stream that
 /// defines the origin, begin at the first event.
-void RecordingReader::start_chunker(std::size_t index) {
+void RecordingReader::start_chunker(Stream& stream) {
   const bool from_first_event =
-      clock_ == Clock::stream ||
-      (start_ == 0 && (!begun_ || survey_.stream(index).first == origin()));
-  streams_[index].chunker =
+      clock_ == Clock::stream || (start_ == 0 && (!begun_ || stream.first == origin()));
+  stream.chunker =
       from_first_event ? Chunker(chunk_length_) : Chunker(chunk_length_, origin_ + start_, origin_);
 }
 
@@ -201,16 +439,16 @@ std::optional<RecordingReader::Output> RecordingReader::next() {
     if (drained_ || is_past_stop()) return std::nullopt;
     if (const auto item = next_item()) {
       if (begun_) {
-        std::visit([this](const auto& some) { take(some); }, *item);
+        std::visit([this](const auto& some) { add(some); }, *item);
       } else {
-        survey_.take(*item);
+        std::visit([this](const auto& some) { survey(some); }, *item);
         input_.hold(*item);
-        if (survey_.is_origin_known(input_)) begin();
+        if (is_origin_known()) begin();
       }
     } else if (!input_.is_finished()) {
       return std::nullopt;
     } else if (!begun_) {
-      survey_.finish(input_.decoder());
+      for (auto& stream : streams_) finish_survey(stream);
       begin();
     } else if (!std::exchange(finishing_, true)) {
       finish_chunkers();
@@ -240,11 +478,11 @@ std::optional<RecordingReader::Output> RecordingReader::next_output() {
 
 /// Triggers or IMU samples before `end`, in time since the origin.
 std::optional<RecordingReader::Output> RecordingReader::next_accompanying(Microseconds end) {
-  if (const auto triggers = taken_before(end, triggers_); !triggers.empty()) {
+  if (const auto triggers = samples_before(end, triggers_); !triggers.empty()) {
     counts_.triggers += triggers.size();
     return TriggerItem{0, triggers};
   }
-  if (const auto samples = taken_before(end, imu_samples_); !samples.empty()) {
+  if (const auto samples = samples_before(end, imu_samples_); !samples.empty()) {
     counts_.imu_samples += samples.size();
     return ImuItem{0, samples};
   }
@@ -253,10 +491,10 @@ std::optional<RecordingReader::Output> RecordingReader::next_accompanying(Micros
 
 /// Items before `end` and within the segment, with times since the origin.
 template <class Sample>
-std::span<const Sample> RecordingReader::taken_before(Microseconds end,
-                                                      WaitingItems<Sample>& waiting) {
+std::span<const Sample> RecordingReader::samples_before(Microseconds end,
+                                                        WaitingItems<Sample>& waiting) {
   const auto shift = shift_.value_or(0) - origin_;
-  const auto items = waiting.take_before(end - shift);
+  const auto items = waiting.pop_before(end - shift);
   for (auto& item : items) item.t += shift;
   const auto first =
       start_ > 0 ? std::ranges::lower_bound(items, start_, {}, &Sample::t) : items.begin();
@@ -264,11 +502,11 @@ std::span<const Sample> RecordingReader::taken_before(Microseconds end,
   return first < last ? std::span<const Sample>(first, last) : std::span<const Sample>();
 }
 
-void RecordingReader::take(const EventItem& item) {
+void RecordingReader::add(const EventItem& item) {
   if (item.events.empty()) return;
   auto& stream = streams_[item.stream];
   if (!stream.shown) {
-    survey_.take_late(item);
+    stream.used.include(item.events);
     show(item.stream);
   }
   auto events = item.events;
@@ -304,7 +542,7 @@ void RecordingReader::grow(Stream& stream, std::span<const AbsoluteEvent> events
   stream.info.size = sensor_with(stream.extent, stream.info.mirrored);
 }
 
-void RecordingReader::take(const FrameItem& item) {
+void RecordingReader::add(const FrameItem& item) {
   auto& stream = streams_[item.stream];
   const auto t = item.frame.t;
   if (!Chunker::is_time(t)) {
@@ -312,7 +550,7 @@ void RecordingReader::take(const FrameItem& item) {
     return;
   }
   if (!stream.shown) {
-    survey_.take_late(item);
+    stream.first_frame = item.frame;
     show(item.stream);
   }
   if (t < origin_) {
@@ -325,15 +563,15 @@ void RecordingReader::take(const FrameItem& item) {
   output_due_ = TimedFrame{item.stream, time, item.frame};
 }
 
-void RecordingReader::take(const TriggerItem& item) {
+void RecordingReader::add(const TriggerItem& item) {
   counts_.stray += triggers_.push(item.triggers);
 }
 
-void RecordingReader::take(const ImuItem& item) {
+void RecordingReader::add(const ImuItem& item) {
   counts_.stray += imu_samples_.push(item.samples);
 }
 
-/// Shifts the clock of words to that of their interval. If the two differ only by wraps of the
+/// Shifts the clock of words to the clock of their interval. If the two differ only by wraps of the
 /// words' clock, event times are preserved exactly.
 void RecordingReader::set_shift(Microseconds first) {
   first = std::clamp(first, -Chunker::max_time, Chunker::max_time);
@@ -428,7 +666,7 @@ RecordingReader::Counts RecordingReader::counts() const {
   for (const auto& stream : streams_) {
     counts.outside += stream.outside;
     if (!begun_) continue;
-    const auto& dropped = stream.chunker.dropped();
+    const auto dropped = stream.chunker.dropped();
     counts.late += dropped.late;
     counts.stray += dropped.stray;
   }

@@ -2,16 +2,22 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
+#include "src/formats/byte_source.hpp"
 #include "src/formats/chunker.hpp"
-#include "src/formats/recording_input.hpp"
-#include "src/formats/recording_survey.hpp"
+#include "src/formats/decoder.hpp"
+#include "src/formats/seek_points.hpp"
 #include "src/formats/sensor_sizes.hpp"
 #include "src/formats/waiting_items.hpp"
 
@@ -29,7 +35,8 @@ namespace eventcamera {
 ///     while (const auto output = recording.next()) ...
 class RecordingReader {
  public:
-  using MakeDecoder = RecordingInput::MakeDecoder;
+  /// Creates a decoder of the file, positioned at its start. May throw.
+  using MakeDecoder = std::function<std::unique_ptr<Decoder>()>;
 
   /// Source of output times: the file's own times, or the PTS of the buffers that carry encoded
   /// words.
@@ -51,9 +58,15 @@ class RecordingReader {
     std::optional<std::uint64_t> end = {};  ///< of its part of the segment in the file, if known
     std::uint64_t outside = 0;              ///< events outside a size not stated in the file
     std::optional<Frame> first_frame = {};  ///< format only: its pixels are no longer valid
-    bool is_implausible = false;            ///< no sensor is so large as an assumed one had to be
+    bool is_implausible = false;            ///< no sensor is as large as the assumed size
     Extent extent = {};                     ///< of an assumed size
-    Chunker chunker;
+    Chunker chunker;                        ///< before the origin is known, rejects erroneous times
+
+    // Known from the items before the first Start.
+    std::optional<Microseconds> first = {};   ///< earliest time
+    std::optional<Microseconds> latest = {};  ///< latest time
+    UsedPixels used = {};
+    bool is_sampled = false;  ///< `used` covers at least one interval
   };
 
   /// More streams are shown. Precedes the first item of each of them.
@@ -93,8 +106,11 @@ class RecordingReader {
   /// Push mode: marks the end of the bytes.
   void finish() { input_.finish(); }
 
-  /// Words: nothing earlier than `t` will follow. False if no event was read yet.
-  bool reach(Microseconds t);
+  /// Words: nothing earlier than `t` will follow.
+  void advance_to(Microseconds t);
+
+  /// Words: whether the time of the first event is known.
+  bool has_events() const { return streams_.front().chunker.first().has_value(); }
 
   /// Reads the pushed bytes and drops their items.
   void discard() { input_.discard(); }
@@ -111,6 +127,12 @@ class RecordingReader {
   /// Returns the next item, valid until the next call. Nothing if more bytes are needed, if bytes
   /// cannot be read, and after the end. May throw.
   std::optional<Output> next();
+
+  /// Exchanges the memory of the events of the last chunk, whose stream this is, for other memory.
+  /// The events stay valid there.
+  void swap_memory(std::size_t stream, std::vector<Event>& memory) {
+    streams_[stream].chunker.swap_memory(memory);
+  }
 
   /// True once everything up to the end of the file was returned.
   bool at_end() const { return drained_; }
@@ -140,11 +162,10 @@ class RecordingReader {
 
   std::string format_name() const { return input_.decoder().format_name(); }
 
-  /// Content that was ignored; see RecordingDecoder.
-  std::string left_out() const { return input_.decoder().left_out(); }
+  std::string unread_topics() const { return input_.decoder().unread_topics(); }
 
   /// True if no events and frames were found before the Start.
-  bool is_empty() const { return !survey_.origin(); }
+  bool is_empty() const { return !earliest(); }
 
   /// Time in the file that output times count from; valid after a Start.
   Microseconds origin() const { return origin_; }
@@ -174,23 +195,113 @@ class RecordingReader {
   const Corruption& corruption() const { return input_.decoder().corruption(); }
 
  private:
+  /// The items of the decoder, and the bytes that they are decoded from.
+  class Input {
+   public:
+    explicit Input(MakeDecoder make_decoder)
+        : make_decoder_(std::move(make_decoder)), decoder_(make_decoder_()) {}
+
+    void open(ByteSource& source) { source_ = &source; }
+    bool is_pulling() const { return source_ != nullptr; }
+    const ByteSource& source() const { return *source_; }
+
+    void push(std::span<const std::uint8_t> bytes);
+    void finish();
+    bool is_finished() const { return is_finished_; }
+
+    /// Further bytes may follow the end.
+    void expect_more() { is_finished_ = false; }
+
+    /// Returns the next item, valid until the next call. Nothing if more bytes are needed, if bytes
+    /// cannot be read, and after the end. May throw.
+    std::optional<Item> next();
+
+    /// Drops the items of all bytes so far.
+    void discard();
+
+    /// Keeps a copy of an item until restart().
+    void hold(Item item);
+
+    /// Size of the held items in memory, in bytes.
+    std::size_t held_size() const { return held_size_; }
+
+    /// The next items are the held ones.
+    void replay() { replayed_ = 0; }
+
+    /// Continues at a seek point, or with a new decoder at the start of the file.
+    void restart(const std::optional<SeekPoint>& seek_point);
+
+    /// May be called from any thread.
+    std::optional<SeekPoint> seek_point_before(Microseconds t) const;
+
+    /// True if all items before this position in the file were returned.
+    bool has_passed(std::uint64_t position) const {
+      return held_.empty() && decoder_->position() >= position;
+    }
+
+    Decoder& decoder() { return *decoder_; }
+    const Decoder& decoder() const { return *decoder_; }
+
+    /// Pull mode: true if the decoder reads from the source.
+    bool reads_itself() const { return reads_itself_; }
+
+    /// Offset of the next byte to push or pull, unless the decoder reads itself.
+    std::uint64_t position() const { return position_; }
+
+   private:
+    /// An item, and the memory that it refers to.
+    struct Held {
+      Item item;
+      std::vector<std::byte> memory;
+    };
+
+    std::unique_lock<std::mutex> lock() const { return std::unique_lock(mutex_); }
+    std::optional<Item> decode();
+    void clear_held();
+
+    MakeDecoder make_decoder_;
+    mutable std::mutex mutex_;  ///< guards decoder_ against seek_point_before()
+    std::unique_ptr<Decoder> decoder_;
+
+    ByteSource* source_ = nullptr;
+    bool reads_itself_ = false;
+    std::uint64_t position_ = 0;
+    bool is_finished_ = false;
+
+    std::vector<Held> held_;
+    std::size_t held_size_ = 0;
+    std::optional<std::size_t> replayed_;  ///< number of held items returned again
+  };
+
   std::optional<Item> next_item();
   void learn_streams();
+
   bool survey();
+  bool is_surveyed();
+  bool find_first_items();
+  void learn_duration(std::optional<Microseconds> stated, bool is_whole);
+  bool is_origin_known() const;
+  std::optional<Microseconds> earliest() const;
+  bool survey_next();
+  void survey(const EventItem& item);
+  void survey(const FrameItem& item);
+  void survey(const TriggerItem& /*item*/) {}
+  void survey(const ImuItem& /*item*/) {}
+  void finish_survey(Stream& stream);
   void begin();
   void begin_segment(Microseconds start, std::optional<Microseconds> stop);
 
   void show(std::size_t index);
-  void start_chunker(std::size_t index);
-  void take(const EventItem& item);
+  void start_chunker(Stream& stream);
+  void add(const EventItem& item);
+  void add(const FrameItem& item);
+  void add(const TriggerItem& item);
+  void add(const ImuItem& item);
   static void grow(Stream& stream, std::span<const AbsoluteEvent> events);
-  void take(const FrameItem& item);
-  void take(const TriggerItem& item);
-  void take(const ImuItem& item);
   std::optional<Output> next_output();
   std::optional<Output> next_accompanying(Microseconds end);
   template <class Sample>
-  std::span<const Sample> taken_before(Microseconds end, WaitingItems<Sample>& waiting);
+  std::span<const Sample> samples_before(Microseconds end, WaitingItems<Sample>& waiting);
   std::optional<Chunk> next_chunk();
   std::optional<Chunk> next_chunk(std::size_t index);
   std::optional<Chunk> next_gap();
@@ -199,10 +310,9 @@ class RecordingReader {
   void set_shift(Microseconds first);
   void finish_chunkers();
 
-  RecordingInput input_;
+  Input input_;
   Microseconds chunk_length_;
   Clock clock_;
-  RecordingSurvey survey_;
   std::atomic<Microseconds> origin_ = 0;  ///< read by seek_point_before()
 
   std::vector<Stream> streams_;  ///< same indices as in the decoder

@@ -11,7 +11,7 @@
 #include "src/core/event.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/formats/corruption.hpp"
-#include "src/formats/decoded.hpp"
+#include "src/formats/decoder.hpp"
 
 namespace eventcamera {
 

@@ -25,7 +25,7 @@ UnitStreamDecoder::UnitStreamDecoder(std::unique_ptr<UnitDecoder> decoder, Senso
 
 void UnitStreamDecoder::begin(std::unique_ptr<UnitDecoder> decoder, SensorSize size) {
   decoder_ = std::move(decoder);
-  size_ = size;
+  stream_.size = size;
 }
 
 std::size_t UnitStreamDecoder::read_header(std::span<const std::uint8_t>, bool) {
@@ -79,7 +79,7 @@ void UnitStreamDecoder::finish(Decoded& out) {
   rest_.clear();
 }
 
-void UnitStreamDecoder::restart(const SeekPoint& seek_point) {
+void UnitStreamDecoder::restore(const SeekPoint& seek_point) {
   rest_.clear();
   position_ = seek_point.position;
   latest_ = seek_point.t;

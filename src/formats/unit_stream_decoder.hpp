@@ -7,23 +7,22 @@
 #include <vector>
 
 #include "src/core/sensor_size.hpp"
-#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
+#include "src/formats/event_decoder.hpp"
 #include "src/formats/seek_points.hpp"
 #include "src/formats/unit_decoder.hpp"
 #include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 
-/// Decoder for formats with a header followed by units of a few bytes.
-class UnitStreamDecoder : public Decoder {
+/// EventDecoder for formats with a header followed by units of a few bytes.
+class UnitStreamDecoder : public EventDecoder {
  public:
   /// For data without a header.
   UnitStreamDecoder(std::unique_ptr<UnitDecoder> decoder, SensorSize size);
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) final;
   void finish(Decoded& out) final;
-  void restart(const SeekPoint& seek_point) final;
 
  protected:
   UnitStreamDecoder() = default;
@@ -39,6 +38,7 @@ class UnitStreamDecoder : public Decoder {
   std::uint64_t units_begin() const { return units_begin_; }
 
  private:
+  void restore(const SeekPoint& seek_point) final;
   void read_headers(bool ended);
   std::size_t read_units(std::span<const std::uint8_t> bytes, Decoded& out);
 

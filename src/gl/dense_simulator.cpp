@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/gl/dense_simulator.hpp"
+#include "src/gl/simulator.hpp"
 
 #include <algorithm>
 
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/gl/farneback.hpp"
-#include "src/gl/interpolation.hpp"
+#include "src/gl/mark_kernels.hpp"
 #include "src/gl/shaders.hpp"
 
 namespace eventcamera::gl {

@@ -6,7 +6,7 @@
 
 #include "src/core/event_buckets.hpp"
 #include "src/core/luma.hpp"
-#include "src/gl/kernel.hpp"
+#include "src/gl/objects.hpp"
 #include "src/simulate/simulator.hpp"
 
 namespace eventcamera::gl {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/gl/frame_simulator.hpp"
+#include "src/gl/simulator.hpp"
 
-#include "src/gl/difference.hpp"
+#include "src/gl/mark_kernels.hpp"
 
 namespace eventcamera::gl {
 namespace {

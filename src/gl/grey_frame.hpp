@@ -3,7 +3,7 @@
 
 #include "src/core/luma.hpp"
 #include "src/core/rgb_luma.hpp"
-#include "src/gl/kernel.hpp"
+#include "src/gl/objects.hpp"
 
 namespace eventcamera::gl {
 

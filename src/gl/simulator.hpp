@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <memory>
+
 #include "src/gl/event_list.hpp"
-#include "src/gl/fence.hpp"
 #include "src/gl/grey_frame.hpp"
-#include "src/gl/picture.hpp"
+#include "src/gl/mark_kernels.hpp"
+#include "src/gl/objects.hpp"
 #include "src/simulate/simulator.hpp"
+#include "src/simulate/warp.hpp"
 
 namespace eventcamera::gl {
 
@@ -19,8 +22,8 @@ namespace eventcamera::gl {
 /// them. Each kernel is a compute shader (shaders/). Dense flow is computed in farneback, tracks in
 /// point_tracker, with the formulas and bounds of their namesakes in src/flow.
 ///
-/// To read events back without making the caller, or the GPU, wait, queue() the next frame before
-/// read() of the previous interval's events.
+/// To keep both the caller and the GPU busy, queue() the next frame before read() of the previous
+/// interval's events.
 class Simulator : public IntervalSimulator {
  public:
   static constexpr int max_queued = 2;  ///< maximum number of queued frames
@@ -79,5 +82,30 @@ class Simulator : public IntervalSimulator {
   int queued_ = 0;  ///< number of queued frames
   DrawKernel draw_;
 };
+
+/// Like eventcamera::make_frame_simulator(); the same luma gives the same events.
+std::unique_ptr<Simulator> make_frame_simulator(const Context& gl, const LumaFormat& format);
+
+/// Like eventcamera::DenseSimulator, with Farneback's flow; the same flow gives the same events.
+/// Flow is always computed for the whole frame. If the CPU computes it only around changed pixels,
+/// pyramid and borders differ; otherwise the last bits of floating-point numbers may differ.
+class DenseSimulator : public Simulator {
+ public:
+  void set_interpolation(Interpolation interpolation) { interpolation_ = interpolation; }
+
+ protected:
+  using Simulator::Simulator;
+  Interpolation interpolation_ = Interpolation::forward;
+};
+
+std::unique_ptr<DenseSimulator> make_dense_simulator(const Context& gl, const LumaFormat& format);
+
+/// Like eventcamera::make_sparse_simulator(). The same tracks give the same events; tracks may
+/// differ in the last bits of floating-point numbers.
+std::unique_ptr<Simulator> make_sparse_simulator(const Context& gl, const LumaFormat& format);
+
+/// Like eventcamera::make_diff_simulator(). The same tracks give the same events; tracks may differ
+/// in the last bits of floating-point numbers.
+std::unique_ptr<Simulator> make_diff_simulator(const Context& gl, const LumaFormat& format);
 
 }  // namespace eventcamera::gl

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/gl/sparse_simulator.hpp"
+#include "src/gl/simulator.hpp"
 
 #include <algorithm>
 
-#include "src/gl/difference.hpp"
+#include "src/gl/mark_kernels.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/shaders.hpp"
 

@@ -46,7 +46,7 @@ struct Classification {
   double false_positive_rate = 0;  ///< the fraction of the noise that is kept
   double precision = 0;            ///< fraction of light among the kept events
 
-  /// Rates without any event to measure them are 0.
+  /// A rate is 0 without events to measure it.
   static Classification of(const CauseCounts& before, const CauseCounts& after) {
     const auto share = [](std::uint64_t part, std::uint64_t other) {
       const auto all = static_cast<double>(part) + static_cast<double>(other);

@@ -20,7 +20,8 @@ inline constexpr std::array<Microseconds, 3> match_distances = {1'000, 5'000, 10
 struct MatchFigures {
   /// Fraction of the events with a match within each of match_distances.
   std::array<double, match_distances.size()> shares{};
-  /// Mean distance to the nearest match; of events without one, the longest of match_distances.
+  /// Mean distance to the nearest match; events without one count as the longest of
+  /// match_distances.
   double nearest_distance = 0;  ///< microseconds
 };
 
@@ -40,7 +41,7 @@ class EventMatcher {
   /// stream.
   void add(StreamRole role, const AbsoluteEvent& event);
 
-  /// Of the events so far.
+  /// Similarity of the events so far.
   MatchFigures figures(StreamRole role) const;
 
  private:

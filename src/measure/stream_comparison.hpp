@@ -12,7 +12,6 @@
 #include "src/measure/cause_counts.hpp"
 #include "src/measure/event_rates.hpp"
 #include "src/measure/event_statistics.hpp"
-#include "src/measure/noise_ceiling.hpp"
 #include "src/measure/stream_role.hpp"
 #include "src/measure/stream_similarity.hpp"
 
@@ -36,11 +35,11 @@ class StreamComparison {
   /// The stream that lags behind; its events are needed next.
   StreamRole behind() const;
 
-  /// End of what was added of a stream; none before that.
+  /// End of the data added to a stream; none before the first.
   std::optional<Nanoseconds> end_of(StreamRole role) const;
 
   /// Adds the sorted events of [start, end] of one stream, with times relative to `base`, and their
-  /// labels, if they have any. Returns what was skipped.
+  /// labels, if they have any. Returns the numbers of skipped events.
   InvalidEvents add(StreamRole role, std::span<const Event> events, Microseconds base,
                     Nanoseconds start, Nanoseconds end, std::span<const Label> labels = {});
 

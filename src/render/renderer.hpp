@@ -10,12 +10,46 @@
 
 #include "src/core/event.hpp"
 #include "src/core/event_validator.hpp"
+#include "src/core/image.hpp"
 #include "src/render/decaying_sums.hpp"
 #include "src/render/event_window.hpp"
 #include "src/render/palette.hpp"
-#include "src/render/time_surface.hpp"
 
 namespace eventcamera {
+
+/// Age and polarity of the last event of each pixel.
+class TimeSurface {
+ public:
+  /// Events older than `max_age` > 0 are ignored.
+  TimeSurface(int width, int height, Microseconds max_age)
+      : max_age_(max_age), last_(width, height) {}
+
+  /// Adds an event, which must lie inside the picture and not be earlier than the last one.
+  void add(const AbsoluteEvent& event) {
+    last_.at(event.x, event.y()) = {event.t, event.polarity() == Polarity::on ? 1.0F : -1.0F};
+  }
+
+  /// Passes a value per pixel of a row to `take`: from 1 for an event at `time` down to 0 at
+  /// `max_age`; negative if the last event is OFF. `time` must not be before any event.
+  template <class Take>
+  void read_row(int y, Microseconds time, const Take& take) const {
+    const auto* row = last_.row(y);
+    const float scale = 1 / static_cast<float>(max_age_);
+    for (int x = 0; x < last_.width(); ++x) {
+      const Microseconds left = max_age_ - (time - row[x].time);
+      take(x, left > 0 ? row[x].sign * static_cast<float>(left) * scale : 0);
+    }
+  }
+
+ private:
+  struct Last {
+    Microseconds time = 0;
+    float sign = 0;  ///< 0 = no event
+  };
+
+  Microseconds max_age_;
+  Image<Last> last_;
+};
 
 enum class RenderMode {
   accumulate,    ///< polarities that fired within a window
@@ -37,8 +71,8 @@ struct RenderSettings {
 
 /// Draws pictures of the events up to given times. Events and pictures must be in time order.
 ///
-/// A picture has a pixel for each of the sensor's. If these are more than max_pixels, as a hostile
-/// file may state, it has one for 2x2, 3x3, ... of them.
+/// A picture has a pixel for each sensor pixel, or, if these are more than max_pixels, as a hostile
+/// file may state, for each 2x2, 3x3, ... sensor pixels.
 class Renderer {
  public:
   static constexpr int max_pixels = 1 << 23;  ///< of a picture; 4K video fits
@@ -54,7 +88,7 @@ class Renderer {
 
   /// Adds sorted events whose times are relative to `start`. An event that is not later than the
   /// last picture is drawn in the next one; events outside the sensor, and those later than
-  /// `max_t`, are skipped. Returns what was skipped.
+  /// `max_t`, are skipped. Returns their numbers.
   InvalidEvents add(std::span<const Event> events, Microseconds start,
                     Microseconds max_t = std::numeric_limits<Microseconds>::max());
 
@@ -73,7 +107,7 @@ class Renderer {
   static Memory make_memory(int width, int height, const RenderSettings& settings);
   void shade_row(int y, Microseconds time);
 
-  int reduction_;  ///< pixels of the sensor a side of a pixel of the picture
+  int reduction_;  ///< sensor pixels along a side of a picture's pixel
   int width_;
   int height_;
   RenderSettings settings_;

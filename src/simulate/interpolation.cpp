@@ -186,7 +186,7 @@ constexpr int steps_at_once = 16;
 /// step, steps - 1, or `steps` if even the frame of step steps - 1 equals the last frame there.
 using FirstSteps = std::array<int, max_side / tile_width>;
 
-/// Pairs each pixel of rows [first, last) with the one below it, those of the bottom row with
+/// Pairs each pixel of rows [first, last) with the one below it; pixels of the bottom row with
 /// themselves.
 void pair_rows(const ImageView<std::uint8_t>& frame, int first, int last,
                Image<std::uint16_t>& pairs) {

@@ -12,10 +12,10 @@ namespace eventcamera {
 
 /// Tensors of successive windows of events.
 ///
-/// A voxel grid spans the time from the first to the last event of its window, as that of E2VID
-/// does (Rebecq et al., TPAMI 2019, section 3.2): an event at t adds its polarity, +1 or -1, to the
-/// two bins nearest to (bins - 1) (t - first) / (last - first), in proportion to their closeness.
-/// Events of a single instant are all in bin 0.
+/// A voxel grid spans the time from the first to the last event of its window, as in E2VID (Rebecq
+/// et al., TPAMI 2019, section 3.2): an event at t adds its polarity, +1 or -1, to the two bins
+/// nearest to (bins - 1) (t - first) / (last - first), in proportion to their closeness. Events of
+/// a single instant are all in bin 0.
 ///
 /// A time surface (Lagorce et al., TPAMI 2017) remembers the last events of earlier windows.
 class EventTensor {

@@ -49,7 +49,8 @@ WindowQueue::Added WindowQueue::add(std::span<const Event> events, Microseconds 
   validator_ = validator;
   events_.erase(out, events_.end());
 
-  // Of what does not fit, events of the next window are dropped, and later ones wait for it to go.
+  // Events that do not fit are dropped if they belong to the next window, else they wait for it to
+  // go.
   Nanoseconds complete = validator_.passed() * microsecond;
   if (settings_.events == 0) complete = std::max(complete, *start_ + settings_.duration);
   const auto rest = events.subspan(fitting.size());

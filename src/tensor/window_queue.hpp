@@ -12,8 +12,7 @@
 
 namespace eventcamera {
 
-/// Length of windows, by count if `events` > 0, else by time if `duration` > 0, else as so many
-/// intervals.
+/// Length of windows, by count if `events` > 0, else by time if `duration` > 0, else in intervals.
 struct WindowSettings {
   std::size_t events = 0;  ///< at most WindowQueue::max_events
   Nanoseconds duration = 0;
@@ -44,7 +43,7 @@ class WindowQueue {
     std::span<const AbsoluteEvent> events;  ///< valid until add() or reset()
   };
 
-  /// What became of the events of an interval.
+  /// Outcome of add().
   struct Added {
     InvalidEvents invalid{};           ///< dropped
     std::size_t excess = 0;            ///< dropped: more than max_events in a window
@@ -54,10 +53,10 @@ class WindowQueue {
   WindowQueue(int width, int height, const WindowSettings& settings)
       : settings_(settings), validator_(width, height) {}
 
-  /// Adds an interval, and those of its events that are in [start, end]; their times are relative
-  /// to `base`. Late events count as events of the end of the last window, or interval where
-  /// windows consist of intervals. Afterwards, call next() until there is no more window, and add
-  /// the events that are waiting, if any, again. Throws std::bad_alloc.
+  /// Adds an interval, and its events in [start, end]; their times are relative to `base`. Late
+  /// events count as events of the end of the last window, or interval where windows consist of
+  /// intervals. Afterwards, call next() until there is no more window, and add the events that are
+  /// waiting, if any, again. Throws std::bad_alloc.
   Added add(std::span<const Event> events, Microseconds base, Nanoseconds start, Nanoseconds end);
 
   /// Returns the next window if it is complete.

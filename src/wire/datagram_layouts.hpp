@@ -14,7 +14,6 @@
 #include "src/core/byte_order.hpp"
 #include "src/core/event.hpp"
 #include "src/wire/datagram_settings.hpp"
-#include "src/wire/wrapped_time.hpp"
 
 /// Layouts of the datagrams of each format. A layout has
 ///
@@ -25,6 +24,28 @@
 /// - write(event, out): writes an event;
 /// - read(bytes, in): reads a received datagram, and returns why it is invalid, or null.
 namespace eventcamera::datagram_layouts {
+
+/// Unwraps 32-bit times in microseconds: each is assumed to be less than half the range (36
+/// minutes) from the expected time.
+class WrappedTime {
+ public:
+  Microseconds at(std::uint32_t t) {
+    if (!expected_) {
+      expected_ = t;
+    } else {
+      *expected_ += static_cast<std::int32_t>(t - static_cast<std::uint32_t>(*expected_));
+    }
+    return *expected_;
+  }
+
+  /// Advances the expected time.
+  void pass(Microseconds time) {
+    if (expected_) *expected_ += time;
+  }
+
+ private:
+  std::optional<Microseconds> expected_;
+};
 
 /// Largest time that fits into 64-bit nanoseconds.
 inline constexpr Microseconds max_time = std::numeric_limits<Nanoseconds>::max() / 1000;

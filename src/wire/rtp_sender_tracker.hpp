@@ -2,13 +2,25 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
-#include "src/wire/rtp_packet.hpp"
 #include "src/wire/rtp_payload.hpp"
 
 namespace eventcamera {
+
+inline constexpr std::uint64_t no_arrival = std::numeric_limits<std::uint64_t>::max();
+
+/// The parts of an RTP packet that a receiver of events needs.
+struct RtpPacket {
+  std::uint32_t ssrc;
+  std::uint16_t sequence_number;
+  bool marker;  ///< last packet of its interval
+  std::span<const std::uint8_t> payload;
+  std::uint64_t arrival = 0;  ///< nanoseconds, on any clock; `no_arrival` if unknown
+};
 
 /// Follows the packets of one sender.
 ///

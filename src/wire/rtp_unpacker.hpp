@@ -12,7 +12,6 @@
 #include "src/core/sensor_size.hpp"
 #include "src/formats/corruption.hpp"
 #include "src/formats/unit_decoder.hpp"
-#include "src/wire/rtp_packet.hpp"
 #include "src/wire/rtp_payload.hpp"
 #include "src/wire/rtp_sender_tracker.hpp"
 
@@ -37,7 +36,7 @@ struct RtpStatistics {
   std::uint64_t late_packets = 0;  ///< duplicate or out of order; dropped
   /// Not of this format, sensor or sender, or corrupt; dropped.
   std::uint64_t rejected_packets = 0;
-  std::uint64_t second_sender_packets = 0;  ///< of these, only the sender is wrong
+  std::uint64_t second_sender_packets = 0;  ///< rejected only because of their sender
 };
 
 /// Joins the packets of each interval. Drops packets that are invalid, late, or of a second sender,
@@ -81,8 +80,8 @@ class RtpUnpacker {
   const RtpStatistics& statistics() const { return statistics_; }
 
  private:
-  /// Decodes the events of a packet past the end of the current interval's. Nothing, and no other
-  /// change, if the packet is not valid in every detail.
+  /// Decodes a packet's events after those of the current interval. False, without any change, if
+  /// any part of the packet is invalid.
   std::optional<RtpPayloadHeader> decode(const RtpPacket& packet);
   bool decode_evt3(const RtpPayloadHeader& header, std::span<const std::uint8_t> words);
   bool decode_xytp(const RtpPayloadHeader& header, std::span<const std::uint8_t> bytes);

@@ -16,7 +16,7 @@ using namespace aedat_recordings;
 std::uint64_t place_of_corruption(const Bytes& bytes) {
   Aedat4Decoder decoder;
   decoder.push(bytes);
-  decoder.finish();
+  decoder.drain();
   while (decoder.next()) continue;
   EXPECT_GT(decoder.corruption().places, 0U);
   return decoder.corruption().first_at;

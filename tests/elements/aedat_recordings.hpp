@@ -126,7 +126,7 @@ struct Content {
   explicit Content(const Bytes& bytes) {
     Aedat4Decoder decoder;
     decoder.push(bytes);
-    decoder.finish();
+    decoder.drain();
     const auto append = [](auto& to, const auto& more) {
       to.insert(to.end(), more.begin(), more.end());
     };

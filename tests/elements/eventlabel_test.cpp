@@ -315,7 +315,9 @@ TEST_F(EventLabel, StartsOverWithEventsThatAreFlushedAlone) {
   push_segment(events.get());
   push_events(12 * ms, {0, 1, 2}, 30 * ms);
   push_image(80 * ms, 6);
-  EXPECT_EQ(classes(), (Classes{2, 2, 2}));
+  auto labelled = classes();
+  if (last_pts < 12 * ms) labelled = classes();  // an aggregation in progress finishes its buffer
+  EXPECT_EQ(labelled, (Classes{2, 2, 2}));
 }
 
 /// A live source of events, and images that never come.

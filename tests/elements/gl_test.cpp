@@ -482,15 +482,18 @@ TEST_P(EitherOutput, IsNotMistakenForTheFrameWhereItHasEnded) {
 
 TEST_P(EitherOutput, HoldsFramesUntilItHasReadThem) {
   for (int i = 0; i < 3; ++i) {
-    const Buffer frame(flashes.frame());
-    const auto is_held = [&frame] { return GST_MINI_OBJECT_REFCOUNT_VALUE(frame.get()) > 1; };
+    GstBuffer* const frame = flashes.frame();
+    bool is_held = true;
+    gst_mini_object_weak_ref(
+        GST_MINI_OBJECT(frame),
+        +[](gpointer held, GstMiniObject*) { *static_cast<bool*>(held) = false; }, &is_held);
     is_busy = true;
-    EXPECT_EQ(h.push(gst_buffer_ref(frame.get())), GST_FLOW_OK);
-    EXPECT_TRUE(is_held()) << i;
+    EXPECT_EQ(h.push(frame), GST_FLOW_OK);
+    EXPECT_TRUE(is_held) << i;
     is_busy = false;
     gst_harness_push_event(
         h.get(), gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("any")));
-    EXPECT_FALSE(is_held()) << i;
+    EXPECT_FALSE(is_held) << i;
   }
 }
 

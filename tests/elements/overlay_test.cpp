@@ -14,10 +14,14 @@ constexpr GstClockTime ms = GST_MSECOND;
 class OverlayTest : public testing::Test {
  protected:
   explicit OverlayTest(const std::string& launch = "eventoverlay palette=grey")
-      : overlay(launch, "video_sink", "event_sink") {}
+      : overlay(launch, "video_sink", "event_sink") {
+    gst_harness_set_sink_caps_str(video.get(), "video/x-raw, format=GRAY8");
+  }
 
   void begin(const std::string& sensor_size, const std::string& format = "GRAY8",
-             const std::string& framerate = "25/1") {
+             const std::string& framerate = "25/1", const std::string& shown = {}) {
+    gst_harness_set_sink_caps_str(
+        video.get(), ("video/x-raw, format=" + (shown.empty() ? format : shown)).c_str());
     gst_harness_set_src_caps_str(
         video.get(),
         ("video/x-raw, format=" + format + ", width=8, height=4, framerate=" + framerate).c_str());
@@ -165,6 +169,33 @@ TEST_F(OverlayTest, LetsDownstreamChangeTheFormatOfTheVideo) {
   while (const Owned<GstEvent> event{gst_harness_try_pull_upstream_event(video.get())})
     is_passed = is_passed || GST_EVENT_TYPE(event.get()) == GST_EVENT_RECONFIGURE;
   EXPECT_TRUE(is_passed);
+}
+
+TEST_F(OverlayTest, DrawsInColourOverGreyVideo) {
+  g_object_set(overlay.element.get(), "palette", 3, nullptr);  // red-blue
+  begin("width=8, height=4", "GRAY8", "25/1", "{ RGB, GRAY8 }");
+  push_frame(0);
+  push_events(0, {Event::at(1, 0, 5, Polarity::off)});
+  const Buffer frame(gst_harness_pull(video.get()));
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(GST_BUFFER_PTS(frame.get()), 0U);
+  EXPECT_EQ(GST_BUFFER_DURATION(frame.get()), 40 * ms);
+  const auto bytes = bytes_of(frame.get());
+  ASSERT_EQ(bytes.size(), 96U);
+  EXPECT_EQ(bytes.substr(0, 3), "ddd");                                     // grey 100
+  EXPECT_GT(static_cast<guint8>(bytes[3]), static_cast<guint8>(bytes[5]));  // red
+}
+
+TEST(Overlay, TakesGreyVideoThatIsShownInColour) {
+  for (const char* shown : {"RGBA", "GRAY8"}) {
+    Pipeline pipeline(
+        "videotestsrc num-buffers=3 ! video/x-raw,format=GRAY8 ! tee name=t  t. ! queue ! "
+        "eventoverlay name=overlay ! capsfilter name=shown caps=video/x-raw,format=" +
+        std::string(shown) +
+        " ! fakesink name=sink  t. ! queue ! eventsim-diff ! overlay.event_sink");
+    EXPECT_TRUE(pipeline.play()) << shown << pipeline.error;
+    EXPECT_EQ(pipeline.stat("sink", "rendered"), 3U);
+  }
 }
 
 TEST_F(OverlayTest, ScalesTheSensorToTheVideo) {

@@ -93,11 +93,10 @@ TEST_P(Memory, DoesNotGrowFrameByFrame) {
     const auto heap = Resources::now().heap;
     growths.push_back(static_cast<std::ptrdiff_t>(heap - std::exchange(last_heap, heap)));
   }
-  // Less than a pointer per frame in half of them, but for what comes and goes. A driver, or a
-  // thread that gets most of a frame for the first time because the machine is busy, may allocate
-  // late, but not all the time.
+  // A leak grows the heap in every tenth, by less than a pointer per frame here. Drivers and their
+  // threads allocate late and in steps, on a busy machine in up to half of the tenths.
   std::ranges::sort(growths);
-  EXPECT_LE(growths[growths.size() / 2], frames / 10 * 7 + 1024) << testing::PrintToString(growths);
+  EXPECT_LE(growths[growths.size() / 4], frames / 10 * 7 + 1024) << testing::PrintToString(growths);
 }
 
 class OnTheCpu : public testing::TestWithParam<const char*> {};

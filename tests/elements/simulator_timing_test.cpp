@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Times and order of intervals, and discontinuities between frames.
+#include <algorithm>
 #include <span>
 
 #include "tests/elements/harness.hpp"
@@ -14,12 +15,20 @@ const std::string uneven = "video/x-raw, format=GRAY8, width=32, height=24, fram
 class EverySimulator : public testing::TestWithParam<const char*> {
  protected:
   EverySimulator() : h(GetParam()) {}
+  explicit EverySimulator(GstHarness* bare) : h(bare, GetParam()) {}
 
   /// A frame that differs from the one before.
   GstFlowReturn flash(GstClockTime pts, guint flags = 0) {
     bright = !bright;
     GstBuffer* buffer = h.flat(pts, bright ? 200 : 50);
     GST_BUFFER_FLAG_SET(buffer, flags);
+    return h.push(buffer);
+  }
+
+  /// The last frame again, flagged as videorate flags its copies.
+  GstFlowReturn repeat(GstClockTime pts) {
+    GstBuffer* buffer = h.flat(pts, bright ? 200 : 50);
+    GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_GAP);
     return h.push(buffer);
   }
 
@@ -36,6 +45,14 @@ class EverySimulator : public testing::TestWithParam<const char*> {
   bool bright = false;
 };
 INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
+
+/// Simulators on the GPU upload their frames: glupload drops flags.
+class EverySimulatorAlone : public EverySimulator {
+ protected:
+  EverySimulatorAlone()
+      : EverySimulator((gst_init(nullptr, nullptr), gst_harness_new_parse(GetParam()))) {}
+};
+INSTANTIATE_TEST_SUITE_P(, EverySimulatorAlone, testing::ValuesIn(simulators));
 
 TEST_P(EverySimulator, MakesOneIntervalLessThanThereAreFrames) {
   h.caps(video);
@@ -69,14 +86,12 @@ TEST_P(EverySimulator, DrawsAPictureForEveryFrameAtItsTime) {
   for (int i = 0; i < 6; ++i) {
     GstBuffer* frame = h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, i < 3 ? 60 : 200);
     GST_BUFFER_DURATION(frame) = 39 * GST_MSECOND;
-    GST_BUFFER_FLAG_SET(frame, GST_BUFFER_FLAG_GAP);  // as set by videorate on its copies
     if (i == 5) GST_BUFFER_FLAG_SET(frame, GST_BUFFER_FLAG_DISCONT);
     h.push(frame);
     const auto picture = h.pull();
     ASSERT_TRUE(picture) << i;
     EXPECT_EQ(GST_BUFFER_PTS(picture.get()), i * 40 * GST_MSECOND);
     EXPECT_EQ(GST_BUFFER_DURATION(picture.get()), 39 * GST_MSECOND);
-    EXPECT_FALSE(GST_BUFFER_FLAG_IS_SET(picture.get(), GST_BUFFER_FLAG_GAP));
     EXPECT_EQ(GST_BUFFER_IS_DISCONT(picture.get()), i == 5);
     pictures.push_back(bytes_of(picture.get()));
   }
@@ -257,13 +272,32 @@ TEST_P(EverySimulator, WarnsOfTimeThatRunsBackwards) {
   EXPECT_FALSE(h.pull());
   flash(140 * GST_MSECOND);
   expect_interval(60 * GST_MSECOND, 140 * GST_MSECOND);
-  EXPECT_EQ(flash(140 * GST_MSECOND), GST_FLOW_OK);  // equal times are not accepted, either
-  EXPECT_FALSE(h.pull());
   EXPECT_NE(h.warning().find("not later"), std::string::npos);
 }
 
-TEST_P(EverySimulator, TakesNoIntervalShorterThanTheResolutionOfEvents) {
+/// As from decoders, where the timestamps of a file are not in the order of its frames.
+TEST_P(EverySimulator, SpacesFramesOfTheSameTimestamp) {
   h.caps(video);
+  for (const auto pts : {0, 40, 40, 80, 80, 80, 80}) flash(pts * GST_MSECOND);
+  flash(240 * GST_MSECOND);
+  flash(240 * GST_MSECOND + 1);  // less than a microsecond later
+  for (int i = 0; i < 3; ++i) {  // a stream of them
+    GstBuffer* const frame = h.flat(0, i % 2 * 100);
+    GST_BUFFER_DURATION(frame) = 30 * GST_MSECOND;
+    GST_BUFFER_FLAG_SET(frame, i == 0 ? GST_BUFFER_FLAG_DISCONT : 0);
+    h.push(frame);
+  }
+  const GstClockTime times[] = {0, 40, 60, 80, 100, 140, 180, 240, 260};
+  for (std::size_t i = 1; i < std::size(times); ++i)
+    expect_interval(times[i - 1] * GST_MSECOND, times[i] * GST_MSECOND);
+  expect_interval(0, 30 * GST_MSECOND);
+  expect_interval(30 * GST_MSECOND, 60 * GST_MSECOND);
+  EXPECT_NE(h.warning().find("the same one"), std::string::npos);
+  EXPECT_EQ(h.warning(), "");
+}
+
+TEST_P(EverySimulator, TakesNoIntervalShorterThanTheResolutionOfEvents) {
+  h.caps(uneven);
   flash(1500);
   EXPECT_EQ(flash(2300), GST_FLOW_OK);
   EXPECT_FALSE(h.pull());
@@ -328,6 +362,75 @@ TEST_P(EverySimulator, LosesNoFrameThatAGapOvertook) {
     expect_interval(times[i - 1] * GST_MSECOND, times[i] * GST_MSECOND);
   EXPECT_FALSE(h.pull());
   EXPECT_EQ(h.warning(), "");
+}
+
+TEST_P(EverySimulatorAlone, ContinuesAnIntervalThroughRepeatedFrames) {
+  h.caps(video);
+  flash(0);
+  repeat(40 * GST_MSECOND);
+  flash(80 * GST_MSECOND);
+  expect_interval(0, 80 * GST_MSECOND);
+  GstBuffer* const frame = h.flat(120 * GST_MSECOND, 0);  // darker than any mean of frames
+  h.push(gst_buffer_ref(frame));
+  expect_interval(80 * GST_MSECOND, 120 * GST_MSECOND);
+  GstBuffer* const again = gst_buffer_copy(frame);  // as imagefreeze sends its picture
+  gst_buffer_unref(frame);
+  GST_BUFFER_PTS(again) = 160 * GST_MSECOND;
+  h.push(again);
+  EXPECT_FALSE(h.pull());
+  flash(200 * GST_MSECOND);
+  expect_interval(120 * GST_MSECOND, 200 * GST_MSECOND);
+  EXPECT_EQ(stat_of(h.element(), "repeated-frames"), 2U);
+  EXPECT_EQ(h.warning(), "");
+}
+
+TEST_P(EverySimulatorAlone, DrawsTheLastPictureForRepeatedFrames) {
+  h.caps(video, pictures_of(GetParam()));
+  flash(0);
+  const auto empty = bytes_of(h.pull().get());
+  flash(40 * GST_MSECOND);
+  const auto picture = bytes_of(h.pull().get());
+  EXPECT_FALSE(picture == empty);
+  repeat(80 * GST_MSECOND);
+  const auto repeated = h.pull();
+  ASSERT_TRUE(repeated);
+  EXPECT_EQ(GST_BUFFER_PTS(repeated.get()), 80 * GST_MSECOND);
+  EXPECT_FALSE(GST_BUFFER_IS_DISCONT(repeated.get()));
+  EXPECT_TRUE(bytes_of(repeated.get()) == picture);
+  h.push(h.flat(120 * GST_MSECOND, 50));  // as at 40 ms, in other memory: the scene is still
+  EXPECT_TRUE(h.pull());
+  EXPECT_EQ(stat_of(h.element(), "repeated-frames"), 1U);
+}
+
+TEST_P(EverySimulatorAlone, TakesAPictureThatIsRepeatedForASecondForAStillScene) {
+  h.caps(video);
+  flash(0);
+  for (int i = 1; i <= 30; ++i) repeat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND);
+  EXPECT_EQ(stat_of(h.element(), "repeated-frames"), 25U);
+}
+
+TEST_P(EverySimulator, ComparesFramesOnlyIfItShould) {
+  for (const bool compares : {false, true}) {
+    Harness other(GetParam());
+    g_object_set(other.element(), "skip-repeated", compares, nullptr);
+    other.caps(video);
+    const int greys[] = {50, 200, 200, 50, 50, 50, 200};
+    for (std::size_t i = 0; i < std::size(greys); ++i)
+      other.push(other.flat(i * 40 * GST_MSECOND, greys[i]));
+    other.wait_for_events();
+    std::vector<GstClockTime> starts;
+    while (const auto events = other.pull())
+      starts.push_back(GST_BUFFER_PTS(events.get()) / GST_MSECOND);
+    while (const auto gap = other.pull_event(GST_EVENT_GAP))
+      starts.push_back(gap_of(gap.get()).start / GST_MSECOND);
+    std::ranges::sort(starts);
+    // The second of three equal frames is a repetition, the third one tells that nothing moves.
+    const std::vector<GstClockTime> expected =
+        compares ? std::vector<GstClockTime>{0, 40, 120, 200}
+                 : std::vector<GstClockTime>{0, 40, 80, 120, 160, 200};
+    EXPECT_EQ(starts, expected);
+    EXPECT_EQ(stat_of(other.element(), "repeated-frames"), compares ? 2U : 0U);
+  }
 }
 
 /// As from matroskademux, after the first frame of files with sound.
@@ -465,6 +568,20 @@ TEST(Dvs, SendsTheNoiseOfAGap) {
   ASSERT_TRUE(next);
   EXPECT_EQ(GST_BUFFER_PTS(next.get()), 100 * GST_MSECOND);
   EXPECT_EQ(GST_BUFFER_DURATION(next.get()), 40 * GST_MSECOND);
+}
+
+TEST(Dvs, SendsTheNoiseOfAPictureThatIsRepeated) {
+  Harness h("eventsim-dvs leak-rate=100");
+  h.caps(video);
+  for (int i = 0; i <= 50; ++i) {
+    GstBuffer* frame = h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, 90);
+    GST_BUFFER_FLAG_SET(frame, i % 10 > 0 ? GST_BUFFER_FLAG_GAP : 0);
+    h.push(frame);
+  }
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  std::size_t events = 0;
+  while (const auto interval = h.pull()) events += events_of(interval.get()).size();
+  EXPECT_NEAR(static_cast<double>(events), 32 * 24 * 200.0, 32 * 24);
 }
 
 TEST(Dvs, SendsTheNoiseOfAGapOfAnyLength) {

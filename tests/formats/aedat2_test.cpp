@@ -122,7 +122,7 @@ TEST(Aedat2, TheHeaderOrTheUserTellsTheSizeOfADavis) {
       Aedat2Decoder decoder(line.empty() ? size : SensorSize{});
       EXPECT_TRUE(decoded(decoder, bytes).events == events) << line;
       EXPECT_EQ(decoder.size(), size);
-      EXPECT_FALSE(decoder.is_mirrored());
+      EXPECT_FALSE(decoder.streams().front().mirrored);
     }
   }
   auto bytes = aedat_files::aedat2_header("DAVI346");
@@ -139,7 +139,7 @@ TEST(Aedat2, WithoutASizeEventsStayMirrored) {
     Aedat2Decoder decoder;
     auto turned = decoded(decoder, aedat_files::aedat2_v2e(events, size), piece).events;
     EXPECT_EQ(decoder.size(), SensorSize{});
-    EXPECT_TRUE(decoder.is_mirrored());
+    EXPECT_TRUE(decoder.streams().front().mirrored);
     for (auto& event : turned)
       event = AbsoluteEvent::at(239 - event.x, 179 - event.y(), event.t, event.polarity());
     EXPECT_TRUE(turned == events);

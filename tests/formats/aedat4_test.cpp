@@ -76,7 +76,7 @@ Contents decoded(Aedat4Decoder& decoder, std::span<const std::uint8_t> bytes,
     decoder.push({copy.get(), part.size()});
     take(decoder, contents);
   }
-  decoder.finish();
+  decoder.drain();
   take(decoder, contents);
   contents.events.resize(decoder.streams().size());
   return contents;

@@ -4,7 +4,10 @@
 // corrupt parts.
 #include <gtest/gtest.h>
 
+#include <sqlite3.h>
+
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -42,7 +45,7 @@ struct Contents {
   std::vector<Trigger> triggers;
 };
 
-void take(RecordingDecoder& decoder, Contents& out) {
+void take(Decoder& decoder, Contents& out) {
   while (const auto item = decoder.next()) {
     if (const auto* events = std::get_if<EventItem>(&*item)) {
       out.events.insert(out.events.end(), events->events.begin(), events->events.end());
@@ -60,7 +63,7 @@ void take(RecordingDecoder& decoder, Contents& out) {
 }
 
 /// Pushes bytes in pieces, which are invalid once they have been read.
-void push(RecordingDecoder& decoder, std::span<const std::uint8_t> bytes, Contents& out,
+void push(Decoder& decoder, std::span<const std::uint8_t> bytes, Contents& out,
           std::size_t piece = std::size_t{1} << 20) {
   for (const auto part : pieces::of(bytes, piece)) {
     const auto copy = std::make_unique<std::uint8_t[]>(part.size());
@@ -68,11 +71,11 @@ void push(RecordingDecoder& decoder, std::span<const std::uint8_t> bytes, Conten
     decoder.push({copy.get(), part.size()});
     take(decoder, out);
   }
-  decoder.finish();
+  decoder.drain();
   take(decoder, out);
 }
 
-Contents decoded(RecordingDecoder& decoder, std::span<const std::uint8_t> bytes,
+Contents decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
                  std::size_t piece = std::size_t{1} << 20) {
   Contents contents;
   push(decoder, bytes, contents, piece);
@@ -146,7 +149,7 @@ TEST_F(Bags, HaveTheirEventsAndFrames) {
       for (const auto& stream : decoder->streams())
         EXPECT_EQ(stream.size, stream.kind == StreamKind::events ? (SensorSize{346, 260})
                                                                  : (SensorSize{86, 65}));
-      EXPECT_EQ(decoder->left_out(), "topics /second/events");
+      EXPECT_EQ(decoder->unread_topics(), "topics /second/events");
     }
   }
 }
@@ -417,6 +420,100 @@ TEST(Databases, OfManyMessagesAreReadWhole) {
   EXPECT_EQ(contents.events, events);
   EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
   EXPECT_EQ(decoder.last_time(), events.back().t);
+}
+
+/// A database made by statements of SQL.
+Bytes database_of(const std::string& statements) {
+  sqlite3* database = nullptr;
+  sqlite3_open(":memory:", &database);
+  char* error = nullptr;
+  sqlite3_exec(database, ("PRAGMA page_size = 512;" + statements).c_str(), nullptr, nullptr,
+               &error);
+  EXPECT_EQ(error, nullptr) << error;
+  sqlite3_int64 count = 0;
+  auto* const bytes = sqlite3_serialize(database, "main", &count, 0);
+  Bytes file(bytes, bytes + count);
+  sqlite3_free(bytes);
+  sqlite3_close(database);
+  return file;
+}
+
+/// What the decoder says of a database, which must take less than a second.
+std::string refusal_of(const Bytes& bytes) {
+  const auto start = std::chrono::steady_clock::now();
+  std::string refusal;
+  MemoryBytes source(bytes);
+  BagDecoder decoder("");
+  try {
+    decoder.open(source);
+    Contents contents;
+    push(decoder, {}, contents);
+  } catch (const UnsupportedFormat& error) {
+    refusal = error.what();
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(1));
+  return refusal;
+}
+
+const std::string topics_table =
+    "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT);"
+    "INSERT INTO topics VALUES (1, '/dvs/events', 'dvs_msgs/msg/EventArray', 'cdr');";
+
+TEST(Databases, RunNoFunctions) {
+  const std::string columns = "id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data";
+  const std::string stored = topics_table + "CREATE TABLE stored(" + columns +
+                             "); INSERT INTO stored VALUES (1, 1, 1, x'00');";
+  const std::string tables[] = {
+      topics_table + "CREATE TABLE messages(" + columns +
+          " AS (0)); INSERT INTO messages VALUES (1, 1, 1);",
+      topics_table +
+          "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id AS (0),"
+          " timestamp INTEGER, data); INSERT INTO messages VALUES (1, 1, x'00');",
+      topics_table + "CREATE TABLE messages(" + columns + ", other AS (0));",
+      stored + "CREATE VIEW messages AS SELECT id, topic_id, timestamp, (0) AS data FROM stored;",
+      // a view that is listed as a table
+      stored +
+          "CREATE VIEW messages AS SELECT * FROM stored; PRAGMA writable_schema = 1;"
+          "UPDATE sqlite_schema SET type = 'table', rootpage = 3 WHERE name = 'messages';",
+      topics_table + "CREATE VIRTUAL TABLE messages USING fts5(topic_id, timestamp, data);",
+      "CREATE TABLE messages(" + columns + "); CREATE VIEW topics AS SELECT 1 AS id;",
+  };
+  // SQLite computes generated columns of rows that are inserted, so it gets the function last.
+  const std::string slow =
+      "PRAGMA writable_schema = 1; UPDATE sqlite_schema SET sql = replace(sql, '(0)',"
+      " '(instr(hex(zeroblob(5000000)), hex(zeroblob(2500000)) || ''1''))');";
+  for (const auto& statements : tables) {
+    SCOPED_TRACE(statements);
+    EXPECT_EQ(refusal_of(database_of(statements + slow)),
+              "this SQLite database is not a ROS 2 bag: it has no ordinary tables topics and "
+              "messages");
+  }
+}
+
+/// Each of 16 pages refers to the next 60 times, which makes 60^16 rows.
+TEST(Databases, WithPagesInCirclesEnd) {
+  auto bytes =
+      database_of(topics_table +
+                  "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp, data);"
+                  "INSERT INTO messages VALUES (1, 1, 1, zeroblob(20000));");
+  constexpr std::size_t page_size = 512;
+  constexpr std::uint8_t cells = 60;
+  const auto leaf = bytes.size() / page_size - 1;
+  std::copy_n(&bytes[page_size], page_size, &bytes[leaf * page_size]);  // of topics
+  for (std::size_t page = 1; page <= 16; ++page) {
+    const auto next = static_cast<std::uint8_t>(page == 16 ? leaf + 1 : page + 3);
+    const std::size_t at = (page == 1 ? page : page + 1) * page_size;  // page 3 is of messages
+    std::fill_n(&bytes[at], page_size, std::uint8_t{0});
+    bytes[at] = 5;
+    bytes[at + 4] = cells;
+    bytes[at + 5] = 1;
+    bytes[at + 11] = next;
+    for (std::size_t cell = 0; cell < cells; ++cell) bytes[at + 12 + 2 * cell] = 1;
+    for (std::size_t cell = 0; cell < cells; ++cell) bytes[at + 13 + 2 * cell] = 0xf0;
+    bytes[at + 0x1f0 + 3] = next;
+    bytes[at + 0x1f0 + 4] = 1;
+  }
+  EXPECT_EQ(refusal_of(bytes), "");
 }
 
 TEST_F(Bags, HaveTheSensorSizeOfTheirFirstPacket) {

@@ -19,7 +19,7 @@ struct Format {
   std::string name;
   int max_side;
   Microseconds max_pause;  ///< maximum that it supports, or that tests have time for
-  std::function<std::unique_ptr<Decoder>(SensorSize)> make_decoder;
+  std::function<std::unique_ptr<EventDecoder>(SensorSize)> make_decoder;
   std::function<std::unique_ptr<Encoder>(SensorSize)> make_encoder;
 };
 

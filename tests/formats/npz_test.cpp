@@ -29,7 +29,7 @@ struct Read {
   Corruption corruption;
 };
 
-Read all_of(RecordingDecoder& reader) {
+Read all_of(Decoder& reader) {
   Read read;
   read.size = reader.streams().front().size;
   while (const auto item = reader.next()) {
@@ -47,7 +47,7 @@ Read read(const Bytes& bytes, const TableSettings& settings = {}) {
     pushed->push(std::span(bytes).subspan(at, std::min<std::size_t>(1000, bytes.size() - at)));
     EXPECT_FALSE(pushed->next());
   }
-  pushed->finish();
+  pushed->drain();
   MemoryBytes source(bytes);
   const auto pulled = make_npz_decoder(settings);
   EXPECT_TRUE(pulled->open(source));

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "src/core/sensor_size.hpp"
-#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
+#include "src/formats/event_decoder.hpp"
 
 namespace eventcamera::pieces {
 
@@ -31,7 +31,7 @@ inline std::vector<std::span<const std::uint8_t>> of(std::span<const std::uint8_
 }
 
 /// Decodes everything, each piece in its own memory.
-inline Decoded decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
+inline Decoded decoded(EventDecoder& decoder, std::span<const std::uint8_t> bytes,
                        std::size_t piece = std::size_t{1} << 20) {
   Decoded out;
   for (const auto part : of(bytes, piece)) {

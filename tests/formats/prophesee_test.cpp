@@ -197,7 +197,7 @@ TEST(Written, IsForSensorsThatTheWordsCanAddress) {
 
 // Headers.
 
-std::unique_ptr<Decoder> decoder_after(const std::string& header, Decoded& decoded) {
+std::unique_ptr<EventDecoder> decoder_after(const std::string& header, Decoded& decoded) {
   auto decoder = make_prophesee_raw_decoder();
   Bytes bytes(header.begin(), header.end());
   decoder->decode(bytes, decoded);

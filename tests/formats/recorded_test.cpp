@@ -8,8 +8,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "src/formats/event_decoder.hpp"
 #include "src/formats/evt/raw.hpp"
-#include "src/formats/one_stream_decoder.hpp"
 #include "src/formats/recording_reader.hpp"
 #include "tests/formats/evt_validator.hpp"
 #include "tests/formats/recordings.hpp"
@@ -82,8 +82,7 @@ TEST(Recorded, PlaysEveryEventInTheOrderOfTheFile) {
     auto events = recordings::decode(*make_prophesee_raw_decoder(), bytes_of(name)).events;
     std::ranges::stable_sort(events, {}, &AbsoluteEvent::t);
     MemoryBytes bytes(bytes_of(name));
-    RecordingReader reader(
-        [] { return std::make_unique<OneStreamDecoder>(make_prophesee_raw_decoder()); }, 10'000);
+    RecordingReader reader([] { return make_prophesee_raw_decoder(); }, 10'000);
     reader.open(bytes);
     std::vector<AbsoluteEvent> played;
     while (const auto output = reader.next())

@@ -18,10 +18,10 @@
 #include "src/formats/aedat/aedat_decoder.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/es/es.hpp"
+#include "src/formats/event_decoder.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
-#include "src/formats/one_stream_decoder.hpp"
 #include "tests/formats/pieces.hpp"
 #include "tests/formats/recordings.hpp"
 
@@ -56,14 +56,14 @@ struct File {
 File raw_file() {
   const auto encoder = make_prophesee_raw_encoder(EvtFormat::evt3, sensor);
   return {"raw", recordings::encode(*encoder, some_events()),
-          [] { return std::make_unique<OneStreamDecoder>(make_prophesee_raw_decoder()); }};
+          [] { return make_prophesee_raw_decoder(); }};
 }
 
 /// Without a stated size, and readable only from the start.
 File npy_file() {
   NpyEncoder encoder;
   return {"npy", recordings::encode(encoder, some_events()),
-          [] { return std::make_unique<OneStreamDecoder>(std::make_unique<NpyDecoder>()); }};
+          [] { return std::make_unique<NpyDecoder>(); }};
 }
 
 /// Events, and a frame every 100 ms, starting 50 ms earlier, whose pixels contain its number.
@@ -436,9 +436,7 @@ TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
     encoder->encode_trigger(triggers.back(), bytes);
   }
   encoder->finish(bytes);
-  const auto make_decoder = [] {
-    return std::make_unique<OneStreamDecoder>(make_prophesee_raw_decoder());
-  };
+  const auto make_decoder = [] { return make_prophesee_raw_decoder(); };
   for (const std::size_t size : {1UL, 0UL, 1UL << 24}) {
     RecordingReader reader(make_decoder, chunk_length);
     std::vector<Trigger> found;
@@ -493,9 +491,7 @@ TEST(RecordingReader, DoesNotCollectTriggersWithoutEvents) {
   const auto events = some_events();
   const auto half = events.size() / 2;  // before a silence
   const auto encoder = make_prophesee_raw_encoder(EvtFormat::evt3, sensor);
-  RecordingReader reader(
-      [] { return std::make_unique<OneStreamDecoder>(make_prophesee_raw_decoder()); },
-      chunk_length);
+  RecordingReader reader([] { return make_prophesee_raw_decoder(); }, chunk_length);
   Outcome outcome;
   Bytes bytes;
   const auto read = [&] {
@@ -543,7 +539,7 @@ File growing_file() {
                                        i % 2 == 0 ? Polarity::off : Polarity::on));
   NpyEncoder encoder;
   return {"growing", recordings::encode(encoder, events),
-          [] { return std::make_unique<OneStreamDecoder>(std::make_unique<NpyDecoder>()); }};
+          [] { return std::make_unique<NpyDecoder>(); }};
 }
 
 TEST(RecordingReader, GrowsAnAssumedSensorBeforeTheEventsThatNeedIt) {
@@ -664,8 +660,7 @@ TEST(RecordingReader, ReadsTheDurationOfFixedRecordsAtTheEnd) {
     RecordingReader::MakeDecoder make_decoder;
   } files[] = {
       {npy, many_events(7, 100), npy_file().make_decoder},
-      {*dat, many_events(hour, 8'000),
-       [] { return std::make_unique<OneStreamDecoder>(make_dat_decoder()); }},
+      {*dat, many_events(hour, 8'000), [] { return make_dat_decoder(); }},
   };
   for (const auto& [encoder, events, make_decoder] : files) {
     MemoryBytes bytes(recordings::encode(encoder, events));
@@ -692,9 +687,7 @@ TEST(RecordingReader, FindsTheFirstEventsAfterALongSilence) {
   MemoryBytes all(bytes);
   WatchedBytes source(bytes);
   for (ByteSource* const from : std::initializer_list<ByteSource*>{&all, &source}) {
-    RecordingReader reader(
-        [] { return std::make_unique<OneStreamDecoder>(make_event_stream_decoder()); },
-        chunk_length);
+    RecordingReader reader([] { return make_event_stream_decoder(); }, chunk_length);
     reader.open(*from);
     Outcome outcome;
     outcome.take_all(reader);
@@ -711,16 +704,17 @@ TEST(RecordingReader, MovesWordsToTheTimeOfTheirStream) {
                       AbsoluteEvent::at(3, 4, 19'000, Polarity::off)};
   const auto encoder = make_evt_encoder(EvtFormat::evt3, sensor);
   const auto bytes = recordings::encode(*encoder, events);
-  RecordingReader reader(
-      [] { return std::make_unique<OneStreamDecoder>(make_evt_decoder(EvtFormat::evt3, sensor)); },
-      chunk_length, RecordingReader::Clock::stream);
-  EXPECT_FALSE(reader.reach(5'000'000));
+  RecordingReader reader([] { return make_evt_decoder(EvtFormat::evt3, sensor); }, chunk_length,
+                         RecordingReader::Clock::stream);
+  reader.advance_to(5'000'000);
+  EXPECT_FALSE(reader.has_events());
   const Microseconds hours = Microseconds{5} * 3600 * 1'000'000;
   reader.push(bytes, RecordingReader::Interval{hours, 10'000});
   Outcome outcome;
   outcome.take_all(reader);
   EXPECT_TRUE(outcome.chunks.empty());
-  EXPECT_TRUE(reader.reach(hours + 60'000'000));
+  reader.advance_to(hours + 60'000'000);
+  EXPECT_TRUE(reader.has_events());
   outcome.take_all(reader);
   EXPECT_EQ(outcome.events(0).size(), 2U);
   EXPECT_EQ(std::get<1>(outcome.chunks.front()), hours);
@@ -739,14 +733,13 @@ Bytes words_of(std::initializer_list<std::uint16_t> words) {
 }
 
 TEST(RecordingReader, KeepsNoStateOfWordsThroughADiscontinuity) {
-  RecordingReader reader(
-      [] { return std::make_unique<OneStreamDecoder>(make_evt_decoder(EvtFormat::evt3, sensor)); },
-      chunk_length, RecordingReader::Clock::stream);
+  RecordingReader reader([] { return make_evt_decoder(EvtFormat::evt3, sensor); }, chunk_length,
+                         RecordingReader::Clock::stream);
   Outcome outcome;
   const auto read = [&](const Bytes& words) {
     reader.push(words, RecordingReader::Interval{0, 0});
     outcome.take_all(reader);
-    reader.reach(chunk_length);
+    reader.advance_to(chunk_length);
     outcome.take_all(reader);
     return std::exchange(outcome.chunks, {});
   };
@@ -766,7 +759,7 @@ TEST(RecordingReader, KeepsNoStateOfWordsThroughADiscontinuity) {
 }
 
 TEST(RecordingReader, SaysWhatIsNoRecording) {
-  const auto make = [] { return std::make_unique<OneStreamDecoder>(make_prophesee_raw_decoder()); };
+  const auto make = [] { return make_prophesee_raw_decoder(); };
   RecordingReader pushed(make, chunk_length);
   pushed.finish();
   EXPECT_THROW(pushed.next(), UnsupportedFormat);

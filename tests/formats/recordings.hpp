@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "src/core/sensor_size.hpp"
-#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
+#include "src/formats/event_decoder.hpp"
 #include "src/formats/unsupported_format.hpp"
 
 namespace recordings {
@@ -79,7 +79,8 @@ inline std::vector<std::uint8_t> encode(Encoder& encoder, std::span<const Absolu
 
 /// Decodes everything, in pieces of `next_piece()` bytes.
 template <class NextPiece>
-Decoded decode(Decoder& decoder, std::span<const std::uint8_t> bytes, const NextPiece& next_piece) {
+Decoded decode(EventDecoder& decoder, std::span<const std::uint8_t> bytes,
+               const NextPiece& next_piece) {
   Decoded decoded;
   while (!bytes.empty()) {
     const auto piece = bytes.first(std::min<std::size_t>(bytes.size(), next_piece()));
@@ -90,12 +91,12 @@ Decoded decode(Decoder& decoder, std::span<const std::uint8_t> bytes, const Next
   return decoded;
 }
 
-inline Decoded decode(Decoder& decoder, std::span<const std::uint8_t> bytes) {
+inline Decoded decode(EventDecoder& decoder, std::span<const std::uint8_t> bytes) {
   return decode(decoder, bytes, [&] { return bytes.size(); });
 }
 
 /// Error of a decoder for a file; empty if it succeeds.
-inline std::string refusal(Decoder& decoder, std::span<const std::uint8_t> bytes) {
+inline std::string refusal(EventDecoder& decoder, std::span<const std::uint8_t> bytes) {
   try {
     decode(decoder, bytes);
   } catch (const UnsupportedFormat& exception) {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "src/core/sensor_size.hpp"
-#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
+#include "src/formats/event_decoder.hpp"
 
 namespace table_events {
 
@@ -74,8 +74,9 @@ inline Bytes encoded(Encoder& encoder, std::span<const AbsoluteEvent> events,
 }
 
 /// Feeds `bytes` in pieces of `size`, or of random sizes if it is 0.
-inline std::vector<AbsoluteEvent> decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
-                                          std::size_t size = 0, unsigned seed = 1) {
+inline std::vector<AbsoluteEvent> decoded(EventDecoder& decoder,
+                                          std::span<const std::uint8_t> bytes, std::size_t size = 0,
+                                          unsigned seed = 1) {
   std::mt19937 random(seed);
   Decoded out;
   while (!bytes.empty()) {

@@ -94,8 +94,8 @@ void read_file(const std::string& kind, const std::string& file, const std::stri
     }
     corruption = reader->corruption();
   } else {
-    const std::unique_ptr<Decoder> decoder =
-        kind == "npy" ? std::unique_ptr<Decoder>(std::make_unique<NpyDecoder>())
+    const std::unique_ptr<EventDecoder> decoder =
+        kind == "npy" ? std::unique_ptr<EventDecoder>(std::make_unique<NpyDecoder>())
                       : std::make_unique<CsvDecoder>();
     decoder->decode(load(file), out);
     decoder->finish(out);

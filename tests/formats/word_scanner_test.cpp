@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <string>
 
-#include "src/formats/decoder.hpp"
+#include "src/formats/event_decoder.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {
@@ -141,7 +141,7 @@ class Reader {
 
   Format format_;
   std::unique_ptr<WordScanner> scanner_;
-  std::unique_ptr<Decoder> decoder_;
+  std::unique_ptr<EventDecoder> decoder_;
   std::optional<Microseconds> shift_;
   std::size_t decoded_ = 0;
 };

@@ -25,7 +25,7 @@ void seek(AedatDecoder& reader, std::span<const std::uint8_t> bytes) {
   if (position < bytes.size()) reader.push(bytes.subspan(static_cast<std::size_t>(position)));
   Sums sums;
   take(reader, sums);
-  reader.finish();
+  reader.drain();
   take(reader, sums);
 }
 
@@ -37,7 +37,7 @@ Sums sums_of(std::span<const std::uint8_t> bytes, Pieces pieces) {
       reader.push(piece);
       take(reader, sums);
     });
-    reader.finish();
+    reader.drain();
     take(reader, sums);
   } catch (const UnsupportedFormat&) {
     sums.rest.add(std::uint64_t{1});

@@ -15,7 +15,7 @@ namespace {
 using namespace fuzz;
 
 /// Seeks to the time of the last event, and reads the rest.
-void seek(RecordingDecoder& reader, std::span<const std::uint8_t> bytes, Microseconds t) {
+void seek(Decoder& reader, std::span<const std::uint8_t> bytes, Microseconds t) {
   const auto point = reader.seek_point_before(t);
   if (!point) return;
   reader.restart(*point);
@@ -23,7 +23,7 @@ void seek(RecordingDecoder& reader, std::span<const std::uint8_t> bytes, Microse
     reader.push(bytes.subspan(static_cast<std::size_t>(point->position)));
   Sums sums;
   take(reader, sums);
-  reader.finish();
+  reader.drain();
   take(reader, sums);
 }
 
@@ -35,7 +35,7 @@ Sums sums_of(std::span<const std::uint8_t> bytes, Pieces pieces) {
       reader->push(piece);
       take(*reader, sums);
     });
-    reader->finish();
+    reader->drain();
     take(*reader, sums);
   } catch (const UnsupportedFormat&) {
     sums.rest.add(std::uint64_t{1});
@@ -55,7 +55,7 @@ void read_with_index(std::span<const std::uint8_t> bytes) {
     if (!reads_itself) {
       reader->push(bytes);
       take(*reader, sums);
-      reader->finish();
+      reader->drain();
     }
     take(*reader, sums);
     const auto last = reader->last_time();

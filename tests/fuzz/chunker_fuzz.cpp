@@ -65,7 +65,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         taken += take(chunker, end);
         break;
       case 2:
-        chunker.reach(static_cast<Microseconds>(t + step));
+        chunker.advance_to(static_cast<Microseconds>(t + step));
         break;
       case 3:
         chunker.pause(static_cast<Microseconds>(t + step));
@@ -79,7 +79,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   pushed += events.size();
   chunker.finish();
   taken += take(chunker, end);
-  const auto& dropped = chunker.dropped();
+  const auto dropped = chunker.dropped();
   require(taken + dropped.late + dropped.stray == pushed, "no event is lost");
   return 0;
 }

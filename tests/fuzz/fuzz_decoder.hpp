@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "src/core/sensor_size.hpp"
-#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
+#include "src/formats/event_decoder.hpp"
 #include "src/formats/unsupported_format.hpp"
 
 /// Invariants of every decoder for arbitrary bytes.
@@ -80,7 +80,7 @@ inline void require_within(SensorSize size, std::span<const AbsoluteEvent> event
 }
 
 /// Checks that the same events are read again from the seek point before all events.
-inline void require_restarts(Decoder& decoder, std::span<const std::uint8_t> bytes,
+inline void require_restarts(EventDecoder& decoder, std::span<const std::uint8_t> bytes,
                              const Decoded& before) {
   const auto seek_point = decoder.seek_point_before(std::numeric_limits<Microseconds>::min());
   if (!seek_point) return;

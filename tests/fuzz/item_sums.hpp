@@ -3,7 +3,7 @@
 
 #include <bit>
 
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace fuzz {
@@ -63,7 +63,7 @@ struct Sums {
   friend bool operator==(const Sums&, const Sums&) = default;
 };
 
-inline void take(RecordingDecoder& reader, Sums& sums) {
+inline void take(Decoder& reader, Sums& sums) {
   while (const auto item = reader.next()) {
     std::visit([&](const auto& some) { sums.add(some); }, *item);
     if (const auto* const some = std::get_if<EventItem>(&*item)) {

@@ -37,7 +37,7 @@ class Pieces {
 
  private:
   EvtFormat format_;
-  std::unique_ptr<Decoder> decoder_;
+  std::unique_ptr<EventDecoder> decoder_;
   Microseconds end_ = 0;
 };
 

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "src/flow/farneback/farneback.hpp"
-#include "src/gl/dense_simulator.hpp"
 #include "src/gl/farneback.hpp"
-#include "src/gl/interpolation.hpp"
+#include "src/gl/mark_kernels.hpp"
+#include "src/gl/simulator.hpp"
 #include "src/simulate/dense_simulator.hpp"
 #include "src/simulate/interpolation.hpp"
 #include "tests/gl/every_api.hpp"

@@ -12,11 +12,8 @@
 #include <vector>
 
 #include "src/flow/lucas_kanade/point_tracker.hpp"
-#include "src/gl/dense_simulator.hpp"
-#include "src/gl/diff_simulator.hpp"
-#include "src/gl/frame_simulator.hpp"
 #include "src/gl/point_tracker.hpp"
-#include "src/gl/sparse_simulator.hpp"
+#include "src/gl/simulator.hpp"
 #include "src/render/accumulator.hpp"
 #include "src/simulate/diff_simulator.hpp"
 #include "src/simulate/frame_simulator.hpp"

@@ -8,9 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "src/gl/diff_simulator.hpp"
 #include "src/gl/point_tracker.hpp"
-#include "src/gl/sparse_simulator.hpp"
+#include "src/gl/simulator.hpp"
 #include "tests/gl/every_api.hpp"
 #include "tests/reference/diff.hpp"
 #include "tests/reference/sparse.hpp"

@@ -7,10 +7,11 @@ source "$SOURCE/tests/pipelines/scratch_folder.sh"
 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=50 ! video/x-raw,format=I420,width=320,height=240,framerate=25/1 ! x264enc ! mp4mux ! filesink location=drive.mp4
 
 # Writes rendered.mkv, the times of its pictures, and their grey levels.
+rate=25
 render() { # EFFECT...
   echo "+clip drive.mp4 inpoint=0.4 duration=1.0 $*"
   timeout 120 ges-launch-1.0 +clip drive.mp4 inpoint=0.4 duration=1.0 "$@" --disable-mixing --track-types=video \
-    --video-caps=video/x-raw,width=320,height=240,framerate=25/1 --format=video/x-matroska:video/x-vp8 \
+    --video-caps="video/x-raw,width=320,height=240,framerate=$rate/1" --format=video/x-matroska:video/x-vp8 \
     -o rendered.mkv >log 2>&1 </dev/null || fail "$(cat log)"
   "$GST_LAUNCH" -v filesrc location=rendered.mkv ! matroskademux ! fakesink silent=false |
     sed -n 's/.*chain .*pts: \([0-9:.]*\),.*/\1/p' >times
@@ -33,4 +34,13 @@ for effect in "eventsim-diff ! videoconvert" "eventsim-dvs preset=davis346 ! vid
     read -r darkest brightest < <(levels $picture)
     [ $((brightest - darkest)) -gt 100 ] || fail "picture $picture has no events: $darkest to $brightest"
   done
+done
+
+# A project of 30 frames/s repeats each fifth frame of the clip; its picture is drawn again.
+rate=30
+render +effect "eventsim-diff ! videoconvert"
+[ "$(wc -l <times)" -eq 30 ] || fail "$(wc -l <times) pictures of 30"
+for picture in $(seq 29); do
+  read -r darkest brightest < <(levels "$picture")
+  [ $((brightest - darkest)) -gt 100 ] || fail "picture $picture of 30 has no events: $darkest to $brightest"
 done

@@ -6,10 +6,19 @@ source "$SOURCE/tests/pipelines/scratch_folder.sh"
 "$SOURCE/docs/describe-elements" "$work/pages"
 diff -r "$SOURCE/docs/elements" "$work/pages" || fail "run docs/describe-elements in the shell of: meson devenv -C build -w ."
 
-# A comment without an example is named.
+# A property that is newer than its element has its own version.
 mkdir docs
 cp "$SOURCE/docs/describe-elements" docs
-cp -r "$SOURCE/elements" .
+cp -r "$SOURCE/elements" "$SOURCE/gst" .
+printf '/**\n * GstEventCrop:top:\n *\n * Rows.\n *\n * Since: 7.5\n */\n' >>elements/eventcam/filters/eventcrop.cpp
+docs/describe-elements pages
+grep -q '^| `top` |.*| 7\.5 |' pages/eventcrop.md || fail "$(grep top pages/eventcrop.md)"
+grep -q '^| `left` |.*| 0\.1 |' pages/eventcrop.md || fail "$(grep left pages/eventcrop.md)"
+
+# A comment without a version or an example is named.
+sed -i 's/ \* Since: 0.1/ */' elements/eventcam/filters/eventcrop.cpp
+if docs/describe-elements pages 2>errors; then fail "eventcrop needs no version"; fi
+grep -q 'error: SECTION:element-eventcrop in .*"Since: VERSION"' errors || fail "$(cat errors)"
 sed -i 's/## Example launch line/## Example/' elements/eventcam/filters/eventcrop.cpp
 if docs/describe-elements pages 2>errors; then fail "eventcrop needs no example"; fi
 grep -q 'error: SECTION:element-eventcrop in .*"## Example launch line"' errors || fail "$(cat errors)"

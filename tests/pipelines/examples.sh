@@ -76,12 +76,10 @@ for language in py js c; do
   sed 's/eventsim-diff ! appsink name/appsink name/' "$SOURCE/pipelines/examples/on_and_off.$language" >"$work/video.$language"
 done
 export PKG_CONFIG_PATH=$BUILD/meson-uninstalled
-flags=$(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
-# shellcheck disable=SC2086
-cc -o "$work/on_and_off" "$SOURCE/pipelines/examples/on_and_off.c" $flags
+eval "flags=($(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0))" # escapes spaces
+cc -o "$work/on_and_off" "$SOURCE/pipelines/examples/on_and_off.c" "${flags[@]}"
 "$work/on_and_off" | diff "$work/expected" -
-# shellcheck disable=SC2086
-cc -o "$work/video" "$work/video.c" $flags
+cc -o "$work/video" "$work/video.c" "${flags[@]}"
 refused "receives no events; insert a simulator" "$work/video"
 refused "receives no events; insert a simulator" /usr/bin/python3 "$work/video.py"
 refused "receives no events; insert a simulator" gjs -m "$work/video.js"

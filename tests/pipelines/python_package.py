@@ -5,8 +5,11 @@
 import copy
 import itertools
 import multiprocessing
+import math
 import os
+import shlex
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -14,6 +17,7 @@ import threading
 import tracemalloc
 import unittest
 import unittest.mock
+import warnings
 
 if not os.path.exists(os.path.join(os.environ["GI_TYPELIB_PATH"], "GstEventCamera-1.0.typelib")):
     print("built without introspection: no Python")
@@ -51,6 +55,103 @@ def random_events(count, microseconds, seed=1, pixels=(WIDTH, HEIGHT)):
 
 def same(a, b):
     return len(a) == len(b) and all(np.array_equal(a[name], b[name]) for name in "txyp")
+
+
+def launch(line):
+    subprocess.run(f"{os.environ['GST_LAUNCH']} -q {line}", shell=True, check=True)
+
+
+class VideoFrames(unittest.TestCase):
+    """They reach the simulator as a person sees them, and as they are in a pipeline."""
+
+    def make(self, name, line):
+        launch(f"{line} ! filesink location={shlex.quote(path_of(name))}")
+        return path_of(name)
+
+    def make_film(self, container, audio, pause):
+        """45 moving frames with B-frames; with pauses of 2 s before frames 15 and 30."""
+        name = f"{'audio' if audio else 'mute'} {'pause' if pause else 'even'}.{container}"
+        muxer = {"mkv": "matroskamux", "ts": "mpegtsmux", "mp4": "mp4mux", "avi": "avimux", "flv": "flvmux"}[container]
+        audio_line = ("  audiotestsrc num-buffers=250 samplesperbuffer=882 ! audio/x-raw,rate=44100,channels=1"
+                      " ! audioconvert ! lamemp3enc ! mpegaudioparse ! queue ! mux.") if audio else ""
+        pipeline = Gst.parse_launch(
+            f"videotestsrc num-buffers=45 pattern=zone-plate kx2=20 ky2=20 kt=9 ! video/x-raw,format=I420,width=64,"
+            f"height=48,framerate=30/1 ! identity name=frames ! x264enc bframes=3 b-adapt=false speed-preset=ultrafast"
+            f" ! video/x-h264,profile=main ! h264parse ! queue ! {muxer} name=mux ! filesink name=file{audio_line}")
+        pipeline.get_by_name("file").set_property("location", path_of(name))
+        count = itertools.count()
+
+        def delay(_, info):
+            info.get_buffer().pts += next(count) // 15 * 2 * Gst.SECOND * pause
+            return Gst.PadProbeReturn.OK
+
+        pipeline.get_by_name("frames").get_static_pad("src").add_probe(Gst.PadProbeType.BUFFER, delay)
+        pipeline.set_state(Gst.State.PLAYING)
+        ended = pipeline.get_bus().timed_pop_filtered(60 * Gst.SECOND, Gst.MessageType.EOS | Gst.MessageType.ERROR)
+        pipeline.set_state(Gst.State.NULL)
+        self.assertEqual(ended.type, Gst.MessageType.EOS, name)
+        return path_of(name)
+
+    def test_each_frame_but_the_first_ends_an_interval(self):
+        for container, audio, pause in itertools.product(("mkv", "ts", "mp4", "avi", "flv"), (0, 1), (0, 1)):
+            film = self.make_film(container, audio, pause)
+            with self.subTest(film=film), warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # tsdemux loses times in pauses
+                self.assertEqual(sum(len(chunk) > 0 for chunk in ec.simulate(film, "eventsim-frame")), 44)
+
+    def test_frames_are_not_converted(self):
+        for pixels in "BGRA", "I420_10LE", "Y42B", "GRAY16_LE":
+            video = self.make("pixels.mkv", "videotestsrc pattern=ball num-buffers=8"
+                              f" ! video/x-raw,format={pixels},width=64,height=48,framerate=25/1 ! avenc_ffv1 ! matroskamux")
+            launch(f"filesrc location={shlex.quote(video)} ! decodebin ! eventsim-dvs ! eventnpyenc"
+                   f" ! filesink location={shlex.quote(path_of('expected.npy'))}")
+            expected = ec.read(path_of("expected.npy"))
+            with open(path_of("pixels.yaml"), "w", encoding="utf-8") as recipe:
+                recipe.write("videos: pixels.mkv\nsimulator: eventsim-dvs seed=0\n")
+            for name, chunks in (("simulate", ec.simulate(video, "eventsim-dvs")),
+                                 ("data set", ec.Dataset(path_of("pixels.yaml"))[0].events())):
+                with self.subTest(pixels=pixels, name=name):
+                    self.assertTrue(same(ec.join(chunks), expected))
+
+    def test_rotated_video_is_upright(self):
+        video = self.make("rotated.mp4", "videotestsrc pattern=ball num-buffers=8"
+                          " ! video/x-raw,format=I420,width=64,height=48 ! x264enc ! mp4mux")
+        with open(video, "r+b") as file:  # mp4mux 1.22 writes no rotation
+            file.seek(file.read().index(b"tkhd") + 44)
+            file.write(struct.pack(">9i", 0, 1 << 16, 0, -1 << 16, 0, 0, 0, 0, 1 << 30))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            events = ec.join(ec.simulate(video, "eventsim-frame"))
+        self.assertEqual((events.width, events.height), (48, 64))
+        self.assertGreater(len(events), 0)
+
+    def test_interlaced_video_is_deinterlaced(self):
+        video = self.make("interlaced.mkv", "videotestsrc pattern=ball num-buffers=16"
+                          " ! video/x-raw,format=I420,width=64,height=48,framerate=50/1 ! interlace field-pattern=1:1"
+                          " ! x264enc interlaced=true ! matroskamux")
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            chunks = list(ec.simulate(video, "eventsim-frame"))
+        self.assertGreaterEqual(len(chunks), 14)  # an interval a field
+
+    def test_a_looping_gif_is_played_once(self):
+        pictures = [bytes(100 * ((x - 4 * i) % 32 < 8) for _ in range(24) for x in range(32)) for i in range(8)]
+        with open(path_of("loop.gif"), "wb") as file:
+            file.write(b"GIF89a" + struct.pack("<HHBBB", 32, 24, 0xf6, 0, 0) + np.repeat(np.arange(128), 3).astype("u1")
+                       .tobytes() + b"\x21\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")
+            for picture in pictures:
+                # Codes of 8 bits stay so if the table is cleared before it grows.
+                codes = b"".join(b"\x80" + picture[i:i + 120] for i in range(0, len(picture), 120)) + b"\x81"
+                file.write(b"\x21\xf9\4\0\4\0\0\0\x2c" + struct.pack("<HHHHB", 0, 0, 32, 24, 0) + b"\7")
+                for i in range(0, len(codes), 255):
+                    file.write(bytes([len(codes[i:i + 255])]) + codes[i:i + 255])
+                file.write(b"\0")
+            file.write(b"\x3b")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # avdec_gif gives no times
+            chunks = list(ec.simulate(path_of("loop.gif"), "eventsim-frame"))
+        self.assertEqual(len(chunks), 7)
+        self.assertAlmostEqual(chunks[-1].end, 7 * 0.04)
 
 
 class Recordings(unittest.TestCase):
@@ -272,6 +373,31 @@ class Recordings(unittest.TestCase):
         path = path_of("decades.csv")
         ec.write(path, events)
         self.assertTrue(same(ec.read(path), events))
+
+    def test_skips_the_windows_of_long_pauses(self):
+        events = self.events[:4].copy()
+        events["t"] = 0, 10, 86_400_000_000, 200_000_000_000
+        path = path_of("pauses.csv")
+        ec.write(path, events)
+        with self.assertWarnsRegex(ec.PipelineWarning, "pause of .* s: its windows are skipped"):
+            windows = list(ec.stream(path))
+        self.assertLess(len(windows), 10)
+        self.assertEqual([len(window) for window in windows if len(window)], [2, 1, 1])
+        later = [window for window in windows if len(window)][1]
+        self.assertTrue(later.start <= 86_400 < later.end)
+
+    def test_takes_paths_of_any_type(self):
+        path = path_of("bytes.csv")
+        ec.write(os.fsencode(path), self.events)
+        self.assertTrue(same(ec.read(os.fsencode(path)), self.events))
+        self.assertEqual(ec.stream(os.fsencode(path)).width, ec.stream(path).width)
+        for wrong in (lambda: ec.read("a\0b"), lambda: ec.write("a\0b.csv", self.events)):
+            with self.assertRaisesRegex(ValueError, "null byte"):
+                wrong()
+        with self.assertRaises(TypeError):
+            ec.stream(path)[1.5]  # pylint: disable=expression-not-assigned
+        with self.assertRaises(ValueError):
+            ec.stream(path).between(math.nan)
 
     def test_joins_chunks(self):
         events = self.labelled(3000)

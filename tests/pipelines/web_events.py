@@ -95,6 +95,24 @@ def handshake(url, **headers):
         "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="})
 
 
+def send_body(url, method, **headers):
+    """The HTTP status that a request with a body of 100 MB is answered with, and how much of it was sent."""
+    connection = http.client.HTTPConnection(urlsplit(url).netloc, timeout=SECONDS)
+    connection.putrequest(method, "/", skip_host="Host" in headers)
+    for name, value in headers.items():
+        connection.putheader(name, value)
+    connection.putheader("Content-Length", str(100 << 20))
+    connection.endheaders()
+    sent = 0
+    with contextlib.suppress(OSError):  # of the closed connection
+        while sent < 100:
+            connection.send(bytes(1 << 20))
+            sent += 1
+    status = connection.getresponse().status
+    connection.close()
+    return status, sent
+
+
 def stay_connected(url, count):
     """Loads the page with clients that would keep their connection, and then close it."""
     clients = [http.client.HTTPConnection(urlsplit(url).netloc, timeout=SECONDS) for _ in range(count)]
@@ -155,11 +173,17 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, context
         answer = status_of(url, "/", Host=host)
         assert answer == status, f"a request to {host} is answered with {answer}"
     assert handshake(url, Host="elsewhere.example", Origin="http://elsewhere.example") == 403
+    memory = server.memory()
+    for method, headers, status in (("POST", {}, 405), ("PUT", {"Origin": "http://elsewhere"}, 403), ("GET", {}, 413),
+                                    ("GET", {"Host": "elsewhere.example"}, 403), ("HEAD", {"Host": "[bad"}, 400)):
+        answer, sent = send_body(url, method, **headers)
+        assert answer == status and sent < 50, f"{method} {headers} is answered with {answer} after {sent} MB"
+    assert server.memory() < memory + 50, f"bodies are kept: {memory} MB, then {server.memory()}"
     for path, status in (("/%ff", 400), ("/viewer/%ff", 400), ("/nowhere", 404)):
         answer = status_of(url, path)
         assert answer == status, f"{path} is answered with {answer}"
     see_events(first)
-    print("strange messages and other sites' pages are refused")
+    print("strange messages, bodies and other sites' pages are refused")
 
     port = re.search(r":(\d+)/", url)[1]
     refused("Address already in use; choose another with --port", "--port", port)

@@ -15,15 +15,15 @@ class CameraSegment {
  public:
   using Nanoseconds = eventcamera::Nanoseconds;
 
-  /// Notes that data up to the time `sent` arrived. After a gap, the camera's clock may be another
-  /// one.
+  /// Records the arrival of data up to the time `sent`. After a gap, the camera's clock may have
+  /// been reset.
   void arrive(eventcamera::Microseconds sent, GstClockTime arrival, bool after_gap) {
     is_due_ |= clock_.arrive(sent, static_cast<Nanoseconds>(arrival), after_gap);
   }
 
-  /// Before data of these times: pushes a segment from `start`, unless the last one holds; returns
-  /// the running time of `start` if it did. What happened before running time 0, as in a first
-  /// transfer, is late: the next data correct the mapping.
+  /// Pushes a segment from `start` before data of these times, unless the last segment still holds.
+  /// Returns the running time of `start` if it did. Data before running time 0, as in a first
+  /// transfer, is late: the next data corrects the mapping.
   std::optional<GstClockTime> begin(GstPad* src, guint32 seqnum, GstClockTime start,
                                     GstClockTime end) {
     std::optional<GstClockTime> mapped;
@@ -40,7 +40,7 @@ class CameraSegment {
   }
 
   bool has_begun() const { return segment_.has_begun(); }
-  /// Running time of a time of the camera by the transfers so far, if one has arrived.
+  /// Running time of a camera time; none before the first transfer.
   std::optional<Nanoseconds> running_time_of(GstClockTime time) const {
     const auto offset = clock_.offset();
     return offset ? std::optional(static_cast<Nanoseconds>(time) + *offset) : std::nullopt;

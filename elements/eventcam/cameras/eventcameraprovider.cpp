@@ -24,7 +24,7 @@ G_DECLARE_FINAL_TYPE(GstEventCameraDevice, gst_event_camera_device, GST, EVENT_C
 
 struct _GstEventCameraDevice {
   GstDevice parent;
-  gchar* elements;  ///< launch line of what reads it; null: nothing here does
+  gchar* elements;  ///< launch line of a source; null if there is none
 };
 
 G_DEFINE_TYPE(GstEventCameraDevice, gst_event_camera_device, GST_TYPE_DEVICE)
@@ -57,7 +57,7 @@ static void gst_event_camera_device_class_init(GstEventCameraDeviceClass* klass)
   GST_DEVICE_CLASS(klass)->create_element = create_element;
 }
 
-/// Caps of the words, as far as the drivers tell.
+/// Caps of the words, without fields that the drivers do not report.
 static OwnedCaps caps_of(const EventCamera& camera) {
   OwnedCaps caps(gst_caps_from_string(EVT_WORDS_CAPS));
   if (camera.format)
@@ -69,7 +69,7 @@ static OwnedCaps caps_of(const EventCamera& camera) {
   return caps;
 }
 
-/// Launch line of what reads the grey buffers of a camera.
+/// Launch line of a source for a camera with grey buffers.
 static std::string elements_of(const FoundDevice& found, const EventCamera& camera) {
   const auto& buffers = found.device.buffers;
   auto line = "v4l2src name=source device=" + found.path +

@@ -38,6 +38,8 @@
  * gst-launch-1.0 tcpclientsrc host=camera port=3333 do-timestamp=true ! evtparse format=EVT3
  * width=1280 height=720 ! evtdec ! eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/gst.h>
 
@@ -46,7 +48,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -55,6 +56,7 @@
 #include "elements/eventcam/cameras/event_camera.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
@@ -102,7 +104,7 @@ struct Settings {
   GstClockTime latency = 10 * GST_MSECOND;
 };
 
-/// What the input's caps tell.
+/// Fields of the input's caps.
 struct Input {
   std::optional<EvtFormat> format;
   eventcamera::SensorSize sensor;
@@ -136,35 +138,32 @@ struct State {
   CameraSegment segment{};  ///< of the output
 };
 
-struct Private {
-  Guarded<Settings> settings;
-  Guarded<Stats> stats;
-  GstPad* sink = nullptr;
-  GstPad* src = nullptr;
+/// State from start to stop.
+struct Stream {
+  Stream() { gst_segment_init(&upstream, GST_FORMAT_UNDEFINED); }
 
-  // Accessed by the streaming thread only, or while there is none.
   std::optional<Input> input;  ///< of the last caps
-  GstSegment upstream = {};
+  GstSegment upstream;
   guint32 segment_seqnum = gst_util_seqnum_next();
   std::optional<State> state;
   WarnOnce warn_of_no_words{GST_CAT_DEFAULT};
   RepeatLevel loss_level;
 };
 
-}  // namespace
+struct Private {
+  explicit Private(const std::pair<GstPad*, GstPad*>& pads) : sink(pads.first), src(pads.second) {}
 
-#define GST_TYPE_EVT_PARSE (gst_evt_parse_get_type())
-G_DECLARE_FINAL_TYPE(GstEvtParse, gst_evt_parse, GST, EVT_PARSE, GstElement)
-
-struct _GstEvtParse {
-  GstElement parent;
-  Private* priv;
+  Guarded<Settings> settings;
+  Guarded<Stats> stats;
+  GstPad* const sink;
+  GstPad* const src;
+  StreamLocked<Stream> stream{sink};
 };
 
-G_DEFINE_TYPE_WITH_CODE(GstEvtParse, gst_evt_parse, GST_TYPE_ELEMENT,
-                        GST_DEBUG_CATEGORY_INIT(evt_parse_debug, "evtparse", 0,
-                                                "words of live event cameras"))
-GST_ELEMENT_REGISTER_DEFINE(evtparse, "evtparse", GST_RANK_NONE, GST_TYPE_EVT_PARSE)
+}  // namespace
+
+DEFINE_EVENT_ELEMENT(GstEvtParse, gst_evt_parse, EVT_PARSE, GstElement, GST_TYPE_ELEMENT, evtparse,
+                     GST_RANK_NONE, "words of live event cameras")
 
 static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVT_PARSE(object)->priv->settings;
@@ -200,7 +199,7 @@ static auto reported(GstEvtParse* self, const Work& work) {
 static bool start_stream(GstEvtParse* self) {
   auto& priv = *self->priv;
   const auto settings = priv.settings.copy();
-  const auto input = priv.input.value_or(Input{});
+  const auto input = priv.stream->input.value_or(Input{});
   auto format = input.format;
   if (settings.format != format_of_caps) format = static_cast<EvtFormat>(settings.format);
   auto sensor = input.sensor;
@@ -215,8 +214,8 @@ static bool start_stream(GstEvtParse* self) {
     return false;
   }
   return reported(self, [&] {
-    priv.state.emplace(State{.buffers = CameraBuffers(input.framing),
-                             .scanner = make_word_scanner(*format, sensor, input.framing)});
+    priv.stream->state.emplace(State{.buffers = CameraBuffers(input.framing),
+                                     .scanner = make_word_scanner(*format, sensor, input.framing)});
     const OwnedCaps caps(gst_caps_new_simple(GST_EVENT_CAMERA_MEDIA_TYPE, "format", G_TYPE_STRING,
                                              evt_format_name(*format), "width", G_TYPE_INT,
                                              sensor.width, "height", G_TYPE_INT, sensor.height,
@@ -237,9 +236,9 @@ static GstClockTime nanoseconds(Microseconds t) {
 /// Pushes a segment before data of these times, if they need one.
 static void begin_segment(GstEvtParse* self, GstClockTime start, GstClockTime end) {
   auto& priv = *self->priv;
-  auto& segment = priv.state->segment;
+  auto& segment = priv.stream->state->segment;
   const bool is_correction = segment.has_begun();
-  const auto mapped = segment.begin(priv.src, priv.segment_seqnum, start, end);
+  const auto mapped = segment.begin(priv.src, priv.stream->segment_seqnum, start, end);
   if (!mapped) return;
   GST_DEBUG_OBJECT(self, "the camera's %" GST_TIME_FORMAT " is running time %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(start), GST_TIME_ARGS(*mapped));
@@ -259,7 +258,7 @@ static GstBuffer* buffer_of(WordScanner::Piece&& piece) {
 /// Pushes the pieces of a transfer. May throw.
 static GstFlowReturn push_pieces(GstEvtParse* self) {
   auto& priv = *self->priv;
-  auto& state = *priv.state;
+  auto& state = *priv.stream->state;
   GstFlowReturn result = GST_FLOW_OK;
   for (auto& piece : state.pieces) {
     if (result != GST_FLOW_OK) break;
@@ -278,15 +277,15 @@ static GstFlowReturn push_pieces(GstEvtParse* self) {
 static void note_losses(GstEvtParse* self, const WordScanner::Counts& before, guint64 buffers) {
   constexpr guint64 max_skipped = 1U << 16;
   auto& priv = *self->priv;
-  const auto& counts = priv.state->scanner->counts();
+  const auto& counts = priv.stream->state->scanner->counts();
   if (buffers > 0 || counts.lost_bytes != before.lost_bytes)
-    GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, priv.loss_level.next(), self,
+    GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, priv.stream->loss_level.next(), self,
                       "lost %" G_GUINT64_FORMAT " buffers, and %" G_GUINT64_FORMAT
                       " bytes with %" G_GUINT64_FORMAT " events",
                       buffers, guint64{counts.lost_bytes - before.lost_bytes},
                       guint64{counts.lost_events - before.lost_events});
   if (counts.lost_bytes > std::max<guint64>(counts.bytes, max_skipped))
-    priv.warn_of_no_words(
+    priv.stream->warn_of_no_words(
         self,
         {GST_STREAM_ERROR_DECODE,
          "Most of the camera's data is not valid in this format. Set format, width "
@@ -297,8 +296,8 @@ static void note_losses(GstEvtParse* self, const WordScanner::Counts& before, gu
 /// Raises the latency to the duration of the longest transfer.
 static void note_transfer(GstEvtParse* self, GstClockTime arrival) {
   auto& priv = *self->priv;
-  const auto& state = *priv.state;
-  // The first may hold what the camera kept before the start.
+  const auto& state = *priv.stream->state;
+  // The first transfer may hold older data from the camera's buffer.
   if (!state.segment.has_begun() || state.pieces.empty() || !GST_CLOCK_TIME_IS_VALID(arrival))
     return;
   const auto first = state.segment.running_time_of(nanoseconds(state.pieces.front().start));
@@ -322,9 +321,9 @@ static void note_transfer(GstEvtParse* self, GstClockTime arrival) {
 static GstFlowReturn handle_transfer(GstEvtParse* self, GstBuffer* buffer,
                                      std::span<const guint8> bytes) {
   auto& priv = *self->priv;
-  auto& state = *priv.state;
+  auto& state = *priv.stream->state;
   const auto before = state.scanner->counts();
-  const auto transfer = state.buffers.transfer_of(buffer, bytes, priv.upstream);
+  const auto transfer = state.buffers.transfer_of(buffer, bytes, priv.stream->upstream);
   state.scanner->scan(transfer.words, state.pieces);
   if (!state.pieces.empty() && state.pieces.back().end > Chunker::max_time) {
     GST_ELEMENT_ERROR(self, STREAM, DECODE, ("The clock of the camera has jumped too far."),
@@ -350,7 +349,7 @@ static GstFlowReturn handle_transfer(GstEvtParse* self, GstBuffer* buffer,
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   auto* self = GST_EVT_PARSE(parent);
   const OwnedBuffer buffer(taken);
-  if (!self->priv->state && !start_stream(self)) return GST_FLOW_ERROR;
+  if (!self->priv->stream->state && !start_stream(self)) return GST_FLOW_ERROR;
   const MappedBytes bytes(GST_ELEMENT(self), OwnedBuffer(gst_buffer_ref(taken)));
   if (!bytes.is_mapped()) return GST_FLOW_ERROR;
   return reported(self, [&] { return handle_transfer(self, taken, bytes.get()); });
@@ -359,11 +358,11 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
 /// Pushes the last words before the stream ends or changes.
 static void end_stream(GstEvtParse* self) {
   auto& priv = *self->priv;
-  if (!priv.state) return;
+  if (!priv.stream->state) return;
   reported(self, [&] {
-    auto& scanner = *priv.state->scanner;
+    auto& scanner = *priv.stream->state->scanner;
     const auto before = scanner.counts();
-    scanner.finish(priv.state->pieces);
+    scanner.finish(priv.stream->state->pieces);
     add(priv.stats.lock()->words, before, scanner.counts());
     note_losses(self, before, 0);
     return push_pieces(self);
@@ -376,21 +375,21 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_STREAM_START:
       end_stream(self);  // into the stream that ends here
-      priv.state.reset();
+      priv.stream->state.reset();
       break;
     case GST_EVENT_CAPS: {
       GstCaps* caps = nullptr;
       gst_event_parse_caps(event, &caps);
       end_stream(self);
-      priv.state.reset();
-      priv.input = input_of(caps);
+      priv.stream->state.reset();
+      priv.stream->input = input_of(caps);
       gst_event_unref(event);
       return start_stream(self);
     }
     case GST_EVENT_SEGMENT:
       if (!plays_forwards(self, event, "parse")) return FALSE;
-      gst_event_copy_segment(event, &priv.upstream);
-      priv.segment_seqnum = gst_event_get_seqnum(event);
+      gst_event_copy_segment(event, &priv.stream->upstream);
+      priv.stream->segment_seqnum = gst_event_get_seqnum(event);
       gst_event_unref(event);
       return TRUE;
     case GST_EVENT_GAP:
@@ -400,7 +399,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       end_stream(self);
       break;
     case GST_EVENT_FLUSH_STOP:
-      priv.state.reset();
+      priv.stream->state.reset();
       break;
     default:
       break;
@@ -424,28 +423,15 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_evt_parse_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    priv.state.reset();
-    priv.input.reset();
-    gst_segment_init(&priv.upstream, GST_FORMAT_UNDEFINED);
-    priv.segment_seqnum = gst_util_seqnum_next();
-    priv.warn_of_no_words.reset();
-    priv.loss_level.reset();
+    priv.stream.reset();
   }
   return result;
 }
 
 /* type */
 
-static void finalize(GObject* object) {
-  delete GST_EVT_PARSE(object)->priv;
-  G_OBJECT_CLASS(gst_evt_parse_parent_class)->finalize(object);
-}
-
 static void gst_evt_parse_init(GstEvtParse* self) {
-  self->priv = new Private;
-  auto& priv = *self->priv;
-  gst_segment_init(&priv.upstream, GST_FORMAT_UNDEFINED);
-  std::tie(priv.sink, priv.src) = add_pads(GST_ELEMENT(self), chain, sink_event, src_query);
+  self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));
 }
 
 static GstStructure* structure_of(const Stats& stats) {

@@ -8,7 +8,7 @@
  * the events of the interval that it starts, or of the #GstEventOverlay:accumulation-time before
  * the interval's end. Frames without a duration or framerate show the events since the last
  * one. The two streams are synchronized by running time. Events are scaled to the video if the
- * sensor has a different size.
+ * sensor has a different size. Grey video becomes RGB, unless downstream takes only grey.
  *
  * Video from a live source waits for events no longer than its latency. Other video waits for the
  * events of its interval, or for a GAP event or EOS.
@@ -18,12 +18,16 @@
  * gst-launch-1.0 videotestsrc pattern=ball ! tee name=t  t. ! queue ! videoconvert ! eventoverlay
  * name=overlay ! videoconvert ! autovideosink  t. ! queue ! eventsim-diff ! overlay.event_sink
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/video/video.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <new>
 #include <optional>
 #include <span>
 #include <vector>
@@ -66,6 +70,8 @@ class EventOverlay final : public EventAggregator {
   void flush() noexcept override;
   void release_memory() noexcept override { flush(); }
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  OwnedCaps output_caps(GstCaps* input) override;
+  OwnedCaps input_caps(OwnedCaps output) const override;
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
 
@@ -79,13 +85,14 @@ class EventOverlay final : public EventAggregator {
   bool add_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end);
   bool handle_buffer(GstBuffer* buffer, GstClockTime end);
   bool add_events_until(GstClockTime end);
+  OwnedBuffer in_colour(GstBuffer* grey) const;
   GstFlowReturn draw(const EventInterval& interval, GstBuffer* buffer);
   GstFlowReturn handle_frame(const std::optional<EventInterval>& interval, bool timed_out);
 
   GstAggregatorPad* const events_pad_ = pad("event_sink");
 
-  // Accessed by the source pad's thread only, or while there is none.
   std::optional<GstVideoInfo> video_;
+  std::optional<GstVideoInfo> drawn_;  // output; in colour where the video is grey
   std::optional<SensorSize> sensor_;
   std::optional<Overlay> overlay_;     // set once both are known
   OwnedBuffer begun_;                  // first queued buffer, if some events were processed
@@ -108,8 +115,8 @@ std::optional<EventInterval> running_interval(GstAggregatorPad* pad,
   return EventInterval{*start, *start + static_cast<GstClockTime>(std::min(length, max))};
 }
 
-/// Interval during which a frame is shown, in running time; that since the last frame if nothing
-/// tells when it ends.
+/// Interval during which a frame is shown, in running time; since the last frame if its end is
+/// unknown.
 std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) const {
   const GstClockTime start = GST_BUFFER_PTS(frame);
   if (!GST_CLOCK_TIME_IS_VALID(start) || start > G_MAXINT64) return std::nullopt;
@@ -124,7 +131,7 @@ std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) c
 
 /* events */
 
-/// The events of a buffer that is played at a rate, with times that differ as running times do.
+/// The events of a buffer, with times scaled by the rate to differences of running time.
 std::span<const Event> EventOverlay::in_running_time(std::span<const Event> events, double rate) {
   if (rate == 1) return events;
   constexpr double max = std::numeric_limits<std::uint32_t>::max();
@@ -192,9 +199,32 @@ bool EventOverlay::add_events_until(GstClockTime end) {
 
 /* frames */
 
+/// A copy of a grey frame in the format of the output; the frame itself if it cannot be read.
+OwnedBuffer EventOverlay::in_colour(GstBuffer* grey) const {
+  OwnedBuffer colour(gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(&*drawn_), nullptr));
+  if (!colour) throw std::bad_alloc();
+  gst_buffer_copy_into(
+      colour.get(), grey,
+      static_cast<GstBufferCopyFlags>(GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS), 0,
+      static_cast<gsize>(-1));
+  keep_metas(grey, colour.get());
+  const VideoFrame from(*video_, grey, GST_MAP_READ);
+  const VideoFrame to(*drawn_, colour.get(), GST_MAP_WRITE);
+  if (!from || !to) return OwnedBuffer(gst_buffer_ref(grey));
+  const auto layout = pixel_layout_of(*drawn_);
+  for (int y = 0; y < GST_VIDEO_INFO_HEIGHT(&*drawn_); ++y) {
+    const std::byte* in = from.data() + y * from.stride();
+    std::byte* out = to.data() + y * to.stride();
+    std::fill_n(out, GST_VIDEO_INFO_WIDTH(&*drawn_) * layout.bytes, std::byte{255});  // opaque
+    for (int x = 0; x < GST_VIDEO_INFO_WIDTH(&*drawn_); ++x, ++in, out += layout.bytes)
+      out[layout.red] = out[layout.green] = out[layout.blue] = *in;
+  }
+  return colour;
+}
+
 GstFlowReturn EventOverlay::draw(const EventInterval& interval, GstBuffer* buffer) {
   const Settings current = settings.copy();
-  const VideoFrame frame(*video_, buffer, static_cast<GstMapFlags>(GST_MAP_READWRITE));
+  const VideoFrame frame(*drawn_, buffer, static_cast<GstMapFlags>(GST_MAP_READWRITE));
   if (!frame) {
     GST_ELEMENT_ERROR(
         element(), RESOURCE, FAILED,
@@ -207,7 +237,7 @@ GstFlowReturn EventOverlay::draw(const EventInterval& interval, GstBuffer* buffe
                          ? end - static_cast<Microseconds>(current.accumulation_time / 1000)
                          : static_cast<Microseconds>(interval.start / 1000);
   overlay_->draw(start, end, eventcamera::palette(current.palette), current.opacity,
-                 pixel_layout_of(*video_), frame.data(), frame.stride());
+                 pixel_layout_of(*drawn_), frame.data(), frame.stride());
   return GST_FLOW_OK;
 }
 
@@ -231,6 +261,8 @@ GstFlowReturn EventOverlay::handle_frame(const std::optional<EventInterval>& int
   GST_LOG_OBJECT(main_pad(),
                  "frame at %" GST_TIME_FORMAT "; events are known until %" GST_TIME_FORMAT,
                  GST_TIME_ARGS(GST_BUFFER_PTS(out.get())), GST_TIME_ARGS(known_));
+  if (GST_VIDEO_INFO_FORMAT(&*drawn_) != GST_VIDEO_INFO_FORMAT(&*video_))
+    out = in_colour(out.get());
   if (interval && overlay_) {
     const GstFlowReturn result = draw(*interval, out.get());
     if (result != GST_FLOW_OK) return result;
@@ -276,6 +308,40 @@ bool EventOverlay::handle_video_caps(const GstCaps* caps) {
   return true;
 }
 
+static bool is_grey(const GstStructure* video) {
+  return g_strcmp0(gst_structure_get_string(video, "format"), "GRAY8") == 0;
+}
+
+/// Grey video is drawn on in colour, unless downstream takes only grey.
+OwnedCaps EventOverlay::output_caps(GstCaps* input) {
+  OwnedCaps output(gst_caps_ref(input));
+  if (is_grey(gst_caps_get_structure(input, 0))) {
+    const OwnedCaps colours(gst_caps_copy(input));
+    const OwnedCaps formats(gst_caps_from_string("video/x-raw, format = (string) " COLOUR_FORMATS));
+    GstStructure* const fields = gst_caps_get_structure(colours.get(), 0);
+    gst_structure_set_value(
+        fields, "format",
+        gst_structure_get_value(gst_caps_get_structure(formats.get(), 0), "format"));
+    gst_structure_remove_field(fields, "colorimetry");
+    OwnedCaps taken(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(element()), colours.get()));
+    if (!gst_caps_is_empty(taken.get())) output.reset(gst_caps_fixate(taken.release()));
+  }
+  GstVideoInfo drawn;
+  if (gst_video_info_from_caps(&drawn, output.get())) drawn_ = drawn;
+  return output;
+}
+
+OwnedCaps EventOverlay::input_caps(OwnedCaps output) const {
+  OwnedCaps input(gst_caps_copy(output.get()));
+  for (guint i = 0; i < gst_caps_get_size(output.get()); ++i) {
+    GstStructure* const grey = gst_structure_copy(gst_caps_get_structure(output.get(), i));
+    gst_structure_set(grey, "format", G_TYPE_STRING, "GRAY8", nullptr);
+    gst_structure_remove_field(grey, "colorimetry");
+    input.reset(gst_caps_merge_structure(input.release(), grey));
+  }
+  return input;
+}
+
 bool EventOverlay::handle_event_caps(const GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
@@ -299,6 +365,7 @@ void EventOverlay::flush() noexcept {
 void EventOverlay::stop() {
   flush();
   video_.reset();
+  drawn_.reset();
   sensor_.reset();
   warn_of_missing_.reset();
 }

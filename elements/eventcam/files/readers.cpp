@@ -6,10 +6,10 @@
 #include "gst/recording/evt_caps.hpp"
 #include "src/formats/atis/atis_bin.hpp"
 #include "src/formats/dat/dat.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/es/es.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
-#include "src/formats/one_stream_decoder.hpp"
 #include "src/formats/text/csv_decoder.hpp"
 #ifdef HAVE_AEDAT
 #include "src/formats/aedat/aedat_decoder.hpp"
@@ -25,36 +25,28 @@
 #endif
 
 using eventcamera::Decoder;
-using eventcamera::OneStreamDecoder;
-using eventcamera::RecordingDecoder;
 
 namespace {
 
-/// Creates a reader for a format with a decoder.
-std::unique_ptr<RecordingDecoder> decoded_by(std::unique_ptr<Decoder> decoder) {
-  return std::make_unique<OneStreamDecoder>(std::move(decoder));
-}
-
-/// Creates a reader for a table.
+/// Creates a decoder of a table.
 template <class TableDecoder>
-std::unique_ptr<RecordingDecoder> table_read_by(const GstCaps* /*caps*/,
-                                                const FormatSettings& settings) {
-  return decoded_by(std::make_unique<TableDecoder>(settings.table()));
+std::unique_ptr<Decoder> make_table_decoder(const GstCaps* /*caps*/,
+                                            const FormatSettings& settings) {
+  return std::make_unique<TableDecoder>(settings.table());
 }
 
 /// For words without a header, takes format and size from the caps; files have a header.
-std::unique_ptr<RecordingDecoder> make_evt_decoder_of(const GstCaps* caps,
-                                                      const FormatSettings& /*settings*/) {
+std::unique_ptr<Decoder> make_raw_decoder(const GstCaps* caps, const FormatSettings& /*settings*/) {
   if (caps != nullptr) {
     const GstStructure* const structure = gst_caps_get_structure(caps, 0);
     if (const auto words = evt_format_named(gst_structure_get_string(structure, "format"))) {
       eventcamera::SensorSize size;
       gst_structure_get_int(structure, "width", &size.width);
       gst_structure_get_int(structure, "height", &size.height);
-      return decoded_by(eventcamera::make_evt_decoder(*words, size));
+      return eventcamera::make_evt_decoder(*words, size);
     }
   }
-  return decoded_by(eventcamera::make_prophesee_raw_decoder());
+  return eventcamera::make_prophesee_raw_decoder();
 }
 
 }  // namespace
@@ -73,6 +65,8 @@ std::unique_ptr<RecordingDecoder> make_evt_decoder_of(const GstCaps* caps,
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventdatenc ! filesink
  * location=recording.dat
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat evt = {
     .type_name = "GstEvtDec",
@@ -81,7 +75,7 @@ static const EventReaderFormat evt = {
     .caps = "application/x-prophesee-raw; " EVT_WORDS_CAPS,
     .has_triggers = true,
     .add_properties = add_sensor_size,
-    .make_decoder = make_evt_decoder_of,
+    .make_decoder = make_raw_decoder,
 };
 GST_ELEMENT_REGISTER_DEFINE(evtdec, "evtdec", GST_RANK_PRIMARY, event_reader_type(evt))
 
@@ -98,6 +92,8 @@ GST_ELEMENT_REGISTER_DEFINE(evtdec, "evtdec", GST_RANK_PRIMARY, event_reader_typ
  * gst-launch-1.0 filesrc location=recording.dat ! eventdatdec ! evtenc ! filesink
  * location=recording.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat dat = {
     .type_name = "GstEventDatDec",
@@ -106,8 +102,8 @@ static const EventReaderFormat dat = {
     .caps = "application/x-prophesee-dat",
     .has_triggers = true,
     .add_properties = add_sensor_size,
-    .make_decoder = [](const GstCaps*, const FormatSettings&) -> std::unique_ptr<RecordingDecoder> {
-      return decoded_by(eventcamera::make_dat_decoder());
+    .make_decoder = [](const GstCaps*, const FormatSettings&) -> std::unique_ptr<Decoder> {
+      return eventcamera::make_dat_decoder();
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_reader_type(dat))
@@ -130,6 +126,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 filesrc location=recording.es ! eventesdec ! evtenc ! filesink
  * location=recording.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat es = {
     .type_name = "GstEventEsDec",
@@ -142,10 +140,9 @@ static const EventReaderFormat es = {
                          g_param_spec_enum("origin", ES_ORIGIN_NICK, ES_ORIGIN_BLURB,
                                            es_origin_type(), 0, mutable_ready_flags));
         },
-    .make_decoder = [](const GstCaps*,
-                       const FormatSettings& settings) -> std::unique_ptr<RecordingDecoder> {
-      return decoded_by(eventcamera::make_event_stream_decoder(
-          static_cast<eventcamera::EsOrigin>(settings.variant)));
+    .make_decoder = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Decoder> {
+      return eventcamera::make_event_stream_decoder(
+          static_cast<eventcamera::EsOrigin>(settings.variant));
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_reader_type(es))
@@ -166,6 +163,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_re
  * gst-launch-1.0 filesrc location=00002.bin ! eventatisdec width=34 height=34 ! evtenc ! filesink
  * location=two.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat atis = {
     .type_name = "GstEventAtisDec",
@@ -173,9 +172,8 @@ static const EventReaderFormat atis = {
     .description = "Reads the .bin files of N-MNIST and N-Caltech101",
     .caps = "application/x-atis-bin",
     .add_properties = add_sensor_size,
-    .make_decoder = [](const GstCaps*,
-                       const FormatSettings& settings) -> std::unique_ptr<RecordingDecoder> {
-      return decoded_by(eventcamera::make_atis_bin_decoder(settings.sensor));
+    .make_decoder = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Decoder> {
+      return eventcamera::make_atis_bin_decoder(settings.sensor);
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventatisdec, "eventatisdec", GST_RANK_PRIMARY, event_reader_type(atis))
@@ -198,6 +196,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventatisdec, "eventatisdec", GST_RANK_PRIMARY, even
  * gst-launch-1.0 filesrc location=recording.csv ! eventcsvdec ! evtenc ! filesink
  * location=events.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat csv = {
     .type_name = "GstEventCsvDec",
@@ -205,7 +205,7 @@ static const EventReaderFormat csv = {
     .description = "Reads CSV files of events",
     .caps = "application/x-event-csv",
     .add_properties = add_table_properties,
-    .make_decoder = table_read_by<eventcamera::CsvDecoder>,
+    .make_decoder = make_table_decoder<eventcamera::CsvDecoder>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_reader_type(csv))
 
@@ -227,6 +227,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 filesrc location=events.npy ! eventnpydec ! evtenc ! filesink
  * location=events.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat npy = {
     .type_name = "GstEventNpyDec",
@@ -234,7 +236,7 @@ static const EventReaderFormat npy = {
     .description = "Reads NumPy files of events",
     .caps = "application/x-npy",
     .add_properties = add_table_properties,
-    .make_decoder = table_read_by<eventcamera::NpyDecoder>,
+    .make_decoder = make_table_decoder<eventcamera::NpyDecoder>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_reader_type(npy))
 
@@ -254,6 +256,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 filesrc location=events.npz ! eventnpzdec ! evtenc ! filesink
  * location=events.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat npz = {
     .type_name = "GstEventNpzDec",
@@ -290,6 +294,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 filesrc location=recording.h5 ! eventhdf5dec ! eventrender ! videoconvert !
  * autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat hdf5 = {
     .type_name = "GstEventHdf5Dec",
@@ -335,6 +341,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, even
  * gst-launch-1.0 filesrc location=davis.aedat4 ! aedatdemux name=d  d.events_0 ! queue !
  * eventrender ! videoconvert ! autovideosink  d.video_0 ! queue ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat aedat = {
     .type_name = "GstAedatDemux",
@@ -344,8 +352,7 @@ static const EventReaderFormat aedat = {
     .has_many_streams = true,
     .has_triggers = true,
     .add_properties = add_sensor_size,
-    .make_decoder = [](const GstCaps*,
-                       const FormatSettings& settings) -> std::unique_ptr<RecordingDecoder> {
+    .make_decoder = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Decoder> {
       return std::make_unique<eventcamera::AedatDecoder>(settings.sensor);
     },
 };
@@ -378,9 +385,11 @@ GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_re
  * gst-launch-1.0 filesrc location=walk.mcap ! eventmcapdemux name=d  d.events_0 ! queue !
  * eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
-static std::unique_ptr<RecordingDecoder> make_bag_decoder(const GstCaps* /*caps*/,
-                                                          const FormatSettings& settings) {
+static std::unique_ptr<Decoder> make_bag_decoder(const GstCaps* /*caps*/,
+                                                 const FormatSettings& settings) {
   return std::make_unique<eventcamera::BagDecoder>(settings.topics);
 }
 
@@ -415,6 +424,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventmcapdemux, "eventmcapdemux", GST_RANK_PRIMARY,
  * gst-launch-1.0 filesrc location=walk.bag ! eventbagdemux name=d  d.events_0 ! queue ! eventrender
  * ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventReaderFormat bag = {
     .type_name = "GstEventBagDemux",

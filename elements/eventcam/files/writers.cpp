@@ -35,6 +35,8 @@ using eventcamera::SensorSize;
  * |[
  * gst-launch-1.0 v4l2src ! eventsim-diff ! evtenc format=EVT3 ! filesink location=out.raw
  * ]|
+ *
+ * Since: 0.1
  */
 static const GEnumValue evt_formats[] = {
     {static_cast<int>(EvtFormat::evt2), "32-bit words, one event each", "EVT2"},
@@ -106,6 +108,8 @@ GST_ELEMENT_REGISTER_DEFINE(evtenc, "evtenc", GST_RANK_PRIMARY, event_writer_typ
  * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventdatenc ! filesink
  * location=test.dat
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventWriterFormat dat = {
     .type_name = "GstEventDatEnc",
@@ -131,6 +135,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventesenc ! filesink
  * location=test.es
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventWriterFormat::Variants es_variants = {
     .property = "origin",
@@ -168,6 +174,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
  * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventcsvenc format=rpg ! filesink
  * location=events.txt
  * ]|
+ *
+ * Since: 0.1
  */
 static GType csv_format_type() {
   static const auto values = [] {
@@ -216,6 +224,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvenc, "eventcsvenc", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventnpyenc ! filesink
  * location=events.npy
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventWriterFormat npy = {
     .type_name = "GstEventNpyEnc",
@@ -249,6 +259,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpyenc, "eventnpyenc", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventnpzenc ! filesink
  * location=events.npz
  * ]|
+ *
+ * Since: 0.1
  */
 static const EventWriterFormat npz = {
     .type_name = "GstEventNpzEnc",
@@ -283,6 +295,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzenc, "eventnpzenc", GST_RANK_PRIMARY, event_
  * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventmcapenc ! filesink
  * location=events.mcap
  * ]|
+ *
+ * Since: 0.1
  */
 static const GEnumValue bag_events[] = {
     {static_cast<int>(eventcamera::BagEvents::evt3), "EVT3 words, the most compact", "evt3"},

@@ -24,6 +24,8 @@
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventantiflicker min-frequency=90
  * max-frequency=130 ! eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include "gst/base/types.hpp"
 #include "gst/filter/eventfilter.hpp"
@@ -49,9 +51,10 @@ static void gst_event_anti_flicker_class_init(GstEventAntiFlickerClass* klass) {
   constexpr guint min_frequency = 50;
   constexpr guint max_frequency = 520;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(&Settings::mode,
-                 g_param_spec_enum("mode", "Mode", "What to do with flicker", mode_type(),
-                                   static_cast<int>(Settings().mode), mutable_playing_flags));
+  properties.add(
+      &Settings::mode,
+      g_param_spec_enum("mode", "Mode", "Drop flicker, or keep only flicker", mode_type(),
+                        static_cast<int>(Settings().mode), mutable_playing_flags));
   properties.add(&Settings::min_frequency,
                  g_param_spec_uint("min-frequency", "Minimum frequency",
                                    "Lower end of the band of flicker (Hz)", min_frequency,

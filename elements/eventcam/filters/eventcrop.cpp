@@ -12,6 +12,8 @@
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventcrop left=100 top=50 ! eventrender
  * ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include <stdexcept>
 #include <string>

@@ -26,6 +26,8 @@
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventdenoise method=stcf ! eventrender !
  * videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include "gst/base/types.hpp"
 #include "gst/filter/eventfilter.hpp"
@@ -54,10 +56,9 @@ static GType method_type() {
 static void gst_event_denoise_class_init(GstEventDenoiseClass* klass) {
   using Settings = DenoiseFilter::Settings;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(
-      &Settings::method,
-      g_param_spec_enum("method", "Method", "How noise is distinguished from signal", method_type(),
-                        static_cast<int>(Settings().method), mutable_playing_flags));
+  properties.add(&Settings::method,
+                 g_param_spec_enum("method", "Method", "Denoising method", method_type(),
+                                   static_cast<int>(Settings().method), mutable_playing_flags));
   properties.add(&Settings::correlation_time,
                  g_param_spec_uint64("correlation-time", "Correlation time",
                                      "Maximum time between events that support each other (ns; "
@@ -66,12 +67,12 @@ static void gst_event_denoise_class_init(GstEventDenoiseClass* klass) {
                                      Settings().correlation_time, mutable_playing_flags));
   properties.add(&Settings::min_neighbours,
                  g_param_spec_uint("min-neighbours", "Minimum neighbours",
-                                   "Neighbours that must support an event (stcf)", 1, 8,
+                                   "Minimum number of supporting neighbours (stcf)", 1, 8,
                                    Settings().min_neighbours, mutable_playing_flags));
   properties.add(
       &Settings::match_polarity,
       g_param_spec_boolean("match-polarity", "Match polarity",
-                           "Whether only events of equal polarity support each other "
+                           "Require support by events of equal polarity "
                            "(baf, stcf)",
                            Settings().match_polarity ? TRUE : FALSE, mutable_playing_flags));
   properties.add(

@@ -15,6 +15,8 @@
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventflip video-direction=90r !
  * eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/video/video.h>
 
@@ -64,8 +66,7 @@ class Flip final : public EventFilter {
   }
   void stop() override {}
   LabelledEvents filter(LabelledEvents events, Microseconds /*start*/) override {
-    // One that was set after the caps were negotiated may have to wait for those of the next
-    // buffer.
+    // A direction that changes the size applies only after the next negotiation of caps.
     const Orientation wanted = orientation_of(settings.copy().direction);
     if (wanted.size(in_) == out_) orientation_ = wanted;
     return FlipFilter(in_, orientation_).filter(events);

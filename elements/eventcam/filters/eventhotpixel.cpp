@@ -12,7 +12,7 @@
  *
  * With #GstEventHotPixel:location, the hot pixels are read from the file, if there is one, when the
  * stream begins, and written to it when the element stops or the size of the sensor changes, if
- * others were found; without #GstEventHotPixel:learn, they are only read. It is a text file with
+ * they have changed; without #GstEventHotPixel:learn, they are only read. It is a text file with
  * the column and row of a pixel in each line; those outside the sensor stay in it. For a camera,
  * learn once with the lens covered or in front of an even scene, and use that file from then on.
  *
@@ -27,6 +27,8 @@
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventhotpixel learn=false
  * location=hot-pixels.txt ! eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include <algorithm>
 #include <filesystem>
@@ -119,7 +121,7 @@ static void gst_event_hot_pixel_class_init(GstEventHotPixelClass* klass) {
   properties.add(&Settings::location,
                  g_param_spec_string("location", "Location",
                                      "Text file of hot pixels, read at the start and, with learn, "
-                                     "written on stop if others were found",
+                                     "written on stop if they have changed",
                                      "", mutable_ready_flags));
   properties.add(&Settings::learn,
                  g_param_spec_boolean("learn", "Learn",

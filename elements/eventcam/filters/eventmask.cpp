@@ -12,6 +12,8 @@
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventmask location=mask.png !
  * eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include <cstddef>
 #include <string>

@@ -33,6 +33,8 @@
  * num-buffers=300 is-live=true pattern=ball ! eventsim-diff ! queue ! m.  videotestsrc
  * num-buffers=300 is-live=true pattern=snow ! eventsim-frame ! queue ! m.
  * ]|
+ *
+ * Since: 0.1
  */
 #include <algorithm>
 #include <map>
@@ -43,6 +45,7 @@
 #include <vector>
 
 #include "elements/eventcam/filters/eventmerge_pad.hpp"
+#include "elements/eventcam/filters/merged_timeline.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
@@ -100,8 +103,8 @@ std::vector<OwnedAggregatorPad> numbered_pads(gpointer element) {
 class EventMerge final : public EventAggregator {
  public:
   explicit EventMerge(GstAggregator* element)
-      : EventAggregator(element, {.verb = "merge", .main_pad = nullptr, .passes_main_pad = false}) {
-  }
+      : EventAggregator(element, {.verb = "merge", .main_pad = nullptr, .passes_main_pad = false}),
+        timeline(GST_ELEMENT(element)) {}
 
   void stop() override;
   void flush() noexcept override;
@@ -109,12 +112,13 @@ class EventMerge final : public EventAggregator {
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
-  void prepare_seek(const SeekRequest& request) override;
+  void prepare_seek(const SeekRequest& request) override { timeline.seek(request); }
 
   GstFlowReturn choose_caps(GstCaps* downstream, GstCaps** result);
   GstStructure* stats() const;
 
   Guarded<Settings> settings;
+  MergedTimeline timeline;
   /// Positions of pads that were released before they were ever linked, by name, for the next
   /// request. In a launch line, gst_element_link_pads_full() requests a pad and releases it again
   /// if the pad to link is not there yet, and gst_parse_new_child() of GStreamer's grammar.y sets a
@@ -132,9 +136,6 @@ class EventMerge final : public EventAggregator {
   GstFlowReturn push_empty_interval(GstClockTime start, GstClockTime duration);
 
   Guarded<Counts> counts_;
-  Guarded<std::optional<SeekRequest>> sought_;  ///< the latest seek
-
-  // Only for the source pad's thread, or while it does not run.
   EventMerger merger_;
   EventBuffers buffers_;
   GstClockTime latency_ = 0;
@@ -147,9 +148,9 @@ class EventMerge final : public EventAggregator {
 
 /* input */
 
-/// Pauses while streams are missing: gst_aggregator_aggregate_func() waits for data of the pads
-/// that are there, and calls aggregate() again without a pause if all have some. Returns false if
-/// more pauses are needed, true once the latency of live streams has passed.
+/// Pauses while streams are missing: gst_aggregator_aggregate_func() waits for data of the existing
+/// pads only, and calls aggregate() again without a pause if all have some. Returns false if more
+/// pauses are needed, true once the latency of live streams has passed.
 bool EventMerge::wait_for_streams(std::size_t linked) {
   constexpr gint64 pause = 10'000;
   constexpr gint64 patience = G_USEC_PER_SEC;  // decodebin adds its pads late
@@ -218,23 +219,13 @@ bool EventMerge::load(const OwnedAggregatorPad& pad) {
     }
     gst_aggregator_pad_drop_buffer(pad.get());
   }
-  stream.input.unload();
-  stream.loaded.reset();
+  stream.unload();
   return false;
 }
 
 /* output */
 
-/// Segment of a pad, up to the latest end of all segments.
-GstSegment longest_segment(const OwnedAggregatorPad& of, std::span<const OwnedAggregatorPad> pads) {
-  GstSegment segment = segment_of(of.get());
-  for (const auto& pad : pads)
-    segment.stop = std::max(segment.stop, segment_of(pad.get()).stop);  // none is the maximum
-  return segment;
-}
-
-/// Sets the segment of the output, once: the segment of the stream that starts first, up to the
-/// latest end; start and stop of a seek replace those, as not all streams may reach them.
+/// Sets the segment of the output, once.
 void EventMerge::choose_segment(std::span<const OwnedAggregatorPad> pads) {
   if (pads.empty() || std::exchange(segment_chosen_, true)) return;
   const auto& first = *std::ranges::min_element(
@@ -243,27 +234,7 @@ void EventMerge::choose_segment(std::span<const OwnedAggregatorPad> pads) {
     stream_of(pad).has_output_segment = pad == first;
     stream_of(pad).segment_is_new = stream_of(pad).goes_back = false;
   }
-  GstSegment chosen = longest_segment(first, pads);
-  const auto sought = sought_.copy();
-  // A further seek may be on its way.
-  if (sought && std::ranges::any_of(pads, [&](const auto& pad) {
-        return stream_of(pad).segment_seqnum == sought->seqnum();
-      })) {
-    const MergedTimeline timeline(GST_ELEMENT(element()));
-    if (const auto start = sought->start()) {
-      chosen.start = chosen.position = timeline.timestamp_at(*start);
-      chosen.time = static_cast<GstClockTime>(*start);
-    }
-    if (const auto end = sought->stop(); end && *end >= 0)
-      chosen.stop = timeline.timestamp_at(*end);
-  }
-  set_segment(chosen);
-}
-
-void EventMerge::prepare_seek(const SeekRequest& request) {
-  const auto last = std::exchange(*sought_.lock(), request);
-  if (last && last->seqnum() == request.seqnum()) return;  // a bin sends one to each of its sinks
-  MergedTimeline(GST_ELEMENT(element())).translate(request);
+  set_segment(timeline.segment(first, pads));
 }
 
 void EventMerge::count(const MergedInterval& interval) {
@@ -360,15 +331,14 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
       continue;
     discontinuous_ |= std::exchange(stream.discontinuous, false);
     if (std::exchange(stream.segment_is_new, false) && stream.has_output_segment)
-      set_segment(longest_segment(pad, pads));
+      set_segment(MergedTimeline::longest_segment(pad, pads));
   }
   const GstFlowReturn result = push_interval(interval, inputs);
   for (const auto& pad : pads) {
     auto& stream = stream_of(pad);
     if (!stream.input.is_loaded() || !stream.input.is_merged(interval.end) || stream.goes_back)
       continue;
-    stream.input.unload();
-    stream.loaded.reset();
+    stream.unload();
     gst_aggregator_pad_drop_buffer(pad.get());
   }
   return result;
@@ -446,13 +416,8 @@ GstFlowReturn EventMerge::choose_caps(GstCaps* downstream, GstCaps** result) {
 }
 
 void EventMerge::flush() noexcept {
-  for_each_sink_pad(element(), [](GstAggregatorPad* pad) {
-    auto& stream = *GST_EVENT_MERGE_PAD(pad)->priv;
-    stream.input.unload();
-    stream.loaded.reset();
-    stream.discontinuous = false;
-    stream.segment_is_new = stream.goes_back = false;
-  });
+  for_each_sink_pad(element(),
+                    [](GstAggregatorPad* pad) { GST_EVENT_MERGE_PAD(pad)->priv->flush(); });
   merger_.restart();
   segment_chosen_ = false;
   discontinuous_ = true;
@@ -461,12 +426,8 @@ void EventMerge::flush() noexcept {
 
 void EventMerge::stop() {
   flush();
-  for (const auto& pad : numbered_pads(element())) {
-    stream_of(pad).sensor = {};
-    stream_of(pad).segment_seqnum = GST_SEQNUM_INVALID;
-    gst_segment_init(&*stream_of(pad).segment.lock(), GST_FORMAT_TIME);
-  }
-  sought_.lock()->reset();
+  for (const auto& pad : numbered_pads(element())) stream_of(pad).stop();
+  timeline.reset();
   buffers_.reset();
   latency_ = 0;
   gst_aggregator_set_latency(element(), latency_, latency_);
@@ -547,43 +508,22 @@ static void release_pad(GstElement* element, GstPad* pad) {
   PARENT_ELEMENT_CLASS->release_pad(element, pad);
 }
 
-/// Keeps the segment, which a flush resets, for a second seek before the next segment.
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
-  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && segment_of(event).format == GST_FORMAT_TIME) {
-    auto& stream = *GST_EVENT_MERGE_PAD(pad)->priv;
-    const auto last = std::exchange(*stream.segment.lock(), segment_of(event));
-    if (stream.segment_seqnum != GST_SEQNUM_INVALID)
-      stream.segment_is_new |= !continues(last, segment_of(event));
-    stream.segment_seqnum = gst_event_get_seqnum(event);
-  }
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && segment_of(event).format == GST_FORMAT_TIME)
+    GST_EVENT_MERGE_PAD(pad)->priv->handle_segment(event);
   return PARENT_AGGREGATOR_CLASS->sink_event(aggregator, pad, event);
 }
 
-static gboolean answer_duration(GstAggregator* aggregator, GstQuery* query) {
-  const auto duration = MergedTimeline(GST_ELEMENT(aggregator)).duration();
-  if (duration) gst_query_set_duration(query, GST_FORMAT_TIME, *duration);
-  return duration ? TRUE : FALSE;
-}
-
-/// Seekable up to the end of the last stream, if all streams are.
-static gboolean answer_seeking(GstAggregator* aggregator, GstQuery* query) {
-  if (!PARENT_AGGREGATOR_CLASS->src_query(aggregator, query)) return FALSE;
-  GstFormat format = GST_FORMAT_UNDEFINED;
-  gboolean seekable = FALSE;
-  gst_query_parse_seeking(query, &format, &seekable, nullptr, nullptr);
-  const auto duration = MergedTimeline(GST_ELEMENT(aggregator)).duration();
-  if (seekable && format == GST_FORMAT_TIME && duration)
-    gst_query_set_seeking(query, format, TRUE, 0, *duration);
-  return TRUE;
-}
-
 static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
-  if (GST_QUERY_TYPE(query) == GST_QUERY_SEEKING) return answer_seeking(aggregator, query);
+  const auto& timeline = aggregator_impl<EventMerge>(aggregator).timeline;
   GstFormat format = GST_FORMAT_UNDEFINED;
-  if (GST_QUERY_TYPE(query) == GST_QUERY_DURATION)
+  if (GST_QUERY_TYPE(query) == GST_QUERY_DURATION) {
     gst_query_parse_duration(query, &format, nullptr);
-  return format == GST_FORMAT_TIME ? answer_duration(aggregator, query)
-                                   : PARENT_AGGREGATOR_CLASS->src_query(aggregator, query);
+    if (format == GST_FORMAT_TIME) return timeline.answer_duration(query);
+  }
+  if (!PARENT_AGGREGATOR_CLASS->src_query(aggregator, query)) return FALSE;
+  if (GST_QUERY_TYPE(query) == GST_QUERY_SEEKING) timeline.extend_seeking(query);
+  return TRUE;
 }
 
 static Guarded<Settings>& settings_of(GObject* object) {
@@ -599,8 +539,8 @@ static void gst_event_merge_class_init(GstEventMergeClass* klass) {
   properties.add(
       &Settings::min_streams,
       g_param_spec_uint("min-streams", "Minimum streams",
-                        "Number of streams that are waited for before the output starts; live "
-                        "sources are waited for no longer than the latency",
+                        "Number of linked streams that the output needs to start; live sources "
+                        "wait for them no longer than the latency",
                         1, G_MAXUINT, Settings().min_streams, mutable_ready_flags));
   install_stats(
       G_OBJECT_CLASS(klass),

@@ -4,11 +4,9 @@
 #include <gst/base/gstaggregator.h>
 
 #include <atomic>
-#include <optional>
 
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
-#include "gst/base/seek_request.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/filter/event_merge.hpp"
 
@@ -25,13 +23,19 @@ struct SensorPosition {
 G_DECLARE_FINAL_TYPE(GstEventMergePad, gst_event_merge_pad, GST, EVENT_MERGE_PAD, GstAggregatorPad)
 
 struct GstEventMergePadPrivate {
-  GstEventMergePadPrivate() { gst_segment_init(&*segment.lock(), GST_FORMAT_TIME); }
+  GstEventMergePadPrivate() { stop(); }
+
+  /// Drops the loaded interval.
+  void unload();
+  void flush();
+  void stop();
+  /// Keeps the segment, which a flush resets, for a second seek before the next segment.
+  void handle_segment(GstEvent* event);
 
   Guarded<SensorPosition> position;  ///< properties xpos and ypos
   std::atomic<bool> was_linked = false;
   Guarded<GstSegment> segment;  ///< the last one received; a flush does not reset it
 
-  // Only for the source pad's thread, or while it does not run.
   guint32 segment_seqnum = GST_SEQNUM_INVALID;
   bool segment_is_new = false;      ///< not the first segment, and none of its events are merged
   bool goes_back = false;           ///< the loaded interval goes back in a new segment, and waits
@@ -46,22 +50,4 @@ struct GstEventMergePadPrivate {
 struct _GstEventMergePad {
   GstAggregatorPad parent;
   GstEventMergePadPrivate* priv;
-};
-
-/// Stream time of the output: 0 is the timestamp at which the first input starts.
-class MergedTimeline {
- public:
-  explicit MergedTimeline(GstElement* element);
-
-  /// Duration up to the end of the last stream; none if no end is known.
-  std::optional<gint64> duration() const;
-  /// Timestamp of a stream time.
-  GstClockTime timestamp_at(gint64 stream_time) const;
-
-  /// Translates the seek that GstAggregator forwards next to the stream time of each input.
-  void translate(const SeekRequest& request) const;
-
- private:
-  GstElement* element_;
-  GstClockTimeDiff start_ = G_MAXINT64;
 };

@@ -2,16 +2,18 @@
 /**
  * SECTION:element-eventpolarity
  * @title: eventpolarity
- * @short_description: keeps one polarity, or exchanges both
+ * @short_description: keeps one polarity, or swaps both
  *
- * Keeps the ON or the OFF events, and with #GstEventPolarity:invert exchanges ON and OFF of those
- * that are kept.
+ * Keeps ON events, OFF events or both, and with #GstEventPolarity:invert swaps the polarity of the
+ * kept events.
  *
  * ## Example launch line
  * |[
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventpolarity keep=on ! eventrender !
  * videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include "gst/base/types.hpp"
 #include "gst/filter/eventfilter.hpp"
@@ -36,13 +38,11 @@ static GType kept_type() {
 static void gst_event_polarity_class_init(GstEventPolarityClass* klass) {
   using Settings = PolarityFilter::Settings;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(
-      &Settings::keep,
-      g_param_spec_enum("keep", "Keep", "Polarity of the events that are kept", kept_type(),
-                        static_cast<int>(Settings().keep), mutable_playing_flags));
-  properties.add(&Settings::invert,
-                 g_param_spec_boolean("invert", "Invert", "Whether ON becomes OFF, and OFF ON",
-                                      FALSE, mutable_playing_flags));
+  properties.add(&Settings::keep,
+                 g_param_spec_enum("keep", "Keep", "Polarity of the events to keep", kept_type(),
+                                   static_cast<int>(Settings().keep), mutable_playing_flags));
+  properties.add(&Settings::invert, g_param_spec_boolean("invert", "Invert", "Swap ON and OFF",
+                                                         FALSE, mutable_playing_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event polarity", "Filter",
-                                        "Keeps one polarity, or exchanges both", EVENTSIM_AUTHORS);
+                                        "Keeps one polarity, or swaps both", EVENTSIM_AUTHORS);
 }

@@ -19,6 +19,8 @@
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventratecontrol max-rate=1000000 !
  * eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/rate_filter.hpp"

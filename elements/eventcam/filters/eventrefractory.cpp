@@ -16,6 +16,8 @@
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventrefractory
  * refractory-period=10000000 ! eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/refractory_filter.hpp"

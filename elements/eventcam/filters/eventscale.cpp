@@ -20,6 +20,8 @@
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventscale min-events=4 !
  * application/x-event-camera,width=320,height=240 ! eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include <algorithm>
 #include <cmath>
@@ -84,8 +86,8 @@ static void gst_event_scale_class_init(GstEventScaleClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
   properties.add(&Settings::min_events,
                  g_param_spec_uint("min-events", "Minimum events",
-                                   "Number of events of a polarity at a pixel of the output for "
-                                   "which it fires once, at the time of the last one (events)",
+                                   "Number of events of a polarity for which an output pixel "
+                                   "fires once, at the time of the last one (events)",
                                    1, ScaleFilter::max_min_events, Settings().min_events,
                                    mutable_playing_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event scaler", "Filter",

@@ -20,6 +20,8 @@
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventtrail mode=stc-cut-trail !
  * eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include "gst/base/types.hpp"
 #include "gst/filter/eventfilter.hpp"

@@ -18,6 +18,8 @@
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventundistort location=camera.yaml !
  * eventrender ! videoconvert ! autovideosink
  * ]|
+ *
+ * Since: 0.1
  */
 #include <cstddef>
 #include <stdexcept>

@@ -20,7 +20,7 @@
  * - `reference-matches`, `candidate-matches` (#GstStructure): the fractions of the events of each
  *   stream that have a match in the other, of the same polarity, at the same pixel or next to it
  *   (#gdouble, `within-1ms`, `within-5ms`, `within-10ms`), and `nearest-distance` (#guint64): the
- * mean time to the nearest such event, in ns; 10 ms of those without one;
+ * mean time to the nearest such event, in ns; events without one count as 10 ms;
  * - `noise-ceiling` (#GstStructure): `map-correlation`, `rate-correlation`, `interval-distance` and
  *   `matches` of a second recording of the reference's scene, estimated from two halves of its
  *   events, chosen by chance (split halves, Spearman-Brown); a good simulator can come out slightly
@@ -34,8 +34,8 @@
  *   `true-positive-rate` (recall), `false-positive-rate` and `precision` (#gdouble). Events of
  *   unknown cause do not count.
  *
- * Where the stream time of one goes back, as in the next recording of a concat, it waits until that
- * of the other does, or that ends. Then another comparison starts.
+ * If the stream time of one input goes back, as in the next recording of a concat, that input waits
+ * until the other goes back, too, or ends. Then another comparison starts.
  *
  * The same is written to #GstEventCompare:location as JSON. #GstEventCompare:map shows the events
  * per pixel of the reference, of the candidate and of their difference, blue if the candidate has
@@ -52,6 +52,8 @@
  * num-buffers=100 ! eventsim-dvs preset=davis346 label=true ! tee name=t ! queue !
  * compare.reference  t. ! queue ! compare.candidate
  * ]|
+ *
+ * Since: 0.1
  */
 #include <optional>
 
@@ -110,7 +112,6 @@ class EventCompare final : public EventAggregator {
 
   const PerRole<GstAggregatorPad*> pads_{pad("reference"), pad("candidate")};
 
-  // Accessed by the source pad's thread only, or while there is none.
   PerRole<std::optional<SensorSize>> sensors_;
   std::optional<StreamComparison> comparison_;  // set once both sensors are known
   bool concluded_ = true;                       // no events since the last report
@@ -237,7 +238,7 @@ void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
   warn(skipped, buffer);
 }
 
-/// True if the next buffer of a stream is earlier than what was compared of it.
+/// True if the next buffer of a stream is earlier than its compared part.
 bool EventCompare::goes_back(StreamRole role) const {
   const auto end = comparison_ ? comparison_->end_of(role) : std::nullopt;
   const auto buffer = next_buffer(pads_[role]);
@@ -248,12 +249,12 @@ bool EventCompare::goes_back(StreamRole role) const {
   return clipped && stream_time(segment, clipped->start) < *end - Nanoseconds{event_resolution};
 }
 
-/// True if nothing more of a stream belongs to the comparison.
+/// True if a stream has no more events in the comparison.
 bool EventCompare::is_over(StreamRole role) const {
   return has_ended(pads_[role]) || goes_back(role);
 }
 
-/// True if the reference does not cover all that has been read of the candidate yet.
+/// True if the reference does not cover the candidate's buffers so far yet.
 bool EventCompare::waits_for_reference() const {
   return comparison_ && comparison_->behind() == StreamRole::reference &&
          !is_over(StreamRole::reference);

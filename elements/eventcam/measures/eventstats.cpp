@@ -6,7 +6,7 @@
  *
  * Passes events through and posts element messages `eventstats`: after every
  * #GstEventStats:interval of stream time with the statistics since the last one, and at EOS, at the
- * end of the segment in a segment seek, or on stop with the statistics of all of it.
+ * end of the segment in a segment seek, or on stop with the cumulative statistics.
  * Intervals end at buffer boundaries; events outside the segment are not counted.
  *
  * - `cumulative` (#gboolean): %TRUE for the statistics of the whole stream or segment;
@@ -35,6 +35,8 @@
  * gst-launch-1.0 -m videotestsrc pattern=ball num-buffers=100 ! eventsim-dvs preset=davis346
  * label=true ! eventstats ! fakesink
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/base/gstbasetransform.h>
 
@@ -45,6 +47,7 @@
 #include "elements/eventcam/measures/clipped_events.hpp"
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
@@ -107,29 +110,26 @@ struct Measurement {
   bool concluded = true;             ///< no events since the last report
 };
 
-struct Private {
-  Guarded<Settings> settings;
-
-  // Accessed by the streaming thread only, or while there is none.
+/// State from start to stop.
+struct Stream {
   std::optional<Measurement> measurement;
   bool segment_reported = false;  ///< a segment has ended, and so has its measurement
   EventFaults faults{"count", GST_CAT_DEFAULT};
 };
 
-}  // namespace
+struct Private {
+  explicit Private(GstBaseTransform* element) : stream(GST_BASE_TRANSFORM_SINK_PAD(element)) {}
 
-G_DECLARE_FINAL_TYPE(GstEventStats, gst_event_stats, GST, EVENT_STATS, GstBaseTransform)
-
-struct _GstEventStats {
-  GstBaseTransform parent;
-  Private* priv;
+  Guarded<Settings> settings;
+  StreamLocked<Stream> stream;
 };
 
-G_DEFINE_TYPE_WITH_CODE(GstEventStats, gst_event_stats, GST_TYPE_BASE_TRANSFORM,
-                        GST_DEBUG_CATEGORY_INIT(event_stats_debug, "eventstats", 0,
-                                                "statistics of event streams"))
+}  // namespace
+
+DEFINE_EVENT_ELEMENT(GstEventStats, gst_event_stats, EVENT_STATS, GstBaseTransform,
+                     GST_TYPE_BASE_TRANSFORM, eventstats, GST_RANK_NONE,
+                     "statistics of event streams")
 #define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_stats_parent_class)
-GST_ELEMENT_REGISTER_DEFINE(eventstats, "eventstats", GST_RANK_NONE, gst_event_stats_get_type())
 
 static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_STATS(object)->priv->settings;
@@ -163,7 +163,7 @@ static void post(GstEventStats* self, GstStructure* structure) {
 /// May throw.
 static void conclude(GstEventStats* self, const ReportFiles& files) {
   Measurement nothing(1, 1);
-  auto& measurement = self->priv->measurement ? *self->priv->measurement : nothing;
+  auto& measurement = self->priv->stream->measurement ? *self->priv->stream->measurement : nothing;
   measurement.concluded = true;
   GstStructure* figures = figures_of(measurement.cumulative, measurement.end.value_or(0), true);
   GST_DEBUG_OBJECT(self, "concluding: %" GST_PTR_FORMAT, figures);
@@ -172,19 +172,19 @@ static void conclude(GstEventStats* self, const ReportFiles& files) {
 }
 
 /// True if there were events since the last report.
-static bool has_news(const Private& priv) {
-  return priv.measurement && !priv.measurement->concluded;
+static bool has_news(Private& priv) {
+  return priv.stream->measurement && !priv.stream->measurement->concluded;
 }
 
 /// Starts measuring a sensor of this size. May throw.
 static void measure(GstEventStats* self, int width, int height) {
   GST_DEBUG_OBJECT(self, "counting the events of %dx%d pixels", width, height);
-  self->priv->measurement.emplace(width, height);
+  self->priv->stream->measurement.emplace(width, height);
 }
 
 /// Starts over with the same sensor, if it is known. May throw.
 static void start_over(GstEventStats* self) {
-  if (const auto& measurement = self->priv->measurement)
+  if (const auto& measurement = self->priv->stream->measurement)
     measure(self, measurement->width, measurement->height);
 }
 
@@ -193,7 +193,7 @@ static void start_over(GstEventStats* self) {
 /// Adds an interval. Gaps between intervals count as time without events; if time goes backwards,
 /// no inter-event interval spans the discontinuity.
 static void cover(GstEventStats* self, const EventInterval& interval) {
-  auto& measurement = *self->priv->measurement;
+  auto& measurement = *self->priv->stream->measurement;
   const auto& segment = GST_BASE_TRANSFORM(self)->segment;
   const Nanoseconds start = stream_time(segment, interval.start);
   const Nanoseconds end = stream_time(segment, interval.end);
@@ -225,7 +225,7 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
                   const EventInterval& whole, const EventInterval& clipped) {
   const MappedEvents mapped(buffer);
   if (!mapped) {
-    self->priv->faults.warn(self, EventFault::partial_event, buffer);
+    self->priv->stream->faults.warn(self, EventFault::partial_event, buffer);
     return;
   }
   const auto [events, labels] = ClippedEvents(mapped, buffer, whole, clipped);
@@ -241,15 +241,15 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
         }
       },
       labels);
-  self->priv->faults.warn(self, skipped, buffer);
+  self->priv->stream->faults.warn(self, skipped, buffer);
 }
 
 static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer) {
   auto* self = GST_EVENT_STATS(transform);
-  auto& measurement = self->priv->measurement;
+  auto& measurement = self->priv->stream->measurement;
   const auto interval = interval_of(buffer);
   if (!interval) {
-    self->priv->faults.warn(self, interval_fault(buffer), buffer);
+    self->priv->stream->faults.warn(self, interval_fault(buffer), buffer);
     return GST_FLOW_OK;
   }
   if (!measurement) return GST_FLOW_NOT_NEGOTIATED;
@@ -268,7 +268,7 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
 
 /// May throw.
 static void handle_gap(GstEventStats* self, GstEvent* event) {
-  auto& measurement = self->priv->measurement;
+  auto& measurement = self->priv->stream->measurement;
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
@@ -291,14 +291,14 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
       if (!plays_events(self, event, "measure")) return FALSE;
       break;
     case GST_EVENT_SEGMENT_DONE:
-      priv.segment_reported = true;
+      priv.stream->segment_reported = true;
       reported(self, [&] {
         conclude(self, priv.settings.copy());
         start_over(self);
       });
       break;
     case GST_EVENT_EOS:
-      if (!priv.segment_reported || has_news(priv))
+      if (!priv.stream->segment_reported || has_news(priv))
         reported(self, [&] { conclude(self, priv.settings.copy()); });
       break;
     case GST_EVENT_FLUSH_STOP:
@@ -314,7 +314,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
 
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
   auto* self = GST_EVENT_STATS(transform);
-  auto& measurement = self->priv->measurement;
+  auto& measurement = self->priv->stream->measurement;
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, in)) return FALSE;
   if (measurement && measurement->width == info.width && measurement->height == info.height)
@@ -337,21 +337,14 @@ static gboolean stop(GstBaseTransform* transform) {
   auto* self = GST_EVENT_STATS(transform);
   auto& priv = *self->priv;
   if (has_news(priv)) reported(self, [&] { conclude(self, priv.settings.copy()); });
-  priv.measurement.reset();
-  priv.segment_reported = false;
-  priv.faults.reset();
+  priv.stream.reset();
   return TRUE;
 }
 
 /* type */
 
-static void finalize(GObject* object) {
-  delete GST_EVENT_STATS(object)->priv;
-  G_OBJECT_CLASS(gst_event_stats_parent_class)->finalize(object);
-}
-
 static void gst_event_stats_init(GstEventStats* self) {
-  self->priv = new Private;
+  self->priv = new Private(GST_BASE_TRANSFORM(self));
   gst_base_transform_set_passthrough(GST_BASE_TRANSFORM(self), TRUE);
   gst_base_transform_set_gap_aware(GST_BASE_TRANSFORM(self), TRUE);
 }

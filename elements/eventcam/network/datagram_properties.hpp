@@ -9,6 +9,16 @@
 #include "gst/base/types.hpp"
 #include "src/wire/datagram_settings.hpp"
 
+/// Counts of datagrams. Losses are known only if datagrams have a sequence number.
+struct DatagramCounts {
+  guint64 packets = 0;
+  guint64 events = 0;
+  guint64 bytes = 0;
+  guint64 lost = 0;
+  guint64 late = 0;
+  guint64 rejected = 0;
+};
+
 inline GType datagram_format_type() {
   using eventcamera::DatagramFormat;
   static const GEnumValue values[] = {

@@ -32,23 +32,24 @@
  * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-diff !
  * eventdatagrampay format=spif ! udpsink host=receiver port=3333
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/gst.h>
+#include <gst/net/gstnetaddressmeta.h>
 
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
-#include "elements/eventcam/network/current_sender.hpp"
-#include "elements/eventcam/network/datagram_counts.hpp"
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/latency.hpp"
@@ -70,6 +71,41 @@ using eventcamera::Microseconds;
 using eventcamera::Reception;
 
 namespace {
+
+/// Follows the first of several senders until it has been silent for a second. Datagrams without an
+/// address, which udpsrc adds, count as one sender's.
+class CurrentSender {
+ public:
+  /// Whether a datagram that arrived at this running time may be from the current sender.
+  bool may_have_sent(GstBuffer* datagram, GstClockTime arrival) const {
+    const GstNetAddressMeta* meta = gst_buffer_get_net_address_meta(datagram);
+    return meta == nullptr || !GST_CLOCK_TIME_IS_VALID(arrival) || !address_ || is_of(meta->addr) ||
+           arrival >= last_ + max_silence;
+  }
+
+  /// Makes the sender of a valid datagram the current one.
+  void follow(GstBuffer* datagram, GstClockTime arrival) {
+    const GstNetAddressMeta* meta = gst_buffer_get_net_address_meta(datagram);
+    if (meta == nullptr || !GST_CLOCK_TIME_IS_VALID(arrival)) return;
+    if (!is_of(meta->addr)) address_.reset(G_SOCKET_ADDRESS(g_object_ref(meta->addr)));
+    last_ = arrival;
+  }
+
+ private:
+  static constexpr GstClockTime max_silence = GST_SECOND;
+
+  bool is_of(GSocketAddress* address) const {
+    if (!address_ || !G_IS_INET_SOCKET_ADDRESS(address)) return address_.get() == address;
+    auto* const ours = G_INET_SOCKET_ADDRESS(address_.get());
+    auto* const theirs = G_INET_SOCKET_ADDRESS(address);
+    return g_inet_socket_address_get_port(ours) == g_inet_socket_address_get_port(theirs) &&
+           g_inet_address_equal(g_inet_socket_address_get_address(ours),
+                                g_inet_socket_address_get_address(theirs)) != FALSE;
+  }
+
+  std::unique_ptr<GSocketAddress, UnrefObject> address_;
+  GstClockTime last_ = 0;  ///< arrival of its last datagram
+};
 
 /// Largest difference between the running time of an event and of its arrival.
 constexpr GstClockTimeDiff max_drift = GST_SECOND;
@@ -97,34 +133,29 @@ struct Settings : DatagramSettings {
   GstClockTime latency = 10 * GST_MSECOND;
 };
 
-struct Private {
-  Guarded<Settings> settings;
-  Guarded<DatagramCounts> counts;
-  GstPad* sink = nullptr;
-  GstPad* src = nullptr;
-
-  // Accessed by the streaming thread only, or while there is none.
+/// State from start to stop.
+struct Stream {
   std::optional<State> state;
   WarnOnce warn_of_rejected{GST_CAT_DEFAULT};
   WarnOnce warn_of_second_sender{GST_CAT_DEFAULT};
   RepeatLevel late_level;
 };
 
-}  // namespace
+struct Private {
+  explicit Private(const std::pair<GstPad*, GstPad*>& pads) : sink(pads.first), src(pads.second) {}
 
-G_DECLARE_FINAL_TYPE(GstEventDatagramDepay, gst_event_datagram_depay, GST, EVENT_DATAGRAM_DEPAY,
-                     GstElement)
-
-struct _GstEventDatagramDepay {
-  GstElement parent;
-  Private* priv;
+  Guarded<Settings> settings;
+  Guarded<DatagramCounts> counts;
+  GstPad* const sink;
+  GstPad* const src;
+  StreamLocked<Stream> stream{sink};
 };
 
-G_DEFINE_TYPE_WITH_CODE(GstEventDatagramDepay, gst_event_datagram_depay, GST_TYPE_ELEMENT,
-                        GST_DEBUG_CATEGORY_INIT(event_datagram_depay_debug, "eventdatagramdepay", 0,
-                                                "datagrams of events from other tools"))
-GST_ELEMENT_REGISTER_DEFINE(eventdatagramdepay, "eventdatagramdepay", GST_RANK_NONE,
-                            gst_event_datagram_depay_get_type())
+}  // namespace
+
+DEFINE_EVENT_ELEMENT(GstEventDatagramDepay, gst_event_datagram_depay, EVENT_DATAGRAM_DEPAY,
+                     GstElement, GST_TYPE_ELEMENT, eventdatagramdepay, GST_RANK_NONE,
+                     "datagrams of events from other tools")
 
 static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_DATAGRAM_DEPAY(object)->priv->settings;
@@ -137,7 +168,7 @@ static GstClockTime nanoseconds(Microseconds t) {
 }
 
 static bool push_caps(GstEventDatagramDepay* self) {
-  auto& state = *self->priv->state;
+  auto& state = *self->priv->stream->state;
   if (state.has_caps) return true;
   const OwnedCaps caps = event_caps(state.settings.width, state.settings.height);
   GST_DEBUG_OBJECT(self, "the stream begins, with %" GST_PTR_FORMAT, caps.get());
@@ -162,7 +193,7 @@ static GstBuffer* buffer_of(std::span<const AbsoluteEvent> events, Microseconds 
 static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& reception,
                           GstClockTime arrival) {
   auto& priv = *self->priv;
-  auto& state = *priv.state;
+  auto& state = *priv.stream->state;
   const auto first = state.events.front().t;
   if (!push_caps(self))
     return GST_PAD_IS_FLUSHING(priv.src) ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED;
@@ -199,7 +230,7 @@ static void reject(GstEventDatagramDepay* self, const char* fault, gsize size,
                    GstClockTime arrival) {
   gchar* cause = g_strdup_printf("%" G_GSIZE_FORMAT " bytes at running time %" GST_TIME_FORMAT,
                                  size, GST_TIME_ARGS(arrival));
-  self->priv->warn_of_rejected(
+  self->priv->stream->warn_of_rejected(
       self,
       {GST_STREAM_ERROR_DECODE,
        std::string("Rejected a datagram: ") + fault +
@@ -215,7 +246,7 @@ static void reject_second_sender(GstEventDatagramDepay* self, GstClockTime arriv
   gchar* cause =
       g_strdup_printf("a datagram at running time %" GST_TIME_FORMAT " is from another address",
                       GST_TIME_ARGS(arrival));
-  self->priv->warn_of_second_sender(
+  self->priv->stream->warn_of_second_sender(
       self,
       {GST_RESOURCE_ERROR_BUSY,
        "Rejected the datagrams of a second sender, until the first is silent for a second; stats "
@@ -225,7 +256,7 @@ static void reject_second_sender(GstEventDatagramDepay* self, GstClockTime arriv
 }
 
 static void log_late(GstEventDatagramDepay* self, GstClockTime arrival) {
-  const auto level = self->priv->late_level.next();
+  const auto level = self->priv->stream->late_level.next();
   GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self,
                     "dropped the datagram of running time %" GST_TIME_FORMAT
                     ": later events arrived before it",
@@ -236,7 +267,7 @@ static void log_late(GstEventDatagramDepay* self, GstClockTime arrival) {
 static GstFlowReturn receive(GstEventDatagramDepay* self, GstBuffer* datagram,
                              std::span<const std::uint8_t> bytes, GstClockTime arrival) {
   auto& priv = *self->priv;
-  auto& state = *priv.state;
+  auto& state = *priv.stream->state;
   std::optional<Microseconds> time;
   if (GST_CLOCK_TIME_IS_VALID(arrival)) time = static_cast<Microseconds>(arrival / GST_USECOND);
   const auto reception = state.unpacker->unpack(bytes, time, state.events);
@@ -256,9 +287,10 @@ static GstFlowReturn receive(GstEventDatagramDepay* self, GstBuffer* datagram,
     state.sender.follow(datagram, arrival);
   if (reception.late) log_late(self, arrival);
   if (reception.lost > 0)
-    GST_DEBUG_OBJECT(
-        self, "lost %" G_GUINT64_FORMAT " datagrams before that of running time %" GST_TIME_FORMAT,
-        guint64{reception.lost}, GST_TIME_ARGS(arrival));
+    GST_DEBUG_OBJECT(self,
+                     "lost %" G_GUINT64_FORMAT
+                     " datagrams before the one of running time %" GST_TIME_FORMAT,
+                     guint64{reception.lost}, GST_TIME_ARGS(arrival));
   // A datagram without events, such as one with jAER's frame samples, may reveal a loss, too.
   state.is_discontinuous |= GST_BUFFER_IS_DISCONT(datagram) || reception.lost > 0;
   return state.events.empty() ? GST_FLOW_OK : push(self, reception, arrival);
@@ -273,7 +305,7 @@ static GstClockTime arrival_of(const State& state, GstBuffer* buffer) {
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   auto* self = GST_EVENT_DATAGRAM_DEPAY(parent);
   OwnedBuffer buffer(taken);
-  auto& state = self->priv->state;
+  auto& state = self->priv->stream->state;
   if (!state) return GST_FLOW_FLUSHING;
   const auto arrival = arrival_of(*state, taken);
   if (!GST_CLOCK_TIME_IS_VALID(arrival) && state->settings.format == DatagramFormat::spif) {
@@ -305,14 +337,14 @@ static bool start_stream(GstEventDatagramDepay* self, const DatagramSettings& se
   };
   return catch_exceptions(self, report, [&] {
     auto unpacker = make_datagram_unpacker(settings);
-    auto& state = self->priv->state;
+    auto& state = self->priv->stream->state;
     state.emplace(State{.settings = settings, .unpacker = std::move(unpacker)});
   });
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   auto* self = GST_EVENT_DATAGRAM_DEPAY(parent);
-  auto& state = self->priv->state;
+  auto& state = self->priv->stream->state;
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_SEGMENT:
       if (!plays_forwards(self, event, "receive")) return FALSE;
@@ -367,25 +399,15 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_datagram_depay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    self->priv->state.reset();
-    self->priv->warn_of_rejected.reset();
-    self->priv->warn_of_second_sender.reset();
-    self->priv->late_level.reset();
+    self->priv->stream.reset();
   }
   return result;
 }
 
 /* type */
 
-static void finalize(GObject* object) {
-  delete GST_EVENT_DATAGRAM_DEPAY(object)->priv;
-  G_OBJECT_CLASS(gst_event_datagram_depay_parent_class)->finalize(object);
-}
-
 static void gst_event_datagram_depay_init(GstEventDatagramDepay* self) {
-  self->priv = new Private;
-  auto& priv = *self->priv;
-  std::tie(priv.sink, priv.src) = add_pads(GST_ELEMENT(self), chain, sink_event, src_query);
+  self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));
 }
 
 static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klass) {

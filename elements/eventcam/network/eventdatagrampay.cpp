@@ -21,6 +21,8 @@
  * gst-launch-1.0 v4l2src ! eventsim-sparse ! eventdatagrampay format=t32-x16-y15-on1 ! udpsink
  * host=receiver port=5000
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/gst.h>
 
@@ -29,15 +31,15 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <tuple>
+#include <utility>
 #include <vector>
 
-#include "elements/eventcam/network/datagram_counts.hpp"
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "elements/eventcam/network/flush_timer.hpp"
 #include "elements/eventcam/network/max_latency.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
@@ -66,38 +68,32 @@ namespace {
 /// User-settable values.
 struct Settings : eventcamera::DatagramSettings, PayloaderSettings {};
 
-struct Private {
-  Guarded<Settings> settings;
-  Guarded<DatagramCounts> counts;
-  GstPad* sink = nullptr;
-  GstPad* src = nullptr;
-
-  // Accessed under the stream lock of the sink pad, or while nothing streams.
+/// State from start to stop.
+struct Stream {
   GstEventCameraInfo info{};
   std::unique_ptr<DatagramPacker> packer;
   std::vector<AbsoluteEvent> events;   ///< of the current buffer
   std::vector<OwnedBuffer> datagrams;  ///< complete but not yet pushed
   EventFaults faults{"send", GST_CAT_DEFAULT};
   std::optional<Microseconds> timed;  ///< first event of the datagram that the timer is set for
+};
 
+struct Private {
+  explicit Private(const std::pair<GstPad*, GstPad*>& pads) : sink(pads.first), src(pads.second) {}
+
+  Guarded<Settings> settings;
+  Guarded<DatagramCounts> counts;
+  GstPad* const sink;
+  GstPad* const src;
+  StreamLocked<Stream> stream{sink};
   FlushTimer timer;
 };
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventDatagramPay, gst_event_datagram_pay, GST, EVENT_DATAGRAM_PAY,
-                     GstElement)
-
-struct _GstEventDatagramPay {
-  GstElement parent;
-  Private* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstEventDatagramPay, gst_event_datagram_pay, GST_TYPE_ELEMENT,
-                        GST_DEBUG_CATEGORY_INIT(event_datagram_pay_debug, "eventdatagrampay", 0,
-                                                "datagrams of events for other tools"))
-GST_ELEMENT_REGISTER_DEFINE(eventdatagrampay, "eventdatagrampay", GST_RANK_NONE,
-                            gst_event_datagram_pay_get_type())
+DEFINE_EVENT_ELEMENT(GstEventDatagramPay, gst_event_datagram_pay, EVENT_DATAGRAM_PAY, GstElement,
+                     GST_TYPE_ELEMENT, eventdatagrampay, GST_RANK_NONE,
+                     "datagrams of events for other tools")
 
 static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_DATAGRAM_PAY(object)->priv->settings;
@@ -119,7 +115,7 @@ static void keep(Private& priv, const Datagram& datagram) {
   GST_BUFFER_PTS(buffer.get()) = static_cast<GstClockTime>(datagram.first) * GST_USECOND;
   GST_BUFFER_DURATION(buffer.get()) =
       static_cast<GstClockTime>(datagram.last - datagram.first) * GST_USECOND;
-  priv.datagrams.push_back(std::move(buffer));
+  priv.stream->datagrams.push_back(std::move(buffer));
   {
     const auto counts = priv.counts.lock();
     ++counts->packets;
@@ -130,13 +126,14 @@ static void keep(Private& priv, const Datagram& datagram) {
 
 /// Pushes the kept datagrams as a list, which udpsink sends with one system call.
 static GstFlowReturn push(Private& priv) {
-  if (priv.datagrams.empty()) return GST_FLOW_OK;
+  if (priv.stream->datagrams.empty()) return GST_FLOW_OK;
   GST_LOG_OBJECT(priv.src, "%" G_GSIZE_FORMAT " datagrams, the first at %" GST_TIME_FORMAT,
-                 priv.datagrams.size(),
-                 GST_TIME_ARGS(GST_BUFFER_PTS(priv.datagrams.front().get())));
-  GstBufferList* const list = gst_buffer_list_new_sized(static_cast<guint>(priv.datagrams.size()));
-  for (auto& datagram : priv.datagrams) gst_buffer_list_add(list, datagram.release());
-  priv.datagrams.clear();
+                 priv.stream->datagrams.size(),
+                 GST_TIME_ARGS(GST_BUFFER_PTS(priv.stream->datagrams.front().get())));
+  GstBufferList* const list =
+      gst_buffer_list_new_sized(static_cast<guint>(priv.stream->datagrams.size()));
+  for (auto& datagram : priv.stream->datagrams) gst_buffer_list_add(list, datagram.release());
+  priv.stream->datagrams.clear();
   return gst_pad_push_list(priv.src, list);
 }
 
@@ -144,9 +141,9 @@ static void flush_late(GstObject* element);
 
 /// Limits the time that a new incomplete datagram waits. May throw.
 static void set_timer(Private& priv) {
-  const auto since = priv.packer ? priv.packer->waiting_since() : std::nullopt;
-  if (since == priv.timed) return;
-  priv.timed = since;
+  const auto since = priv.stream->packer ? priv.stream->packer->waiting_since() : std::nullopt;
+  if (since == priv.stream->timed) return;
+  priv.stream->timed = since;
   if (since)
     priv.timer.set(priv.settings.copy().max_latency, priv.sink, flush_late);
   else
@@ -158,11 +155,12 @@ template <class Work>
 static GstFlowReturn pack(GstEventDatagramPay* self, const Work& work) {
   auto& priv = *self->priv;
   const bool packed = catch_exceptions(self, report_of, [&] {
-    if (priv.packer) work(*priv.packer, [&](const Datagram& datagram) { keep(priv, datagram); });
+    if (priv.stream->packer)
+      work(*priv.stream->packer, [&](const Datagram& datagram) { keep(priv, datagram); });
     set_timer(priv);
   });
   if (packed) return push(priv);
-  priv.datagrams.clear();
+  priv.stream->datagrams.clear();
   return GST_FLOW_ERROR;
 }
 
@@ -172,8 +170,8 @@ static GstFlowReturn flush(GstEventDatagramPay* self) {
 
 /// Drops the events that wait.
 static void drop(Private& priv) noexcept {
-  if (priv.packer) priv.packer->drop();
-  priv.timed.reset();
+  if (priv.stream->packer) priv.stream->packer->drop();
+  priv.stream->timed.reset();
   priv.timer.cancel();
 }
 
@@ -183,11 +181,11 @@ static void flush_late(GstObject* element) {
   flush(GST_EVENT_DATAGRAM_PAY(element));
 }
 
-/// True if events would wait for too long in the incomplete datagram. `interval` is that of the
-/// current buffer; the next one is expected to be as long.
+/// True if events would wait for too long in the incomplete datagram. `interval` is the current
+/// buffer's; the next one is expected to be as long.
 static bool is_flush_due(GstEventDatagramPay* self, const EventInterval& interval) {
-  const auto& priv = *self->priv;
-  const auto since = priv.packer->waiting_since();
+  auto& priv = *self->priv;
+  const auto since = priv.stream->packer->waiting_since();
   if (!since) return false;
   const auto next = interval.end + (interval.end - interval.start);
   return next >= static_cast<GstClockTime>(*since) * GST_USECOND + priv.settings.copy().max_latency;
@@ -206,34 +204,35 @@ static void collect(GstEventDatagramPay* self, GstBuffer* buffer, const MappedEv
   auto& priv = *self->priv;
   GST_LOG_OBJECT(priv.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                  mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
-  priv.events.clear();
+  const auto stream = priv.stream.lock();
+  stream->events.clear();
   for (const auto& event : mapped.events()) {
-    if (event.x < priv.info.width && event.y() < priv.info.height)
-      priv.events.push_back({mapped.start() + event.t, event.x, event.y_p});
+    if (event.x < stream->info.width && event.y() < stream->info.height)
+      stream->events.push_back({mapped.start() + event.t, event.x, event.y_p});
   }
-  if (priv.events.size() < mapped.events().size())
-    priv.faults.warn(self, EventFault::beyond_sensor, buffer);
+  if (stream->events.size() < mapped.events().size())
+    stream->faults.warn(self, EventFault::beyond_sensor, buffer);
 }
 
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   auto* self = GST_EVENT_DATAGRAM_PAY(parent);
   auto& priv = *self->priv;
   const OwnedBuffer buffer(taken);
-  if (!priv.packer) return GST_FLOW_NOT_NEGOTIATED;
+  if (!priv.stream->packer) return GST_FLOW_NOT_NEGOTIATED;
   const auto interval = interval_of(taken);
   if (!interval) {
-    priv.faults.warn(self, interval_fault(taken), taken);
+    priv.stream->faults.warn(self, interval_fault(taken), taken);
     return GST_FLOW_OK;
   }
   const MappedEvents mapped(taken);
   if (!mapped) {
-    priv.faults.warn(self, EventFault::partial_event, taken);
+    priv.stream->faults.warn(self, EventFault::partial_event, taken);
     return GST_FLOW_OK;
   }
   return pack(self, [&](DatagramPacker& packer, const auto& send) {
     collect(self, taken, mapped);
     packer.set_max_span(max_span(priv.settings.copy().max_latency));
-    packer.pack(priv.events, send);
+    packer.pack(priv.stream->events, send);
     if (is_flush_due(self, *interval)) packer.flush(send);
   });
 }
@@ -242,7 +241,7 @@ static void handle_gap(GstEventDatagramPay* self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
-  if (!self->priv->packer) return;
+  if (!self->priv->stream->packer) return;
   if (!GST_CLOCK_TIME_IS_VALID(duration) || start > G_MAXINT64 || duration > G_MAXINT64 / 2 ||
       is_flush_due(self, {start, start + duration}))
     flush(self);
@@ -254,14 +253,17 @@ static gboolean handle_caps(GstEventDatagramPay* self, GstEvent* event) {
   gst_event_parse_caps(event, &caps);
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
-  if (priv.packer && priv.info.width == info.width && priv.info.height == info.height) return TRUE;
+  if (priv.stream->packer && priv.stream->info.width == info.width &&
+      priv.stream->info.height == info.height)
+    return TRUE;
   flush(self);
   Settings settings = priv.settings.copy();
   settings.width = info.width;
   settings.height = info.height;
-  if (!catch_exceptions(self, report_of, [&] { priv.packer = make_datagram_packer(settings); }))
+  if (!catch_exceptions(self, report_of,
+                        [&] { priv.stream->packer = make_datagram_packer(settings); }))
     return FALSE;
-  priv.info = info;
+  priv.stream->info = info;
   const OwnedCaps out(gst_caps_new_simple("application/x-event-datagram", "format", G_TYPE_STRING,
                                           name_of(settings.format), nullptr));
   GST_DEBUG_OBJECT(self, "sending the events of %dx%d pixels as %" GST_PTR_FORMAT, info.width,
@@ -283,7 +285,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
     case GST_EVENT_SEGMENT:  // waiting events belong to the previous segment
     case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_EOS:
-      GST_DEBUG_OBJECT(pad, "sending what waits before %s", GST_EVENT_TYPE_NAME(event));
+      GST_DEBUG_OBJECT(pad, "sending the waiting events before %s", GST_EVENT_TYPE_NAME(event));
       flush(self);
       if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_events(self, event, "send"))
         return FALSE;
@@ -314,25 +316,15 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
       GST_ELEMENT_CLASS(gst_event_datagram_pay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     priv.timer.stop();
-    priv.timed.reset();
-    priv.packer.reset();
-    priv.datagrams.clear();
-    priv.faults.reset();
+    priv.stream.reset();
   }
   return result;
 }
 
 /* type */
 
-static void finalize(GObject* object) {
-  delete GST_EVENT_DATAGRAM_PAY(object)->priv;
-  G_OBJECT_CLASS(gst_event_datagram_pay_parent_class)->finalize(object);
-}
-
 static void gst_event_datagram_pay_init(GstEventDatagramPay* self) {
-  self->priv = new Private;
-  auto& priv = *self->priv;
-  std::tie(priv.sink, priv.src) = add_pads(GST_ELEMENT(self), chain, sink_event, src_query);
+  self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));
   announce_latency(GST_CAT_DEFAULT, self, "max-latency");
 }
 

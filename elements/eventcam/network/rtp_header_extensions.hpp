@@ -9,8 +9,9 @@
 
 #include "gst/base/owned.hpp"
 
-/// Size of the RTP header extensions that a payloader with given caps writes in each packet. The
-/// base class does not expose it, so it is asked from other instances of the same extensions.
+/// Size of the RTP header extensions that a payloader with given caps writes in each packet.
+/// GstRTPBasePayload keeps its extensions private (header_exts), so other instances of them are
+/// asked.
 class RtpHeaderExtensions {
  public:
   /// Maximum size in bytes, with the extensions' common header.
@@ -23,8 +24,8 @@ class RtpHeaderExtensions {
   }
 
  private:
-  /// RFC 8285: maximum identifier and size of elements with a header of one byte, and maximum size
-  /// of those with two.
+  /// RFC 8285: maximum identifier and size of elements with a one-byte header, and maximum size of
+  /// elements with a two-byte header.
   static constexpr guint max_short_id = 14;
   static constexpr gsize max_short_size = 16;
   static constexpr gsize max_long_size = 255;
@@ -36,7 +37,7 @@ class RtpHeaderExtensions {
   }
 
   static gsize size_of(const GstStructure& caps) {
-    const OwnedBuffer any(gst_buffer_new());  // extensions may ask what they are added to
+    const OwnedBuffer any(gst_buffer_new());  // extensions may inspect the buffer
     gsize count = 0;
     gsize size = 0;
     bool is_short = true;

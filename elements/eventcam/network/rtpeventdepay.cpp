@@ -38,6 +38,8 @@
  * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-diff !
  * rtpeventpay ! udpsink host=receiver port=5000
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/rtp/gstrtpbasedepayload.h>
 #include <gst/rtp/gstrtpbuffer.h>
@@ -53,6 +55,7 @@
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/guarded.hpp"
@@ -98,33 +101,29 @@ struct State {
   bool is_discontinuous = false;  ///< before the next buffer
 };
 
-struct Private {
-  // Accessed by the streaming thread only, or while there is none.
+/// State from start to stop.
+struct Stream {
   std::optional<State> state;
   guint32 segment_seqnum = gst_util_seqnum_next();  ///< of upstream
   WarnOnce warn_of_second_sender{GST_CAT_DEFAULT};
   WarnOnce warn_of_rejected{GST_CAT_DEFAULT};
   RepeatLevel late_level;
+};
 
+struct Private {
+  explicit Private(GstRTPBaseDepayload* element)
+      : stream(GST_RTP_BASE_DEPAYLOAD_SINKPAD(element)) {}
+
+  StreamLocked<Stream> stream;
   Guarded<RtpStatistics> statistics;
 };
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstRtpEventDepay, gst_rtp_event_depay, GST, RTP_EVENT_DEPAY,
-                     GstRTPBaseDepayload)
-
-struct _GstRtpEventDepay {
-  GstRTPBaseDepayload parent;
-  Private* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstRtpEventDepay, gst_rtp_event_depay, GST_TYPE_RTP_BASE_DEPAYLOAD,
-                        GST_DEBUG_CATEGORY_INIT(rtp_event_depay_debug, "rtpeventdepay", 0,
-                                                "RTP depayloader of events"))
+DEFINE_EVENT_ELEMENT(GstRtpEventDepay, gst_rtp_event_depay, RTP_EVENT_DEPAY, GstRTPBaseDepayload,
+                     GST_TYPE_RTP_BASE_DEPAYLOAD, rtpeventdepay, GST_RANK_SECONDARY,
+                     "RTP depayloader of events")
 #define PARENT_DEPAYLOAD_CLASS GST_RTP_BASE_DEPAYLOAD_CLASS(gst_rtp_event_depay_parent_class)
-GST_ELEMENT_REGISTER_DEFINE(rtpeventdepay, "rtpeventdepay", GST_RANK_SECONDARY,
-                            gst_rtp_event_depay_get_type())
 
 /* output */
 
@@ -134,13 +133,13 @@ static void update_segment(GstRtpEventDepay* self, GstClockTime start, GstClockT
   const GstSegment& in = GST_RTP_BASE_DEPAYLOAD(self)->segment;
   if (in.format != GST_FORMAT_TIME) arrival = GST_CLOCK_TIME_NONE;
   const guint64 running = gst_segment_to_running_time(&in, in.format, arrival);
-  auto& segment = self->priv->state->segment;
+  auto& segment = self->priv->stream->state->segment;
   if (segment.continues(start, running)) return;
   GST_DEBUG_OBJECT(self,
                    "the sender's %" GST_TIME_FORMAT " arrives at running time %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(start), GST_TIME_ARGS(running));
-  segment.begin(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), self->priv->segment_seqnum, start, running,
-                gst_segment_to_stream_time(&in, in.format, arrival));
+  segment.begin(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), self->priv->stream->segment_seqnum, start,
+                running, gst_segment_to_stream_time(&in, in.format, arrival));
 }
 
 static Report no_memory(const std::exception&) {
@@ -152,7 +151,7 @@ static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
   const auto start = static_cast<GstClockTime>(interval.start);
   const auto duration = static_cast<GstClockTime>(interval.duration);
   update_segment(self, start, interval.arrival);
-  auto& state = *self->priv->state;
+  auto& state = *self->priv->stream->state;
   state.segment.reach(start + duration);
   state.is_discontinuous |= interval.is_discontinuous;
   GST_LOG_OBJECT(self,
@@ -174,7 +173,7 @@ static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
 
 static void flush(GstRtpEventDepay* self) {
   catch_exceptions(self, no_memory, [&] {
-    if (auto& state = self->priv->state)
+    if (auto& state = self->priv->stream->state)
       state->unpacker.flush([&](const RtpInterval& interval) { push(self, interval); });
   });
 }
@@ -182,7 +181,7 @@ static void flush(GstRtpEventDepay* self) {
 /* input */
 
 static void warn_of_rejected(GstRtpEventDepay* self, guint number) {
-  self->priv->warn_of_rejected(
+  self->priv->stream->warn_of_rejected(
       self,
       {GST_STREAM_ERROR_DECODE,
        "Rejected a packet: it is corrupt, or of another sensor or format. Set width, height and "
@@ -191,7 +190,7 @@ static void warn_of_rejected(GstRtpEventDepay* self, guint number) {
 }
 
 static void warn_of_second_sender(GstRtpEventDepay* self, guint number) {
-  self->priv->warn_of_second_sender(
+  self->priv->stream->warn_of_second_sender(
       self,
       {GST_RESOURCE_ERROR_BUSY,
        "Rejected the packets of a second sender; stats counts them. Let each sender use a port of "
@@ -200,7 +199,7 @@ static void warn_of_second_sender(GstRtpEventDepay* self, guint number) {
 }
 
 static void log_late(GstRtpEventDepay* self, guint number) {
-  const auto level = self->priv->late_level.next();
+  const auto level = self->priv->stream->late_level.next();
   GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self,
                     "dropped packet number %u: later ones arrived before it, or it came twice",
                     number);
@@ -220,7 +219,7 @@ static RtpPacket packet_of(GstRTPBuffer* rtp) {
 /// Publishes the statistics after packet `number`, and logs how it changed them.
 static void update_statistics(GstRtpEventDepay* self, guint number) {
   auto& priv = *self->priv;
-  const auto& counted = priv.state->unpacker.statistics();
+  const auto& counted = priv.stream->state->unpacker.statistics();
   const auto before = std::exchange(*priv.statistics.lock(), counted);
   if (counted.lost_packets > before.lost_packets)
     GST_DEBUG_OBJECT(self, "lost %" G_GUINT64_FORMAT " packets before number %u",
@@ -235,7 +234,7 @@ static void update_statistics(GstRtpEventDepay* self, guint number) {
 static GstBuffer* process_packet(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
   auto* self = GST_RTP_EVENT_DEPAY(depayload);
   const auto packet = packet_of(rtp);
-  auto& unpacker = self->priv->state->unpacker;
+  auto& unpacker = self->priv->stream->state->unpacker;
   catch_exceptions(self, no_memory, [&] {
     unpacker.push(packet, [&](const RtpInterval& interval) { push(self, interval); });
   });
@@ -245,7 +244,7 @@ static GstBuffer* process_packet(GstRTPBaseDepayload* depayload, GstRTPBuffer* r
 
 static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
   auto* self = GST_RTP_EVENT_DEPAY(depayload);
-  auto& state = self->priv->state;
+  auto& state = self->priv->stream->state;
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_GAP:  // its times are not the sender's
       gst_event_unref(event);
@@ -264,7 +263,7 @@ static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
     case GST_EVENT_SEGMENT:
       flush(self);
       if (!plays_forwards(self, event, "receive")) return FALSE;
-      self->priv->segment_seqnum = gst_event_get_seqnum(event);
+      self->priv->stream->segment_seqnum = gst_event_get_seqnum(event);
       break;
     default:
       break;
@@ -310,7 +309,7 @@ static bool send_caps(GstRtpEventDepay* self, SensorSize sensor) {
 
 static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
   auto* self = GST_RTP_EVENT_DEPAY(depayload);
-  auto& state = self->priv->state;
+  auto& state = self->priv->stream->state;
   depayload->clock_rate = rtp_clock_rate;
   const auto* structure = gst_caps_get_structure(caps, 0);
   const auto width = side_of(structure, "width");
@@ -348,10 +347,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_rtp_event_depay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    priv.state.reset();
-    priv.warn_of_second_sender.reset();
-    priv.warn_of_rejected.reset();
-    priv.late_level.reset();
+    priv.stream.reset();
   }
   return result;
 }
@@ -370,14 +366,10 @@ static GstStructure* stats_of(GObject* object) {
   return stats;
 }
 
-static void finalize(GObject* object) {
-  delete GST_RTP_EVENT_DEPAY(object)->priv;
-  G_OBJECT_CLASS(gst_rtp_event_depay_parent_class)->finalize(object);
-}
-
 static void gst_rtp_event_depay_init(GstRtpEventDepay* self) {
-  self->priv = new Private;
-  // The base class would drop late packets uncounted, and those after an invalid number ahead.
+  self->priv = new Private(GST_RTP_BASE_DEPAYLOAD(self));
+  // Otherwise gst_rtp_base_depayload_handle_buffer() drops late packets uncounted, and those that
+  // follow an invalid number ahead of theirs.
   g_object_set(self, "max-reorder", 0, nullptr);
 }
 

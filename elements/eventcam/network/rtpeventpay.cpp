@@ -23,6 +23,8 @@
  * |[
  * gst-launch-1.0 v4l2src ! eventsim-diff ! rtpeventpay ! udpsink host=receiver port=5000
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/rtp/gstrtpbasepayload.h>
 #include <gst/rtp/gstrtpbuffer.h>
@@ -36,6 +38,7 @@
 #include "elements/eventcam/network/rtp_events.hpp"
 #include "elements/eventcam/network/rtp_header_extensions.hpp"
 #include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
@@ -88,35 +91,30 @@ struct Sent {
   std::uint64_t rejected = 0;
 };
 
-struct Private {
-  Guarded<Settings> settings;
-  Guarded<Sent> sent;
-
-  // Accessed with the stream lock of the sink pad, or while there is no streaming thread.
+/// State from start to stop.
+struct Stream {
   std::optional<State> state;
   EventFaults faults{"send", GST_CAT_DEFAULT};
   GstFlowReturn flow = GST_FLOW_OK;  ///< result of the last packets
   guint8 csrc_count = 0;             ///< of the packets sent for the last buffer; others have none
   RtpHeaderExtensions extensions;
+};
 
+struct Private {
+  explicit Private(GstRTPBasePayload* element) : stream(GST_RTP_BASE_PAYLOAD_SINKPAD(element)) {}
+
+  Guarded<Settings> settings;
+  Guarded<Sent> sent;
+  StreamLocked<Stream> stream;
   FlushTimer timer;
 };
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstRtpEventPay, gst_rtp_event_pay, GST, RTP_EVENT_PAY, GstRTPBasePayload)
-
-struct _GstRtpEventPay {
-  GstRTPBasePayload parent;
-  Private* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstRtpEventPay, gst_rtp_event_pay, GST_TYPE_RTP_BASE_PAYLOAD,
-                        GST_DEBUG_CATEGORY_INIT(rtp_event_pay_debug, "rtpeventpay", 0,
-                                                "RTP payloader of events"))
+DEFINE_EVENT_ELEMENT(GstRtpEventPay, gst_rtp_event_pay, RTP_EVENT_PAY, GstRTPBasePayload,
+                     GST_TYPE_RTP_BASE_PAYLOAD, rtpeventpay, GST_RANK_SECONDARY,
+                     "RTP payloader of events")
 #define PARENT_PAYLOAD_CLASS GST_RTP_BASE_PAYLOAD_CLASS(gst_rtp_event_pay_parent_class)
-GST_ELEMENT_REGISTER_DEFINE(rtpeventpay, "rtpeventpay", GST_RANK_SECONDARY,
-                            gst_rtp_event_pay_get_type())
 
 static Guarded<Settings>& settings_of(GObject* object) {
   return GST_RTP_EVENT_PAY(object)->priv->settings;
@@ -127,8 +125,8 @@ static Guarded<Settings>& settings_of(GObject* object) {
 /// Maximum size of the RTP header, with the CSRCs and header extensions that the base class writes.
 static gsize max_header_size(GstRtpEventPay* self) {
   const OwnedCaps caps(gst_pad_get_current_caps(GST_RTP_BASE_PAYLOAD_SRCPAD(self)));
-  return gst_rtp_buffer_calc_header_len(self->priv->csrc_count) +
-         (caps ? self->priv->extensions.max_size(caps) : 0);
+  return gst_rtp_buffer_calc_header_len(self->priv->stream->csrc_count) +
+         (caps ? self->priv->stream->extensions.max_size(caps) : 0);
 }
 
 /// Maximum size of a payload.
@@ -153,12 +151,12 @@ static GstBuffer* make_packet(GstRtpEventPay* self, std::span<const std::uint8_t
 /// Sends the pending interval. May throw.
 static void send(GstRtpEventPay* self) {
   auto& priv = *self->priv;
-  if (!priv.state || priv.state->pending.empty()) return;
-  auto& pending = priv.state->pending;
+  if (!priv.stream->state || priv.stream->state->pending.empty()) return;
+  auto& pending = priv.stream->state->pending;
   Sent sent;
   GstBufferList* list = gst_buffer_list_new();
   try {
-    priv.state->packer.pack(
+    priv.stream->state->packer.pack(
         pending.start(), pending.end() - pending.start(), pending.events(), max_payload_size(self),
         [&](std::span<const std::uint8_t> payload, bool is_last) {
           gst_buffer_list_add(list, make_packet(self, payload, is_last,
@@ -185,14 +183,14 @@ static void send(GstRtpEventPay* self) {
     total->events += sent.events;
   }
   const GstFlowReturn flow = gst_rtp_base_payload_push_list(GST_RTP_BASE_PAYLOAD(self), list);
-  if (priv.flow == GST_FLOW_OK) priv.flow = flow;
+  if (priv.stream->flow == GST_FLOW_OK) priv.stream->flow = flow;
 }
 
 /// Runs `work`, which may throw, and returns the result of the packets that it sent.
 template <class Work>
 static GstFlowReturn reported(GstRtpEventPay* self, const Work& work) {
   auto& priv = *self->priv;
-  priv.flow = GST_FLOW_OK;
+  priv.stream->flow = GST_FLOW_OK;
   const auto failure = [&](const std::exception& error) -> Report {
     if (is_a<std::invalid_argument>(error))
       return {GST_STREAM_ERROR_FORMAT,
@@ -202,7 +200,7 @@ static GstFlowReturn reported(GstRtpEventPay* self, const Work& work) {
     return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to send the events."};
   };
   if (!catch_exceptions(self, failure, work)) return GST_FLOW_ERROR;
-  return priv.flow;
+  return priv.stream->flow;
 }
 
 /// Sends events that have waited for max-latency.
@@ -215,7 +213,7 @@ static void send_late(GstObject* element) {
 /// True if the pending events fill a packet, or cannot wait for another interval as long as the
 /// last one.
 static bool is_due(GstRtpEventPay* self, Nanoseconds last_duration) {
-  const auto& [sensor, format, packer, pending] = *self->priv->state;
+  const auto& [sensor, format, packer, pending] = *self->priv->stream->state;
   const std::size_t event_size = format == RtpEventFormat::evt3 ? 4 : sizeof(Event);
   const auto waiting = static_cast<GstClockTime>(pending.end() - pending.start() + last_duration);
   return pending.events().size() * event_size >= max_payload_size(self) ||
@@ -227,7 +225,7 @@ static bool is_due(GstRtpEventPay* self, Nanoseconds last_duration) {
 static InvalidEvents add_interval(GstRtpEventPay* self, EventInterval interval,
                                   std::span<const Event> events) {
   auto& priv = *self->priv;
-  auto& pending = priv.state->pending;
+  auto& pending = priv.stream->state->pending;
   const auto start = static_cast<Nanoseconds>(interval.start);
   const auto end = static_cast<Nanoseconds>(interval.end);
   if (!pending.empty() && pending.end() != start) send(self);
@@ -245,7 +243,7 @@ static InvalidEvents add_interval(GstRtpEventPay* self, EventInterval interval,
 
 /// Skips a buffer that cannot be sent.
 static GstFlowReturn reject(GstRtpEventPay* self, EventFault fault, GstBuffer* buffer) {
-  self->priv->faults.warn(self, fault, buffer);
+  self->priv->stream->faults.warn(self, fault, buffer);
   self->priv->sent.lock()->rejected += gst_buffer_get_size(buffer) / sizeof(Event);
   return GST_FLOW_OK;
 }
@@ -254,9 +252,9 @@ static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken)
   auto* self = GST_RTP_EVENT_PAY(payload);
   auto& priv = *self->priv;
   const OwnedBuffer buffer(taken);
-  if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
+  if (!priv.stream->state) return GST_FLOW_NOT_NEGOTIATED;
   constexpr guint max_csrc_count = 15;
-  priv.csrc_count = static_cast<guint8>(
+  priv.stream->csrc_count = static_cast<guint8>(
       std::min(gst_rtp_base_payload_get_source_count(payload, taken), max_csrc_count));
   const auto interval = interval_of(taken);
   if (!interval || interval->start > static_cast<GstClockTime>(eventcamera::max_rtp_start))
@@ -268,7 +266,7 @@ static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken)
   return reported(self, [&] {
     const auto rejected = add_interval(self, *interval, mapped.events());
     priv.sent.lock()->rejected += rejected.outside + rejected.unsorted;
-    priv.faults.warn(self, rejected, taken);
+    priv.stream->faults.warn(self, rejected, taken);
   });
 }
 
@@ -277,7 +275,8 @@ static void handle_gap(GstRtpEventPay* self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
-  if (!self->priv->state || start > static_cast<GstClockTime>(eventcamera::max_rtp_start)) return;
+  if (!self->priv->stream->state || start > static_cast<GstClockTime>(eventcamera::max_rtp_start))
+    return;
   const bool is_known = GST_CLOCK_TIME_IS_VALID(duration);
   const GstClockTime end =
       is_known ? start + std::min(duration, GstClockTime{eventcamera::max_interval}) : start;
@@ -296,11 +295,11 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
       gst_event_unref(event);
       return TRUE;
     case GST_EVENT_FLUSH_STOP:
-      if (priv.state) {
+      if (priv.stream->state) {
         GST_DEBUG_OBJECT(self, "flushed: dropping %" G_GSIZE_FORMAT " events that wait",
-                         priv.state->pending.events().size());
-        priv.sent.lock()->rejected += priv.state->pending.events().size();
-        priv.state->pending.clear();
+                         priv.stream->state->pending.events().size());
+        priv.sent.lock()->rejected += priv.stream->state->pending.events().size();
+        priv.stream->state->pending.clear();
       }
       break;
     case GST_EVENT_SEGMENT:
@@ -337,16 +336,16 @@ static gboolean set_caps(GstRTPBasePayload* payload, GstCaps* caps) {
   const auto format = priv.settings.copy().format;
   const std::string width = std::to_string(info.width);
   const std::string height = std::to_string(info.height);
-  if (!priv.state || priv.state->sensor != sensor) {
-    const auto first_event = priv.state ? priv.state->packer.next_event() : 0;
+  if (!priv.stream->state || priv.stream->state->sensor != sensor) {
+    const auto first_event = priv.stream->state ? priv.stream->state->packer.next_event() : 0;
     const Report too_large{GST_STREAM_ERROR_FORMAT,
                            "EVT3 words support sensors of 1x1 to 2048x2048 pixels, not " + width +
                                "x" + height + "; set format=XYTP."};
     if (!catch_exceptions(self, too_large,
-                          [&] { priv.state.emplace(sensor, format, first_event); }))
+                          [&] { priv.stream->state.emplace(sensor, format, first_event); }))
       return FALSE;
   }
-  const char* format_name = rtp_event_formats[static_cast<std::size_t>(priv.state->format)];
+  const char* format_name = rtp_event_formats[static_cast<std::size_t>(priv.stream->state->format)];
   GST_DEBUG_OBJECT(self, "sending the events of %dx%d pixels as %s", info.width, info.height,
                    format_name);
   gst_rtp_base_payload_set_options(payload, "application", TRUE, "X-EVENT-CAMERA", rtp_clock_rate);
@@ -362,8 +361,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
       GST_ELEMENT_CLASS(gst_rtp_event_pay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     priv.timer.stop();
-    priv.state.reset();
-    priv.faults.reset();
+    priv.stream.reset();
   }
   return result;
 }
@@ -379,13 +377,8 @@ static GstStructure* stats_of(GObject* object) {
   return stats;
 }
 
-static void finalize(GObject* object) {
-  delete GST_RTP_EVENT_PAY(object)->priv;
-  G_OBJECT_CLASS(gst_rtp_event_pay_parent_class)->finalize(object);
-}
-
 static void gst_rtp_event_pay_init(GstRtpEventPay* self) {
-  self->priv = new Private;
+  self->priv = new Private(GST_RTP_BASE_PAYLOAD(self));
   gst_pad_set_query_function(GST_RTP_BASE_PAYLOAD_SRCPAD(self), src_query);
   announce_latency(GST_CAT_DEFAULT, self, "max-latency");
 }

@@ -21,6 +21,8 @@
  * - Windows of buffers last from the start of the first to the end of the last; a GAP is a buffer
  *   without events.
  *
+ * There are no tensors of pauses of more than a minute or 10000 windows, with one warning.
+ *
  * A tensor has the PTS and duration of its window. At EOS the remaining events make a last,
  * shorter window, which ends with the stream.
  *
@@ -51,13 +53,14 @@
  * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventtensor
  * representation=voxel-grid accumulation-time=50000000 ! filesink location=voxels.f32
  * ]|
+ *
+ * Since: 0.1
  */
 #include <gst/gst.h>
 
 #include <algorithm>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <utility>
 
 #include "elements/eventcam/tensor/tensor_format.hpp"
@@ -65,6 +68,7 @@
 #include "elements/eventcam/tensor/tensor_properties.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
@@ -109,35 +113,34 @@ struct State {
   WindowQueue windows;
 };
 
-struct Private {
-  Guarded<TensorProperties> settings;
-  Guarded<GstClockTime> latency;
-  GstPad* sink = nullptr;
-  GstPad* src = nullptr;
+/// State from start to stop.
+struct Stream {
+  Stream() { gst_segment_init(&segment, GST_FORMAT_UNDEFINED); }
 
-  // Accessed under the stream lock of the sink pad, or while nothing streams.
   std::optional<State> state;
   EventBuffers buffers;
-  GstSegment segment{};
+  GstSegment segment;
   GstFlowReturn gap_result = GST_FLOW_OK;  ///< of the last GAP, for the next buffer
   bool discontinuous = true;               ///< the next tensor is discontinuous
   EventFaults faults{"use", GST_CAT_DEFAULT};
   WarnOnce warn_of_excess{GST_CAT_DEFAULT};
+  WarnOnce warn_of_pause{GST_CAT_DEFAULT};
+};
+
+struct Private {
+  explicit Private(const std::pair<GstPad*, GstPad*>& pads) : sink(pads.first), src(pads.second) {}
+
+  Guarded<TensorProperties> settings;
+  Guarded<GstClockTime> latency;
+  GstPad* const sink;
+  GstPad* const src;
+  StreamLocked<Stream> stream{sink};
 };
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventTensor, gst_event_tensor, GST, EVENT_TENSOR, GstElement)
-
-struct _GstEventTensor {
-  GstElement parent;
-  Private* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstEventTensor, gst_event_tensor, GST_TYPE_ELEMENT,
-                        GST_DEBUG_CATEGORY_INIT(event_tensor_debug, "eventtensor", 0,
-                                                "windows of events as tensors"))
-GST_ELEMENT_REGISTER_DEFINE(eventtensor, "eventtensor", GST_RANK_NONE, gst_event_tensor_get_type())
+DEFINE_EVENT_ELEMENT(GstEventTensor, gst_event_tensor, EVENT_TENSOR, GstElement, GST_TYPE_ELEMENT,
+                     eventtensor, GST_RANK_NONE, "windows of events as tensors")
 
 static Guarded<TensorProperties>& settings_of(GObject* object) {
   return GST_EVENT_TENSOR(object)->priv->settings;
@@ -147,13 +150,21 @@ static const Report no_memory{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
                               "Not enough memory for a tensor; lower bins, the resolution or the "
                               "length of windows."};
 
+/// Longest pause that is filled with empty tensors.
+static GstClockTime max_pause_of(const State& state) {
+  constexpr GstClockTime max_windows = 10'000;
+  const auto duration = static_cast<GstClockTime>(state.format.windows.duration);
+  if (duration == 0) return max_tensor_gap;  // each interval is one window at most
+  return std::max(duration, std::min(max_pause, max_windows * duration));
+}
+
 /* tensors */
 
 static GstFlowReturn push_tensor(GstEventTensor* self, const WindowQueue::Window& window) {
   auto& priv = *self->priv;
-  auto& tensor = priv.state->tensor;
+  auto& tensor = priv.stream->state->tensor;
   OwnedBuffer buffer;
-  const GstFlowReturn result = priv.buffers.acquire(tensor.bytes(), buffer);
+  const GstFlowReturn result = priv.stream->buffers.acquire(tensor.bytes(), buffer);
   if (result != GST_FLOW_OK) return result;
   GstBuffer* const acquired = buffer.get();
   tensor.write(window.events, window.end / static_cast<Nanoseconds>(GST_USECOND),
@@ -162,9 +173,9 @@ static GstFlowReturn push_tensor(GstEventTensor* self, const WindowQueue::Window
   GST_BUFFER_DTS(acquired) = GST_CLOCK_TIME_NONE;
   GST_BUFFER_DURATION(acquired) = static_cast<GstClockTime>(window.end - window.start);
   GST_BUFFER_FLAG_UNSET(acquired, GST_BUFFER_FLAG_DISCONT);
-  if (std::exchange(priv.discontinuous, false))
+  if (std::exchange(priv.stream->discontinuous, false))
     GST_BUFFER_FLAG_SET(acquired, GST_BUFFER_FLAG_DISCONT);
-  add_tensor_meta(acquired, tensor.shape(), priv.state->format.tensors);
+  add_tensor_meta(acquired, tensor.shape(), priv.stream->state->format.tensors);
   GST_LOG_OBJECT(
       self, "tensor of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
       window.events.size(), GST_TIME_ARGS(static_cast<GstClockTime>(window.start)),
@@ -175,23 +186,23 @@ static GstFlowReturn push_tensor(GstEventTensor* self, const WindowQueue::Window
 /// Ends the current windows: pushes the last tensor and forgets all events.
 static GstFlowReturn drain(GstEventTensor* self) {
   auto& priv = *self->priv;
-  if (!priv.state) return GST_FLOW_OK;
+  if (!priv.stream->state) return GST_FLOW_OK;
   const GstFlowReturn result = catch_exceptions(self, no_memory, [&] {
-    const auto window = priv.state->windows.finish();
+    const auto window = priv.stream->state->windows.finish();
     return window ? push_tensor(self, *window) : GST_FLOW_OK;
   });
-  priv.state->start_over();
-  priv.discontinuous = true;
+  priv.stream->state->start_over();
+  priv.stream->discontinuous = true;
   return result;
 }
 
 /// Ends the current windows if an interval is too far from the last one.
 static GstFlowReturn approach(GstEventTensor* self, const EventInterval& interval) {
-  const auto last = self->priv->state->windows.reached();
+  const auto last = self->priv->stream->state->windows.reached();
   if (!last) return GST_FLOW_OK;
   const auto reached = static_cast<GstClockTime>(*last);
   const bool returns = interval.start + event_resolution < reached;
-  const bool leaps = interval.start > reached + max_tensor_gap;
+  const bool leaps = interval.start > reached + max_pause_of(*self->priv->stream->state);
   if (!returns && !leaps) return GST_FLOW_OK;
   GST_DEBUG_OBJECT(self, "starting over: time %s from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
                    returns ? "goes back" : "leaps", GST_TIME_ARGS(reached),
@@ -203,22 +214,22 @@ static GstFlowReturn approach(GstEventTensor* self, const EventInterval& interva
 static GstFlowReturn add(GstEventTensor* self, std::span<const eventcamera::Event> events,
                          Microseconds base, const EventInterval& interval, GstBuffer* buffer) {
   auto& priv = *self->priv;
-  const GstClockTime start = std::max(interval.start, priv.segment.start);
+  const GstClockTime start = std::max(interval.start, priv.stream->segment.start);
   if (interval.end < start || (interval.end == start && interval.start < start)) return GST_FLOW_OK;
   const GstFlowReturn result = approach(self, {start, interval.end});
   if (result != GST_FLOW_OK) return result;
   do {
-    const auto added = priv.state->windows.add(events, base, static_cast<Nanoseconds>(start),
-                                               static_cast<Nanoseconds>(interval.end));
-    priv.faults.warn(self, added.invalid, buffer);
+    const auto added = priv.stream->state->windows.add(
+        events, base, static_cast<Nanoseconds>(start), static_cast<Nanoseconds>(interval.end));
+    priv.stream->faults.warn(self, added.invalid, buffer);
     if (added.excess > 0)
-      priv.warn_of_excess(
+      priv.stream->warn_of_excess(
           self,
           {GST_STREAM_ERROR_FAILED, "Cannot use all events: there are more than " +
                                         std::to_string(WindowQueue::max_events) +
                                         " in a window; skipping the rest. Shorten the windows."},
           std::to_string(added.excess) + " events skipped");
-    while (const auto window = priv.state->windows.next()) {
+    while (const auto window = priv.stream->state->windows.next()) {
       const GstFlowReturn pushed = push_tensor(self, *window);
       if (pushed != GST_FLOW_OK) return pushed;
     }
@@ -233,18 +244,18 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   auto* self = GST_EVENT_TENSOR(parent);
   auto& priv = *self->priv;
   const OwnedBuffer buffer(taken);
-  if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
-  priv.discontinuous |= GST_BUFFER_IS_DISCONT(taken);
-  const auto gap_result = std::exchange(priv.gap_result, GST_FLOW_OK);
+  if (!priv.stream->state) return GST_FLOW_NOT_NEGOTIATED;
+  priv.stream->discontinuous |= GST_BUFFER_IS_DISCONT(taken);
+  const auto gap_result = std::exchange(priv.stream->gap_result, GST_FLOW_OK);
   if (gap_result != GST_FLOW_OK) return gap_result;
   const auto interval = interval_of(taken);
   if (!interval || interval->end > max_tensor_time) {
-    priv.faults.warn(self, interval_fault(taken), taken);
+    priv.stream->faults.warn(self, interval_fault(taken), taken);
     return GST_FLOW_OK;
   }
   const MappedEvents mapped(taken);
   if (!mapped) {
-    priv.faults.warn(self, EventFault::partial_event, taken);
+    priv.stream->faults.warn(self, EventFault::partial_event, taken);
     return GST_FLOW_OK;
   }
   GST_LOG_OBJECT(priv.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
@@ -261,11 +272,18 @@ static bool handle_gap(GstEventTensor* self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
-  if (!priv.state) return false;
-  if (priv.state->format.windows.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
+  if (!priv.stream->state) return false;
+  if (priv.stream->state->format.windows.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
       start > max_tensor_time || duration > max_tensor_time - start)
-    return priv.state->windows.is_open();
-  priv.gap_result = catch_exceptions(self, no_memory, [&] {
+    return priv.stream->state->windows.is_open();
+  if (duration > max_pause_of(*priv.stream->state)) {
+    priv.stream->warn_of_pause(
+        self, {GST_STREAM_ERROR_FAILED, "The events pause; skipping the tensors of long pauses."},
+        "pause of " + std::to_string(duration / GST_SECOND) + " s");
+    // One window ends what has begun; the next events start over.
+    duration = static_cast<GstClockTime>(priv.stream->state->format.windows.duration);
+  }
+  priv.stream->gap_result = catch_exceptions(self, no_memory, [&] {
     return add(self, {}, 0, {start, start + duration}, nullptr);
   });
   return true;
@@ -280,8 +298,8 @@ static bool post_unless_accepted(GstEventTensor* self, GstCaps* caps) {
   gchar* const cause = gst_info_strdup_printf(
       "downstream takes %" GST_PTR_FORMAT ", not %" GST_PTR_FORMAT, wanted.get(), caps);
   post_message(self, GST_MESSAGE_ERROR,
-               {GST_STREAM_ERROR_FORMAT,
-                "Downstream does not accept these tensors" + wishes_of(wanted.get(), caps) + "."},
+               {GST_STREAM_ERROR_FORMAT, "Downstream does not accept these tensors" +
+                                             mismatch_text(wanted.get(), caps) + "."},
                cause);
   g_free(cause);
   return false;
@@ -290,7 +308,7 @@ static bool post_unless_accepted(GstEventTensor* self, GstCaps* caps) {
 /// Starts over for a sensor. May throw.
 static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
   auto& priv = *self->priv;
-  priv.state.reset();
+  priv.stream->state.reset();
   const TensorFormat format(info, priv.settings.copy());
   const auto bytes = EventTensor::memory(format.shape(), format.tensors);
   if (bytes > max_tensor_bytes) {
@@ -302,7 +320,7 @@ static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
                      " bytes");
     return false;
   }
-  priv.state.emplace(format);
+  priv.stream->state.emplace(format);
   return true;
 }
 
@@ -312,15 +330,15 @@ static gboolean handle_caps(GstEventTensor* self, GstEvent* event) {
   gst_event_parse_caps(event, &caps);
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
-  if (priv.state && priv.state->format.sensor.width == info.width &&
-      priv.state->format.sensor.height == info.height) {
-    priv.state->format.sensor = info;
+  if (priv.stream->state && priv.stream->state->format.sensor.width == info.width &&
+      priv.stream->state->format.sensor.height == info.height) {
+    priv.stream->state->format.sensor = info;
   } else {
     drain(self);
     if (!catch_exceptions(self, no_memory, [&] { return make_state(self, info); })) return FALSE;
   }
-  *priv.latency.lock() = priv.state->format.latency();
-  const OwnedCaps out = priv.state->format.caps();
+  *priv.latency.lock() = priv.stream->state->format.latency();
+  const OwnedCaps out = priv.stream->state->format.caps();
   GST_DEBUG_OBJECT(self, "events of %dx%d pixels become %" GST_PTR_FORMAT, info.width, info.height,
                    out.get());
   if (!post_unless_accepted(self, out.get())) return FALSE;
@@ -341,23 +359,23 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
     case GST_EVENT_GAP:
       if (handle_gap(self, event)) {
         gst_event_unref(event);
-        return priv.gap_result == GST_FLOW_OK ? TRUE : FALSE;
+        return priv.stream->gap_result == GST_FLOW_OK ? TRUE : FALSE;
       }
       break;
     case GST_EVENT_SEGMENT:
       if (!plays_events(self, event, "make tensors of")) return FALSE;
-      if (!continues(priv.segment, segment_of(event))) drain(self);
-      priv.segment = segment_of(event);
+      if (!continues(priv.stream->segment, segment_of(event))) drain(self);
+      priv.stream->segment = segment_of(event);
       break;
     case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_EOS:
       drain(self);
       break;
     case GST_EVENT_FLUSH_STOP:
-      gst_segment_init(&priv.segment, GST_FORMAT_UNDEFINED);
-      priv.gap_result = GST_FLOW_OK;
-      if (priv.state) priv.state->start_over();
-      priv.discontinuous = true;
+      gst_segment_init(&priv.stream->segment, GST_FORMAT_UNDEFINED);
+      priv.stream->gap_result = GST_FLOW_OK;
+      if (priv.stream->state) priv.stream->state->start_over();
+      priv.stream->discontinuous = true;
       break;
     default:
       break;
@@ -379,13 +397,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_tensor_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    priv.buffers.reset();
-    priv.state.reset();
-    gst_segment_init(&priv.segment, GST_FORMAT_UNDEFINED);
-    priv.gap_result = GST_FLOW_OK;
-    priv.discontinuous = true;
-    priv.faults.reset();
-    priv.warn_of_excess.reset();
+    priv.stream.reset();
     *priv.latency.lock() = 0;
   }
   return result;
@@ -393,16 +405,8 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 
 /* type */
 
-static void finalize(GObject* object) {
-  delete GST_EVENT_TENSOR(object)->priv;
-  G_OBJECT_CLASS(gst_event_tensor_parent_class)->finalize(object);
-}
-
 static void gst_event_tensor_init(GstEventTensor* self) {
-  self->priv = new Private;
-  auto& priv = *self->priv;
-  gst_segment_init(&priv.segment, GST_FORMAT_UNDEFINED);
-  std::tie(priv.sink, priv.src) = add_pads(GST_ELEMENT(self), chain, sink_event, src_query);
+  self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));
 }
 
 static void gst_event_tensor_class_init(GstEventTensorClass* klass) {

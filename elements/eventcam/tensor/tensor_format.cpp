@@ -40,13 +40,13 @@ OwnedCaps TensorFormat::caps() const {
       GST_TYPE_FRACTION, fps_n, fps_d, nullptr));
 }
 
-/// Fields of the caps, and what determines them.
+/// Caps fields, and the properties that determine them.
 static constexpr std::pair<const char*, const char*> advice[] = {
     {"types", "set data-type"},
     {"dimensions", "set representation or bins, or scale the events"},
     {"framerate", "set accumulation-time, frame-count or overlap"}};
 
-std::string wishes_of(GstCaps* wanted, GstCaps* made) {
+std::string mismatch_text(GstCaps* wanted, GstCaps* made) {
   std::string wishes;
   if (gst_caps_get_size(wanted) == 0) return wishes;
   for (const auto& [field, remedy] : advice) {

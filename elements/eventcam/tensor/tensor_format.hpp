@@ -7,7 +7,7 @@
 #include "elements/eventcam/tensor/tensor_properties.hpp"
 #include "gst/base/owned.hpp"
 
-/// The tensors that the events of a sensor become.
+/// Format of the tensors of a sensor's events.
 struct TensorFormat {
   TensorFormat(const GstEventCameraInfo& input, const TensorProperties& properties)
       : sensor(input), tensors(properties.of_tensors()), windows(properties.of_windows()) {}
@@ -25,5 +25,5 @@ struct TensorFormat {
   std::pair<gint, gint> framerate() const;
 };
 
-/// The fields in which `wanted` differs from fixed caps, and what to do about it.
-std::string wishes_of(GstCaps* wanted, GstCaps* made);
+/// Text: the fields in which `wanted` differs from fixed caps, and the properties to set.
+std::string mismatch_text(GstCaps* wanted, GstCaps* made);

@@ -101,7 +101,7 @@ void add_tensor_properties(Properties<settings_of>& properties) {
   constexpr guint max_frame_count = 10'000;
   constexpr TensorProperties defaults;
   properties.add(&TensorProperties::representation,
-                 g_param_spec_enum("representation", "Representation", "What a tensor shows",
+                 g_param_spec_enum("representation", "Representation", "Content of a tensor",
                                    tensor_representation_type(), number_of(defaults.representation),
                                    mutable_ready_flags));
   properties.add(&TensorProperties::bins,

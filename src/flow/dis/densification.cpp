@@ -30,7 +30,7 @@ struct SumRow {
 };
 
 /// Adds rows [first, last) of a patch with this flow, whose top left pixel is (x, y); sums_of(row)
-/// are those of a row.
+/// returns the sums of a row.
 template <int side, class SumsOf>
 HWY_INLINE void add_patch(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, int x,
                           int y, int width, int first, int last, const Flow& flow,

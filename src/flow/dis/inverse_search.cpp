@@ -242,7 +242,7 @@ class Search {
     mean_y_[i] = static_cast<float>(totals[5]) / pixels;
   }
 
-  /// Has the sums of a patch read wherever it is next.
+  /// Marks the sums of a patch to be read at its next position.
   void leave_cell(int i) {
     cell_x_[i] = cell_y_[i] = std::numeric_limits<float>::max();
   }

@@ -15,13 +15,13 @@ namespace eventcamera {
 void search_row(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradients& gradients,
                 const Image<std::uint8_t>& to, int row, int iterations, Flow* flows);
 
-/// The flow of a neighbour is better if its sum of squared differences is below this share of that
-/// of a patch's own flow, by this much: else rounding would decide between flows of a plain area.
+/// A neighbour's flow is better if its sum of squared differences is below this share of the
+/// patch's own sum, by this margin; otherwise rounding would decide in plain areas.
 constexpr float better_share = 0.9F;
 constexpr float better_by = 1;
 
-/// Spatial propagation: patches of a row for which the flow of one of their eight neighbours is
-/// better than what was found for them are searched from the best of these flows.
+/// Spatial propagation: searches the patches of a row again from the best flow of their eight
+/// neighbours, if it is better than their own.
 void propagate_row(const PatchGrid& grid, const Image<std::uint8_t>& from,
                    const Gradients& gradients, const Image<std::uint8_t>& to, int row,
                    int iterations, const Image<Flow>& found, Flow* flows);

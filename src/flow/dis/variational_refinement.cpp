@@ -62,7 +62,7 @@ HWY_INLINE Vector inverse_sqrt(Vector value) {
   return hn::Mul(root, hn::Sub(set(1.5F), hn::Mul(hn::Mul(half, root), root)));
 }
 
-/// The columns to the left of those of a parity; those to the right follow each of them.
+/// The columns to the left of a parity's columns; the columns to the right come next.
 template <class Plane>
 HWY_INLINE auto* beside(Plane& plane, int parity, int y) {
   return parity == 0 ? plane.row(1, y) - 1 : plane.row(0, y);

@@ -48,7 +48,7 @@ class FlowUpdate {
   /// Sums of the equations of a strip over the rows of a window.
   ///
   /// Found rows are counted in blocks, from the first row of the first window. The sum over a
-  /// window is the sum over the end of a block plus that over the start of the next one.
+  /// window is the sum over the end of a block plus the sum over the start of the next.
   struct RowSums {
     /// Equations of the rows of a block; once it is complete, sums over each row and all later
     /// ones. The last row is 0.

@@ -85,14 +85,14 @@ void Aedat2Decoder::finish(Decoded& out) {
 
 bool Aedat2Decoder::read_header() {
   auto next = header_.next(queue_);
-  for (; next == AedatHeader::Next::line; next = header_.next(queue_)) take_line(header_.line());
+  for (; next == AedatHeader::Next::line; next = header_.next(queue_)) handle_line(header_.line());
   if (next == AedatHeader::Next::more) return false;
   end_header();
   return true;
 }
 
 /// Evaluates a line of the header.
-void Aedat2Decoder::take_line(const std::string& line) {
+void Aedat2Decoder::handle_line(const std::string& line) {
   constexpr std::string_view chip = "# AEChip:";
   if (line.starts_with(chip)) {
     const auto name = lowercase(std::string_view(line).substr(chip.size()));
@@ -100,14 +100,14 @@ void Aedat2Decoder::take_line(const std::string& line) {
       return name.find(known.name) != name.npos;
     });
     if (camera != std::end(aedat2_cameras)) {
-      size_ = camera->size;
+      stream_.size = camera->size;
       layout_ = camera->layout;
     } else if (assumed_ == SensorSize{}) {
       throw UnsupportedFormat("unsupported camera in the AEDAT 2.0 header: " + name +
                               "; set width and height");
     }
-  } else if (size_ == SensorSize{}) {
-    size_ = size_in(line).value_or(SensorSize{});
+  } else if (stream_.size == SensorSize{}) {
+    stream_.size = size_in(line).value_or(SensorSize{});
   }
   if (line.find("v2e") != std::string::npos) of_v2e_ = true;
 }
@@ -138,14 +138,14 @@ bool Aedat2Decoder::find_layout() {
   return true;
 }
 
-/// Takes the stated size, or that of all cameras with this layout.
+/// Uses the stated size, or the size of all cameras with this layout.
 void Aedat2Decoder::find_size() {
   constexpr SensorSize max_davis_size{640, 480};
-  if (size_ == SensorSize{}) size_ = assumed_;
-  if (size_ == SensorSize{} && layout_ == dvs128_layout) size_ = {128, 128};
-  if (size_ == SensorSize{} && layout_ == dvs640_layout) size_ = {640, 480};
-  is_mirrored_ = size_ == SensorSize{};
-  limit_ = is_mirrored_ ? max_davis_size : size_;
+  if (stream_.size == SensorSize{}) stream_.size = assumed_;
+  if (stream_.size == SensorSize{} && layout_ == dvs128_layout) stream_.size = {128, 128};
+  if (stream_.size == SensorSize{} && layout_ == dvs640_layout) stream_.size = {640, 480};
+  stream_.mirrored = stream_.size == SensorSize{};
+  limit_ = stream_.mirrored ? max_davis_size : stream_.size;
 }
 
 void Aedat2Decoder::read_records(Decoded& out) {
@@ -249,9 +249,9 @@ void Aedat2Decoder::append(const Record& record, Decoded& out) {
   const auto x = layout_->x(address);
   const auto y = layout_->y(address);
   const auto polarity = layout_->is_on(address) ? Polarity::on : Polarity::off;
-  out.events.push_back(
-      is_mirrored_ ? AbsoluteEvent::at(x, y, t, polarity)
-                   : AbsoluteEvent::at(size_.width - 1 - x, size_.height - 1 - y, t, polarity));
+  out.events.push_back(stream_.mirrored ? AbsoluteEvent::at(x, y, t, polarity)
+                                        : AbsoluteEvent::at(limit_.width - 1 - x,
+                                                            limit_.height - 1 - y, t, polarity));
 }
 
 Aedat2Decoder::Record Aedat2Decoder::record_at(const std::uint8_t* bytes) const {

@@ -9,8 +9,8 @@
 #include "src/formats/aedat/aedat2_layout.hpp"
 #include "src/formats/aedat/aedat_header.hpp"
 #include "src/formats/byte_queue.hpp"
-#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
+#include "src/formats/event_decoder.hpp"
 
 namespace eventcamera {
 
@@ -23,7 +23,7 @@ enum class Aedat2Version : std::uint8_t { one, two };
 ///
 /// If the header names no camera, the first addresses determine their layout. A sensor size that
 /// neither the header nor the user states stays 0x0, and then events are mirrored.
-class Aedat2Decoder final : public Decoder {
+class Aedat2Decoder final : public EventDecoder {
  public:
   /// `assumed` is the sensor size to use if the header states neither that nor the camera.
   explicit Aedat2Decoder(SensorSize assumed = {}, Aedat2Version version = Aedat2Version::two);
@@ -41,7 +41,7 @@ class Aedat2Decoder final : public Decoder {
   };
 
   bool read_header();
-  void take_line(const std::string& line);
+  void handle_line(const std::string& line);
   void end_header();
   bool find_camera();
   bool find_layout();

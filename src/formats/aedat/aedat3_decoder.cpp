@@ -92,7 +92,7 @@ void Aedat3Decoder::finish(Decoded& out) {
 
 bool Aedat3Decoder::read_header() {
   auto next = header_.next(queue_);
-  for (; next == AedatHeader::Next::line; next = header_.next(queue_)) take_line(header_.line());
+  for (; next == AedatHeader::Next::line; next = header_.next(queue_)) handle_line(header_.line());
   if (next == AedatHeader::Next::data)
     throw UnsupportedFormat("the AEDAT 3.1 header does not end with #!END-HEADER");
   header_read_ = next == AedatHeader::Next::last;
@@ -100,12 +100,12 @@ bool Aedat3Decoder::read_header() {
 }
 
 /// Evaluates a line of the header.
-void Aedat3Decoder::take_line(const std::string& line) {
+void Aedat3Decoder::handle_line(const std::string& line) {
   if (line.starts_with("#Format:") && line.find("RAW") == std::string::npos)
     throw UnsupportedFormat("unsupported compression of AEDAT 3.1: " + line.substr(1));
   // The camera and the filters of its events are separate sources, all of the same size.
-  if ((line.starts_with("#Source") || line.starts_with("#-Source")) && size_ == SensorSize{})
-    size_ = size_of(line);
+  if ((line.starts_with("#Source") || line.starts_with("#-Source")) && stream_.size == SensorSize{})
+    stream_.size = size_of(line);
 }
 
 void Aedat3Decoder::read_packets(Decoded& out) {
@@ -242,7 +242,7 @@ bool Aedat3Decoder::is_odd(const std::uint8_t* event) const {
   const auto data = little_endian<std::uint32_t>(event);
   if (little_endian<std::int32_t>(event + 4) < 0) return true;
   if (packet_.type != polarity || (data & valid) == 0) return false;
-  const auto limit = size_ != SensorSize{} ? size_ : SensorSize{widest, widest};
+  const auto limit = stream_.size != SensorSize{} ? stream_.size : SensorSize{widest, widest};
   return x_of(data) >= limit.width || y_of(data) >= limit.height;
 }
 
@@ -256,8 +256,7 @@ void Aedat3Decoder::append(const std::uint8_t* event, Decoded& out) {
     return;
   }
   struct Input {
-    std::uint32_t
-        rising;  ///< type of the rising edge; those of the falling edge and the pulse follow
+    std::uint32_t rising;  ///< type of the rising edge; falling edge and pulse follow
     std::uint16_t id;
   };
   constexpr Input inputs[] = {{2, 0}, {6, 1}, {9, 2}};

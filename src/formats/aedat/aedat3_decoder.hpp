@@ -7,14 +7,14 @@
 
 #include "src/formats/aedat/aedat_header.hpp"
 #include "src/formats/byte_queue.hpp"
-#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
+#include "src/formats/event_decoder.hpp"
 
 namespace eventcamera {
 
 /// Decodes AEDAT 3.1: polarity events, and edges on the camera's inputs. Skips frames, IMU samples
 /// and all other packets. The size stays 0x0 if the header names no known camera.
-class Aedat3Decoder final : public Decoder {
+class Aedat3Decoder final : public EventDecoder {
  public:
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
   void finish(Decoded& out) override;
@@ -30,7 +30,7 @@ class Aedat3Decoder final : public Decoder {
   };
 
   bool read_header();
-  void take_line(const std::string& line);
+  void handle_line(const std::string& line);
   void read_packets(Decoded& out);
   bool read_packet_header();
   bool read_events(Decoded& out);

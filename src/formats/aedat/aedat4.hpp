@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "src/core/event.hpp"
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 namespace eventcamera {
 

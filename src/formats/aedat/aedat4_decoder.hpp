@@ -13,7 +13,7 @@
 #include "src/formats/aedat/aedat4_elements.hpp"
 #include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/byte_queue.hpp"
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 namespace eventcamera {
 
@@ -23,12 +23,12 @@ namespace eventcamera {
 ///
 /// The ID of a trigger is the source of the edge: 0 the camera's input, 1 its generator, 2 a frame,
 /// 3 an exposure, 4 a reset of its clock, 5 a pulse at its input, 6 any other.
-class Aedat4Decoder final : public RecordingDecoder {
+class Aedat4Decoder final : public Decoder {
  public:
   Aedat4Decoder();
 
   void push(std::span<const std::uint8_t> piece) override;
-  void finish() override { finished_ = true; }
+  void drain() override { finished_ = true; }
   std::optional<Item> next() override;
 
   /// Gives access to the packet table, which is read once the header has been.
@@ -76,7 +76,7 @@ class Aedat4Decoder final : public RecordingDecoder {
   };
 
   bool read_header();
-  void take_header(std::span<const std::uint8_t> content);
+  void handle_header(std::span<const std::uint8_t> content);
   bool find_packet();
   bool read_packet();
   Place place_at(std::size_t offset);

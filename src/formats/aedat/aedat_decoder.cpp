@@ -7,7 +7,7 @@
 #include "src/formats/aedat/aedat2_decoder.hpp"
 #include "src/formats/aedat/aedat3_decoder.hpp"
 #include "src/formats/aedat/aedat4_decoder.hpp"
-#include "src/formats/one_stream_decoder.hpp"
+#include "src/formats/event_decoder.hpp"
 
 namespace eventcamera {
 
@@ -25,9 +25,9 @@ void AedatDecoder::push(std::span<const std::uint8_t> piece) {
     start_.insert(start_.end(), piece.begin(), piece.end());
 }
 
-void AedatDecoder::finish() {
+void AedatDecoder::drain() {
   finished_ = true;
-  if (reader_) reader_->finish();
+  if (reader_) reader_->drain();
 }
 
 bool AedatDecoder::open(ByteSource& source) {
@@ -53,19 +53,18 @@ bool AedatDecoder::find_version() {
   if (version == "4.0")
     reader_ = std::make_unique<Aedat4Decoder>();
   else if (version == "3.1")
-    reader_ = std::make_unique<OneStreamDecoder>(std::make_unique<Aedat3Decoder>());
+    reader_ = std::make_unique<Aedat3Decoder>();
   else if (version == "2.0")
-    reader_ = std::make_unique<OneStreamDecoder>(std::make_unique<Aedat2Decoder>(assumed_));
+    reader_ = std::make_unique<Aedat2Decoder>(assumed_);
   else if (version == "1.0")
-    reader_ = std::make_unique<OneStreamDecoder>(
-        std::make_unique<Aedat2Decoder>(assumed_, Aedat2Version::one));
+    reader_ = std::make_unique<Aedat2Decoder>(assumed_, Aedat2Version::one);
   else
     throw UnsupportedFormat("this is AEDAT " + std::string(version) +
                             "; only versions 4.0, 3.1, 2.0 and 1.0 are supported");
   version_ = version;
   if (source_ != nullptr) reader_->open(*source_);
   reader_->push(start_);
-  if (finished_) reader_->finish();
+  if (finished_) reader_->drain();
   return true;
 }
 

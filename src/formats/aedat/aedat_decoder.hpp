@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 namespace eventcamera {
 
@@ -11,13 +11,13 @@ class Aedat4Decoder;
 
 /// Decodes AEDAT 4, 3.1, 2.0 and 1.0, according to the first line of the file. The older versions
 /// are read as a single stream of events (and triggers).
-class AedatDecoder final : public RecordingDecoder {
+class AedatDecoder final : public Decoder {
  public:
   /// `assumed` is the sensor size to use if an AEDAT 2.0 file does not state it.
   explicit AedatDecoder(SensorSize assumed = {}) : assumed_(assumed) {}
 
   void push(std::span<const std::uint8_t> piece) override;
-  void finish() override;
+  void drain() override;
   bool open(ByteSource& source) override;
   std::optional<Item> next() override;
   const std::vector<StreamInfo>& streams() const override;
@@ -40,7 +40,7 @@ class AedatDecoder final : public RecordingDecoder {
   bool finished_ = false;
   ByteSource* source_ = nullptr;
   std::string version_;  ///< empty until known
-  std::unique_ptr<RecordingDecoder> reader_;
+  std::unique_ptr<Decoder> reader_;
 };
 
 }  // namespace eventcamera

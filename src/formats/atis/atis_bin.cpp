@@ -72,7 +72,7 @@ class AtisRecordDecoder final : public UnitDecoder {
 
 }  // namespace
 
-std::unique_ptr<Decoder> make_atis_bin_decoder(SensorSize size) {
+std::unique_ptr<EventDecoder> make_atis_bin_decoder(SensorSize size) {
   return std::make_unique<UnitStreamDecoder>(std::make_unique<AtisRecordDecoder>(size), size);
 }
 

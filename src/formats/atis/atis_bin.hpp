@@ -6,13 +6,13 @@
 #include <span>
 
 #include "src/core/sensor_size.hpp"
-#include "src/formats/decoder.hpp"
+#include "src/formats/event_decoder.hpp"
 
 namespace eventcamera {
 
 /// Decodes the `.bin` files of N-MNIST and N-Caltech101, recorded with an ATIS: five bytes an
 /// event, without a header. A size of 0x0 means unknown.
-std::unique_ptr<Decoder> make_atis_bin_decoder(SensorSize size);
+std::unique_ptr<EventDecoder> make_atis_bin_decoder(SensorSize size);
 
 /// True if bytes at the start of a file are such events. There is no signature: many events have to
 /// be in order of time, from its beginning on, at various pixels.

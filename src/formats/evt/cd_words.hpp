@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "src/core/event.hpp"
-#include "src/formats/decoded.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/evt/raw.hpp"
 
 namespace eventcamera {

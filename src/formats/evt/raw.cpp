@@ -149,7 +149,7 @@ std::optional<EvtFormat> evt_format_named(std::string_view name) {
   return known != std::end(names) ? std::optional(known->format) : std::nullopt;
 }
 
-std::unique_ptr<Decoder> make_prophesee_raw_decoder() {
+std::unique_ptr<EventDecoder> make_prophesee_raw_decoder() {
   return std::make_unique<RawDecoder>();
 }
 
@@ -157,7 +157,7 @@ std::unique_ptr<Encoder> make_prophesee_raw_encoder(EvtFormat format, SensorSize
   return make_evt_encoder(format, size, header_text(format, size));
 }
 
-std::unique_ptr<Decoder> make_evt_decoder(EvtFormat format, SensorSize size) {
+std::unique_ptr<EventDecoder> make_evt_decoder(EvtFormat format, SensorSize size) {
   return std::make_unique<UnitStreamDecoder>(make_evt_unit_decoder(format, size), size);
 }
 

@@ -6,8 +6,8 @@
 #include <string_view>
 
 #include "src/core/sensor_size.hpp"
-#include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
+#include "src/formats/event_decoder.hpp"
 
 namespace eventcamera {
 
@@ -22,13 +22,13 @@ std::optional<EvtFormat> evt_format_named(std::string_view name);
 
 /// Decodes Prophesee RAW files ("RAW file format"): a text header, and words of the format that it
 /// names.
-std::unique_ptr<Decoder> make_prophesee_raw_decoder();
+std::unique_ptr<EventDecoder> make_prophesee_raw_decoder();
 
 /// Throws std::invalid_argument for sensors of more than 2048x2048 pixels.
 std::unique_ptr<Encoder> make_prophesee_raw_encoder(EvtFormat format, SensorSize size);
 
 /// Words without a header.
-std::unique_ptr<Decoder> make_evt_decoder(EvtFormat format, SensorSize size);
+std::unique_ptr<EventDecoder> make_evt_decoder(EvtFormat format, SensorSize size);
 std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size);
 
 }  // namespace eventcamera

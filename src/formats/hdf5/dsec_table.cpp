@@ -137,7 +137,7 @@ class DsecTable final : public NumberTable {
     return static_cast<std::uint64_t>(row[0]);
   }
 
-  std::vector<Hdf5Dataset> columns_;  ///< t, x, y and p, and those of labels
+  std::vector<Hdf5Dataset> columns_;  ///< t, x, y and p, and labels
   std::optional<Hdf5Dataset> index_;  ///< first event at or after each millisecond
 };
 

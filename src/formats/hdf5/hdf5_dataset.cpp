@@ -136,9 +136,9 @@ bool Hdf5Dataset::load(std::uint64_t block) {
     const hsize_t offset[] = {block * chunk_[0], column};
     // Incompressible chunks are stored slightly larger.
     const auto max_bytes = chunk_bytes_ + chunk_bytes_ / 64 + 1024;
-    std::uint32_t left_out = 0;
-    if (!read_stored(offset, max_bytes, bytes, left_out) ||
-        !undo_hdf5_filters(filters_, left_out, type_bytes_, chunk_bytes_, bytes))
+    std::uint32_t filter_mask = 0;
+    if (!read_stored(offset, max_bytes, bytes, filter_mask) ||
+        !undo_hdf5_filters(filters_, filter_mask, type_bytes_, chunk_bytes_, bytes))
       return false;
     if (row_columns == chunk_stride) {
       loaded_.swap(bytes);
@@ -324,7 +324,7 @@ void Hdf5Dataset::choose(std::span<const std::string> members) {
 }
 
 bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t max_stored,
-                              std::vector<std::uint8_t>& out, std::uint32_t& left_out) {
+                              std::vector<std::uint8_t>& out, std::uint32_t& filter_mask) {
   if (filters_.empty()) {
     // The library reads as many bytes as the file's index states, without reporting the number
     // beforehand, but not more than the file has. Untouched pages of this buffer take no memory.
@@ -335,7 +335,7 @@ bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t max_stored,
       if (!scratch_) throw std::bad_alloc();
     }
     if (chunk_bytes_ > max_stored ||
-        H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &left_out, scratch_.get()) < 0)
+        H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &filter_mask, scratch_.get()) < 0)
       return false;
     out.assign(scratch_.get(), scratch_.get() + chunk_bytes_);
     return true;
@@ -345,14 +345,14 @@ bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t max_stored,
       bytes > max_stored)
     return false;
   out.resize(bytes);
-  return H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &left_out, out.data()) >= 0;
+  return H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &filter_mask, out.data()) >= 0;
 }
 
 bool Hdf5Dataset::read_chunk(std::uint64_t row, std::size_t max_stored,
                              std::vector<std::uint8_t>& out) {
   const hsize_t offset[] = {row, 0};
-  std::uint32_t left_out = 0;
-  return read_stored(offset, max_stored, out, left_out) && left_out == 0;
+  std::uint32_t filter_mask = 0;
+  return read_stored(offset, max_stored, out, filter_mask) && filter_mask == 0;
 }
 
 std::uint64_t Hdf5Dataset::position(std::uint64_t row) const {
@@ -361,9 +361,9 @@ std::uint64_t Hdf5Dataset::position(std::uint64_t row) const {
     offset[0] = row / chunk_[0] * chunk_[0];
     haddr_t address = 0;
     hsize_t bytes = 0;
-    unsigned left_out = 0;
-    const bool known =
-        H5Dget_chunk_info_by_coord(dataset_.get(), offset.data(), &left_out, &address, &bytes) >= 0;
+    unsigned filter_mask = 0;
+    const bool known = H5Dget_chunk_info_by_coord(dataset_.get(), offset.data(), &filter_mask,
+                                                  &address, &bytes) >= 0;
     return known && address != HADDR_UNDEF ? address : 0;
   }
   const auto offset = H5Dget_offset(dataset_.get());

@@ -95,7 +95,7 @@ class Hdf5Dataset {
   void check_storage(hid_t file);
 
   bool read_stored(const hsize_t* offset, std::size_t max_stored, std::vector<std::uint8_t>& out,
-                   std::uint32_t& left_out);
+                   std::uint32_t& filter_mask);
   bool load(std::uint64_t block);
   bool read_elements(std::uint64_t first, std::uint64_t count, std::vector<std::uint8_t>& out);
 

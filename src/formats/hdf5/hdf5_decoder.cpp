@@ -13,11 +13,11 @@ namespace eventcamera {
 namespace {
 
 /// The events of a file.
-class Hdf5Decoder final : public RecordingDecoder {
+class Hdf5Decoder final : public Decoder {
  public:
   void push(std::span<const std::uint8_t> piece) override { collected_.push(piece); }
 
-  void finish() override {
+  void drain() override {
     reader_ = std::make_unique<Hdf5Reader>(collected_.take());
     describe();
   }
@@ -92,7 +92,7 @@ class Hdf5Decoder final : public RecordingDecoder {
 
 }  // namespace
 
-std::unique_ptr<RecordingDecoder> make_hdf5_decoder() {
+std::unique_ptr<Decoder> make_hdf5_decoder() {
   return std::make_unique<Hdf5Decoder>();
 }
 

@@ -3,12 +3,12 @@
 
 #include <memory>
 
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 namespace eventcamera {
 
 /// Creates a decoder for HDF5 files. A pushed file is collected in memory, up to 256 MiB, and read
 /// at its end, because HDF5 needs random access.
-std::unique_ptr<RecordingDecoder> make_hdf5_decoder();
+std::unique_ptr<Decoder> make_hdf5_decoder();
 
 }  // namespace eventcamera

@@ -83,7 +83,7 @@ std::uint32_t fletcher_sum(std::span<const std::uint8_t> bytes) {
 }
 
 /// Removes the checksum at the end. False if it does not match the bytes before it.
-bool take_fletcher_sum(std::vector<std::uint8_t>& bytes) {
+bool remove_fletcher_sum(std::vector<std::uint8_t>& bytes) {
   if (bytes.size() < sizeof(std::uint32_t)) return false;
   bytes.resize(bytes.size() - sizeof(std::uint32_t));
   const auto sum = little_endian<std::uint32_t>(bytes.data() + bytes.size());
@@ -97,11 +97,11 @@ bool is_own_hdf5_filter(int filter) {
          filter == H5Z_FILTER_FLETCHER32 || filter == lzf_filter;
 }
 
-bool undo_hdf5_filters(std::span<const int> filters, std::uint32_t left_out,
+bool undo_hdf5_filters(std::span<const int> filters, std::uint32_t filter_mask,
                        std::size_t number_bytes, std::size_t chunk_bytes,
                        std::vector<std::uint8_t>& bytes) {
   for (auto i = filters.size(); i-- > 0;) {
-    if ((left_out >> i & 1) != 0) continue;
+    if ((filter_mask >> i & 1) != 0) continue;
     switch (filters[i]) {
       case H5Z_FILTER_DEFLATE:
         // Each further filter may have added a checksum.
@@ -111,7 +111,7 @@ bool undo_hdf5_filters(std::span<const int> filters, std::uint32_t left_out,
         if (!expand_lzf_within(chunk_bytes + 4 * filters.size(), bytes)) return false;
         break;
       case H5Z_FILTER_FLETCHER32:
-        if (!take_fletcher_sum(bytes)) return false;
+        if (!remove_fletcher_sum(bytes)) return false;
         break;
       default:
         unshuffle(number_bytes, bytes);

@@ -71,7 +71,7 @@ std::optional<Microseconds> NumberTable::time_at(std::uint64_t row) {
 
 Microseconds NumberTable::unwrapped(std::uint64_t row, std::int64_t number) {
   if (!wraps_) return number;
-  if (samples_.empty()) take_samples();
+  if (samples_.empty()) read_samples();
   auto clock = std::prev(std::ranges::upper_bound(samples_, row, {}, &Sample::row))->clock;
   return clock.follow(static_cast<std::uint32_t>(number));
 }
@@ -84,7 +84,7 @@ std::optional<std::int64_t> NumberTable::time_number(std::uint64_t row) {
 }
 
 /// Follows the clock through rows that must be less than about half an hour apart.
-void NumberTable::take_samples() {
+void NumberTable::read_samples() {
   constexpr std::uint64_t max_samples = 256;
   const auto steps = std::clamp<std::uint64_t>(rows_, 2, max_samples) - 1;
   Clock clock;

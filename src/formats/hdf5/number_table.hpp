@@ -61,7 +61,7 @@ class NumberTable : public Hdf5Table {
   };
 
   std::optional<std::int64_t> time_number(std::uint64_t row);
-  void take_samples();
+  void read_samples();
 
   std::vector<Sample> samples_;  ///< once they are needed
   std::uint64_t next_row_ = 0;

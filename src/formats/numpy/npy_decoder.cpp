@@ -107,8 +107,8 @@ std::optional<std::int64_t> npy_integer(const NpyField& field, const std::uint8_
 }
 
 NpyDecoder::NpyDecoder(const TableSettings& settings) : settings_(settings) {
-  size_ = settings.size;
-  validator_.set_size(size_);
+  stream_.size = settings.size;
+  validator_.set_size(stream_.size);
 }
 
 NpyDecoder::NpyDecoder(const NpyHeader& header, const TableSettings& settings)
@@ -177,11 +177,11 @@ void NpyDecoder::find_layout(std::span<const std::uint8_t> elements) {
   if (!sample.empty()) polarities_ = sample.find_polarities(*columns);
   power_ = power_of(*unit);
   const std::span<const NpyField> all(header_->fields);
-  has_labels_ = std::ranges::any_of(all.subspan(event_columns),
-                                    [](const NpyField& field) { return field.bytes > 0; });
+  stream_.labelled = std::ranges::any_of(all.subspan(event_columns),
+                                         [](const NpyField& field) { return field.bytes > 0; });
   plain_ =
       power_ == 0 && !polarities_.is_one_two() && header_->element_bytes >= sizeof(std::uint64_t) &&
-      !has_labels_ && std::ranges::all_of(all.first(event_columns), [](const NpyField& field) {
+      !stream_.labelled && std::ranges::all_of(all.first(event_columns), [](const NpyField& field) {
         // Unsigned 64-bit numbers may not fit.
         return field.kind != NpyField::Kind::floating && (!field.big_endian || field.bytes == 1) &&
                (field.kind == NpyField::Kind::signed_integer || field.bytes < 8);
@@ -286,7 +286,7 @@ void NpyDecoder::decode_tail(ByteSource& source, Decoded& out) const {
   tail.power_ = power_;
   tail.plain_ = plain_;
   tail.polarities_ = polarities_;
-  tail.has_labels_ = has_labels_;
+  tail.stream_.labelled = stream_.labelled;
   tail.left_ = last;
   tail.decode(bytes, out);
 }

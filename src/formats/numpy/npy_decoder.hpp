@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
+#include "src/formats/event_decoder.hpp"
 #include "src/formats/event_table.hpp"
 #include "src/formats/numpy/npy_header.hpp"
 
@@ -22,12 +22,12 @@ std::optional<std::int64_t> npy_integer(const NpyField& field, const std::uint8_
 /// or floating-point numbers of any width and byte order. The time unit is taken from the name of
 /// the field, or detected from the first rows (TableSample). An array in which more than one row in
 /// a hundred is not an event is refused.
-class NpyDecoder final : public Decoder {
+class NpyDecoder final : public EventDecoder {
  public:
   explicit NpyDecoder(const TableSettings& settings = {});
 
   /// Reads only elements, as described by `header`. Throws UnsupportedFormat if their columns
-  /// cannot be those of events.
+  /// cannot be events.
   NpyDecoder(const NpyHeader& header, const TableSettings& settings);
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;

@@ -181,7 +181,7 @@ class Archive {
   }
 
   SensorSize size() const { return decoder_->size(); }
-  bool has_labels() const { return decoder_->has_labels(); }
+  bool has_labels() const { return decoder_->streams().front().labelled; }
   const Corruption& corruption() const { return corruption_; }
 
  private:
@@ -296,13 +296,13 @@ class Archive {
 };
 
 /// The events of an archive.
-class NpzDecoder final : public RecordingDecoder {
+class NpzDecoder final : public Decoder {
  public:
   explicit NpzDecoder(const TableSettings& settings) : settings_(settings) {}
 
   void push(std::span<const std::uint8_t> piece) override { collected_.push(piece); }
 
-  void finish() override {
+  void drain() override {
     bytes_ = collected_.take();
     open(*bytes_);
   }
@@ -346,7 +346,7 @@ class NpzDecoder final : public RecordingDecoder {
 
 }  // namespace
 
-std::unique_ptr<RecordingDecoder> make_npz_decoder(const TableSettings& settings) {
+std::unique_ptr<Decoder> make_npz_decoder(const TableSettings& settings) {
   return std::make_unique<NpzDecoder>(settings);
 }
 

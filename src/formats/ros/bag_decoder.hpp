@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/ros/bag_file.hpp"
 #include "src/formats/ros/topic_decoder.hpp"
 
@@ -19,14 +19,14 @@ namespace eventcamera {
 ///
 /// Each topic that is read is a stream, named by StreamInfo::source. Times are the stamps of the
 /// messages' headers, not the times at which they were recorded.
-class BagDecoder final : public RecordingDecoder {
+class BagDecoder final : public Decoder {
  public:
   /// `topics`: names of the topics to read, separated by commas; empty: the first with events, and
   /// all with images.
   explicit BagDecoder(std::string topics);
 
   void push(std::span<const std::uint8_t> piece) override;
-  void finish() override;
+  void drain() override;
   bool open(ByteSource& source) override;
   std::optional<Item> next() override;
   const std::vector<StreamInfo>& streams() const override { return streams_; }
@@ -37,11 +37,11 @@ class BagDecoder final : public RecordingDecoder {
   bool knows_all_streams() const override;
   std::optional<SeekPoint> first_of(std::size_t stream) const override;
   std::string format_name() const override { return format_name_; }
-  std::string left_out() const override;
+  std::string unread_topics() const override;
 
  private:
   void choose_format(std::span<const std::uint8_t> start);
-  std::optional<std::size_t> take_topic(const BagTopic& topic);
+  std::optional<std::size_t> add_topic(const BagTopic& topic);
   bool is_wanted(const BagTopic& topic, StreamKind kind) const;
   std::optional<Item> next_part();
   void learn_delay(Microseconds t);

@@ -22,7 +22,7 @@ constexpr std::int64_t before_all = std::numeric_limits<std::int64_t>::min();
 
 }  // namespace
 
-Db3File::Db3File(TakeTopic take_topic) : BagFile(std::move(take_topic)) {}
+Db3File::Db3File(AddTopic add_topic) : BagFile(std::move(add_topic)) {}
 Db3File::~Db3File() = default;
 
 void Db3File::finish() {
@@ -42,10 +42,12 @@ bool Db3File::open(ByteSource& source) {
 void Db3File::read_topics() {
   constexpr std::size_t max_topics = 4096;
   if (!database_->has_table("topics") || !database_->has_table("messages"))
-    throw UnsupportedFormat("this SQLite database is not a ROS 2 bag");
+    throw UnsupportedFormat(
+        "this SQLite database is not a ROS 2 bag: it has no ordinary tables topics and messages");
   auto rows =
       database_->query("SELECT id, name, type, serialization_format FROM topics ORDER BY id");
-  while (rows.next() && topics_.size() < max_topics) {
+  // Counts rows: a few pages could refer to each other for ever.
+  for (std::size_t count = 0; count < max_topics && rows.next(); ++count) {
     BagTopic topic{rows.text(1), ros1_type(rows.text(2)), {}};
     if (rows.text(3) == "cdr") topic.serialization = RosSerialization::cdr;
     const auto id = rows.integer(0);

@@ -2,7 +2,9 @@
 #include "src/formats/ros/sqlite_database.hpp"
 
 #include <algorithm>
+#include <ctime>
 #include <new>
+#include <string_view>
 
 #include "src/formats/unsupported_format.hpp"
 
@@ -12,10 +14,17 @@ namespace {
 
 /// Limit of a value in the database, bytes.
 constexpr int max_value = 1 << 27;
-/// Steps of SQLite's virtual machine between two looks at how long a query takes.
-constexpr int steps_between_looks = 10'000;
-/// Looks after which a query is given up, if they found no row.
-constexpr int max_looks = 100;
+/// Steps of SQLite's virtual machine between two looks at the time.
+constexpr int steps_between_looks = 1000;
+/// CPU time after which a query that has found no further row is interrupted, nanoseconds.
+constexpr std::int64_t max_time = 200'000'000;
+
+/// CPU time of this thread: neither a busy machine nor a slow disk interrupts a query.
+std::int64_t cpu_time() {
+  timespec now = {};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
 
 /// A file of SQLite's, read from a source of bytes.
 struct SourceFile {
@@ -102,9 +111,10 @@ const char* file_system() {
   return registered == SQLITE_OK ? system.zName : nullptr;
 }
 
-/// Lets queries read tables, and nothing else.
-int authorize(void*, int action, const char*, const char*, const char*, const char*) {
-  return action == SQLITE_SELECT || action == SQLITE_READ ? SQLITE_OK : SQLITE_DENY;
+/// Lets queries read tables and list their columns, and nothing else.
+int authorize(void*, int action, const char* name, const char*, const char*, const char*) {
+  const bool lists = action == SQLITE_PRAGMA && name == std::string_view("table_xinfo");
+  return lists || action == SQLITE_SELECT || action == SQLITE_READ ? SQLITE_OK : SQLITE_DENY;
 }
 
 }  // namespace
@@ -122,11 +132,19 @@ SqliteDatabase::SqliteDatabase(ByteSource& bytes) {
   if (result == SQLITE_OK) {
     sqlite3_db_config(opened, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
     sqlite3_db_config(opened, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
-    sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, max_value);
+    sqlite3_db_config(opened, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+    sqlite3_drop_modules(opened, nullptr);  // no virtual tables
+    // No value is longer than the file, unless its pages refer to each other in circles.
+    sqlite3_limit(opened, SQLITE_LIMIT_LENGTH,
+                  static_cast<int>(std::clamp<std::uint64_t>(bytes.size(), 4096, max_value)));
     sqlite3_set_authorizer(opened, authorize, nullptr);
     sqlite3_progress_handler(
         opened, steps_between_looks,
-        [](void* looks) { return ++*static_cast<int*>(looks) > max_looks ? 1 : 0; }, &looks_);
+        [](void* start) {
+          return cpu_time() - *static_cast<const std::int64_t*>(start) > max_time ? 1 : 0;
+        },
+        &start_);
+    start_ = cpu_time();
     sqlite3_table_column_metadata(opened, nullptr, "messages", nullptr, nullptr, nullptr, nullptr,
                                   nullptr, nullptr);  // opens the file
   }
@@ -136,17 +154,22 @@ SqliteDatabase::SqliteDatabase(ByteSource& bytes) {
     throw UnsupportedFormat("this SQLite database is corrupt or cut short");
 }
 
-bool SqliteDatabase::has_table(std::string_view name) {
-  auto rows = query("SELECT type, name FROM sqlite_schema");
-  while (rows.next())
-    if (rows.text(0) == "table" && rows.text(1) == name) return true;
-  return false;
+bool SqliteDatabase::has_table(const std::string& name) {
+  constexpr int hidden = 6;
+  if (query(("SELECT 1 FROM " + name).c_str()).failed()) return false;  // such as a view
+  auto columns = query(("PRAGMA table_xinfo(" + name + ")").c_str());
+  bool found = false;
+  while (columns.next()) {
+    if (columns.integer(hidden) != 0) return false;
+    found = true;
+  }
+  return found && !columns.failed();
 }
 
 SqliteRows SqliteDatabase::query(const char* text, std::int64_t parameter) {
   SqliteRows rows;
-  rows.looks_ = &looks_;
-  looks_ = 0;
+  rows.start_ = &start_;
+  start_ = cpu_time();
   sqlite3_stmt* statement = nullptr;
   rows.failed_ = sqlite3_prepare_v2(database_.get(), text, -1, &statement, nullptr) != SQLITE_OK;
   rows.statement_.reset(statement);
@@ -157,7 +180,7 @@ SqliteRows SqliteDatabase::query(const char* text, std::int64_t parameter) {
 
 bool SqliteRows::next() {
   if (failed_ || !statement_) return false;
-  *looks_ = 0;
+  *start_ = cpu_time();
   const auto result = sqlite3_step(statement_.get());
   failed_ = result != SQLITE_ROW && result != SQLITE_DONE;
   if (result != SQLITE_ROW) statement_.reset();

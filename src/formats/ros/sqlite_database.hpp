@@ -7,7 +7,6 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <string_view>
 
 #include "src/formats/byte_source.hpp"
 
@@ -36,12 +35,12 @@ class SqliteRows {
   };
 
   std::unique_ptr<sqlite3_stmt, Deleter> statement_;
-  int* looks_ = nullptr;  ///< those of the database
+  std::int64_t* start_ = nullptr;  ///< of the database
   bool failed_ = false;
 };
 
-/// Reads an SQLite database from any source of bytes. The file may be hostile: its views, triggers
-/// and functions are not run, and queries that take too long to find a row fail.
+/// Reads an SQLite database from any source of bytes. The file may be hostile: its views, virtual
+/// tables, triggers and functions are not run, and a query that takes too long to find a row fails.
 class SqliteDatabase {
  public:
   /// `bytes` must outlive this object. Throws UnsupportedFormat if it is no database.
@@ -49,8 +48,9 @@ class SqliteDatabase {
   SqliteDatabase(const SqliteDatabase&) = delete;
   SqliteDatabase& operator=(const SqliteDatabase&) = delete;
 
-  /// True if there is a table, and not a view, of this name.
-  bool has_table(std::string_view name);
+  /// True if there is a table of this name all of whose columns are stored in the file: generated
+  /// columns run functions of the file, which nothing interrupts.
+  bool has_table(const std::string& name);
 
   /// Rows of a query with one parameter. They fail at once if the columns are not there.
   SqliteRows query(const char* text, std::int64_t parameter = 0);
@@ -60,7 +60,7 @@ class SqliteDatabase {
     void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
   };
 
-  int looks_ = 0;  ///< at the query that is running, since its last row
+  std::int64_t start_ = 0;  ///< CPU time at the last row of the query that is running
   std::unique_ptr<sqlite3, Deleter> database_;
 };
 

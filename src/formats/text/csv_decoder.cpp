@@ -114,7 +114,7 @@ void CsvDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
   std::string converted;
   auto text = utf8_.text_of(bytes, converted);
   if (in_head_) {
-    const auto count = take_head(text);
+    const auto count = append_head(text);
     if (head_lines_ < head_lines && head_.size() < max_head) return;
     text.remove_prefix(count);
     read_head();
@@ -144,7 +144,7 @@ void CsvDecoder::finish(Decoded& out) {
 }
 
 /// Appends `text` to the head, up to the head's end, and returns the number of characters appended.
-std::size_t CsvDecoder::take_head(std::string_view text) {
+std::size_t CsvDecoder::append_head(std::string_view text) {
   std::size_t count = 0;
   while (count < text.size() && head_lines_ < head_lines && head_.size() < max_head) {
     const char letter = text[count++];
@@ -258,8 +258,8 @@ void CsvDecoder::read_head() {
   if (!empty && text.size() == head_.size())
     throw UnsupportedFormat("not CSV events: no line ends");
 
-  if (settings_.size != SensorSize{}) size_ = settings_.size;
-  validator_.set_size(size_);
+  if (settings_.size != SensorSize{}) stream_.size = settings_.size;
+  validator_.set_size(stream_.size);
   find_commas(rows);
   TableSample sample;
   std::string buffer;
@@ -271,9 +271,9 @@ void CsvDecoder::read_head() {
   find_columns(sample);
   find_unit(sample);
   if (!sample.empty()) polarities_ = sample.find_polarities(columns_);
-  has_labels_ =
+  stream_.labelled =
       std::ranges::any_of(columns_, [](auto column) { return column && *column > EventColumn::p; });
-  if (columns_.size() == event_columns && !has_labels_ && !polarities_.is_one_two())
+  if (columns_.size() == event_columns && !stream_.labelled && !polarities_.is_one_two())
     plain_lines_.emplace(columns_, separator_, power_);
 }
 
@@ -284,7 +284,7 @@ bool CsvDecoder::read_header_line(std::string_view line) {
   if (line.starts_with(geometry)) {
     if (split(line.substr(geometry.size()), false, fields) != 2) return true;
     const auto size = read_size(fields[0], fields[1]);
-    if (size != SensorSize{}) size_ = size;
+    if (size != SensorSize{}) stream_.size = size;
     has_geometry_ = true;
     return true;
   }
@@ -296,9 +296,9 @@ bool CsvDecoder::read_header_line(std::string_view line) {
   const bool are_names = first != std::string_view::npos && is_letter(line[first]);
   const auto count = split(line, are_names, fields);
   if (count == 2) {
-    if (size_ != SensorSize{}) return false;
-    size_ = read_size(fields[0], fields[1]);
-    return size_ != SensorSize{};
+    if (stream_.size != SensorSize{}) return false;
+    stream_.size = read_size(fields[0], fields[1]);
+    return stream_.size != SensorSize{};
   }
   if (has_names_ || !are_names) return false;
 
@@ -314,7 +314,7 @@ bool CsvDecoder::read_header_line(std::string_view line) {
     if (columns_[i] == EventColumn::y)
       size.height = read_extent(names[i].substr(at + 1)).value_or(0);
   }
-  if (size.width > 0 && size.height > 0) size_ = size;
+  if (size.width > 0 && size.height > 0) stream_.size = size;
   if (!are_all_named() && settings_.columns.empty())
     throw UnsupportedFormat("no columns t, x, y and p in the first line");
   has_names_ = true;

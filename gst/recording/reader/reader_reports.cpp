@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/recording/reader/reader_reports.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "gst/recording/reader/reader_timeline.hpp"
+
+GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
+#define GST_CAT_DEFAULT event_reader_debug
+
+using eventcamera::RecordingReader;
+
+ReaderReports::ReaderReports(GstElement* element, bool has_many_streams)
+    : element_(element),
+      has_many_streams_(has_many_streams),
+      data_error_(has_many_streams ? GST_STREAM_ERROR_DEMUX : GST_STREAM_ERROR_DECODE),
+      warn_of_corruption_(event_reader_debug) {}
+
+void ReaderReports::reset() {
+  restart();
+  warn_of_corruption_.reset();
+  dropped_level_.reset();
+  posted_topics_.clear();
+}
+
+void ReaderReports::restart() {
+  *counts_.lock() = {};
+  corrupt_places_ = 0;
+}
+
+void ReaderReports::update(const RecordingReader& recording) {
+  const auto counts = recording.counts();
+  auto before = counts;
+  std::swap(*counts_.lock(), before);
+  const auto outside = counts.outside - before.outside;
+  const auto late = counts.late - before.late;
+  const auto stray = counts.stray - before.stray;
+  if (outside + late + stray > 0) {
+    const auto level = dropped_level_.next();
+    GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, element_,
+                      "dropped %" G_GUINT64_FORMAT " events outside the sensor, %" G_GUINT64_FORMAT
+                      " late items and %" G_GUINT64_FORMAT
+                      " at impossible times, before %" GST_TIME_FORMAT,
+                      guint64{outside}, guint64{late}, guint64{stray},
+                      GST_TIME_ARGS(nanoseconds(recording.position())));
+  }
+  has_new_corruption_ = counts.corrupt_places > corrupt_places_;
+  if (counts.corrupt_places > 0 && counts.corrupt_places != corrupt_places_) {
+    const auto& corruption = recording.corruption();
+    warn_of_corruption_(
+        element_,
+        {data_error_, "Corrupt data at byte " + std::to_string(corruption.first_at) + ": " +
+                          corruption.first +
+                          "; skipping it. The stats property counts what is "
+                          "dropped."},
+        std::to_string(counts.corrupt_places) + " corrupt places, the last at byte " +
+            std::to_string(corruption.last_at));
+  }
+  corrupt_places_ = counts.corrupt_places;
+}
+
+GstStructure* ReaderReports::stats() const {
+  const auto counts = counts_.copy();
+  GstStructure* const stats = gst_structure_new(
+      has_many_streams_ ? "application/x-event-demux-stats" : "application/x-event-decoder-stats",
+      "events", G_TYPE_UINT64, counts.events, "triggers", G_TYPE_UINT64, counts.triggers,
+      "corrupt-places", G_TYPE_UINT64, counts.corrupt_places, "outside-events", G_TYPE_UINT64,
+      counts.outside, "late-items", G_TYPE_UINT64, counts.late, "stray-items", G_TYPE_UINT64,
+      counts.stray, "skipped-items", G_TYPE_UINT64, counts.skipped, nullptr);
+  if (has_many_streams_)
+    gst_structure_set(stats, "frames", G_TYPE_UINT64, counts.frames, "imu-samples", G_TYPE_UINT64,
+                      counts.imu_samples, nullptr);
+  return stats;
+}
+
+void ReaderReports::post_unread_topics(const RecordingReader& recording) {
+  const auto topics = recording.unread_topics();
+  if (topics.empty() || topics == posted_topics_) return;
+  posted_topics_ = topics;
+  post_message(element_, GST_MESSAGE_INFO,
+               {GST_STREAM_ERROR_DEMUX,
+                "The file also has " + topics + ", which are not read. Set topics to read them."},
+               recording.format_name());
+}
+
+void ReaderReports::post_end(const RecordingReader& recording, bool is_timed) {
+  if (recording.is_empty() && !is_timed)
+    post_message(element_, GST_MESSAGE_WARNING,
+                 {GST_STREAM_ERROR_DECODE, "The file has no events."}, recording.format_name());
+  const auto counts = recording.counts();
+  const auto text_of = [](guint64 number) { return std::to_string(number); };
+  const auto untimely = counts.late + counts.stray;
+  GST_INFO_OBJECT(element_, "%" G_GUINT64_FORMAT " corrupt places, %" G_GUINT64_FORMAT " triggers",
+                  guint64{counts.corrupt_places}, guint64{counts.triggers});
+  if (untimely + counts.outside == 0) return;
+  const bool is_assumed = std::ranges::any_of(recording.streams(), [](const auto& stream) {
+    return stream.outside > 0 && stream.size_from == RecordingReader::SizeFrom::assumption;
+  });
+  post_message(
+      element_, GST_MESSAGE_WARNING,
+      {data_error_, text_of(counts.outside) + " events outside the sensor, and " +
+                        text_of(untimely) + " items with times out of order, were dropped." +
+                        (is_assumed ? " The file does not state its sensor size: if the "
+                                      "sensor is larger, set width and height."
+                                    : "")},
+      text_of(counts.late) + " late, " + text_of(counts.stray) + " at stray times");
+}

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "src/gl/event_list.hpp"
+#include "src/gl/grey_frame.hpp"
+#include "src/simulate/simulator.hpp"
+#include "src/simulate/warp.hpp"
+
+namespace eventcamera::gl {
+
+/// Marks the pixels that fire between two frames, like fire_differences().
+class DifferenceKernel {
+ public:
+  DifferenceKernel(const Context& gl, const LumaFormat& format);
+
+  /// Writes the marks of `step`, 1 or later.
+  void run(const GreyFrame& before, const GreyFrame& now, const Thresholds& thresholds, int step,
+           const EventList& out) const;
+
+ private:
+  LumaFormat format_;
+  Kernel kernel_;
+};
+
+/// Marks the pixels that fire in the frames interpolated between two frames, like
+/// eventcamera::InterpolationKernel; the same flow gives the same events.
+class InterpolationKernel {
+ public:
+  InterpolationKernel(const Context& gl, const LumaFormat& format);
+
+  /// Writes the marks of all steps of an interval. `flow` is laid out as by FarnebackFlow.
+  void run(const GreyFrame& last, const GreyFrame& now, const Buffer& flow,
+           Interpolation interpolation, const Thresholds& thresholds, const EventList& out) const;
+
+ private:
+  LumaFormat format_;
+  Kernel kernel_;
+};
+
+/// A 2D texture of RGBA bytes to draw events in, and the colours of pixels without events, with
+/// OFF, with ON, and with both.
+struct Picture {
+  GLuint texture;
+  std::array<std::array<std::uint8_t, 4>, 4> colours;
+};
+
+/// Draws the marks of an event list like Accumulator draws events. For this, marks need neither be
+/// counted nor sorted.
+class DrawKernel {
+ public:
+  DrawKernel(const Context& gl, const LumaFormat& format);
+  void run(const EventList& events, const Picture& out);
+
+ private:
+  const Context& gl_;
+  LumaFormat format_;
+  Kernel kernel_;
+  /// Output of the shader, copied to the texture on the GPU: in OpenGL ES 3.1, shaders can only
+  /// write to immutable textures, but GStreamer's textures are mutable.
+  Buffer pixels_;
+};
+
+}  // namespace eventcamera::gl

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstddef>
+#include <initializer_list>
+#include <span>
+#include <string_view>
+
+#include "src/gl/context.hpp"
+
+namespace eventcamera::gl {
+
+/// GPU memory that shaders read and write.
+class Buffer {
+ public:
+  /// `usage`: GL_DYNAMIC_COPY for data that stay on the GPU, GL_DYNAMIC_READ for data to read back.
+  explicit Buffer(const Context& gl, GLenum usage = GL_DYNAMIC_COPY);
+  ~Buffer() { gl_.DeleteBuffers(1, &name_); }
+  Buffer(const Buffer&) = delete;
+  Buffer& operator=(const Buffer&) = delete;
+
+  GLuint name() const { return name_; }
+  std::size_t size() const { return size_; }
+
+  /// Makes it at least `size` bytes long; if it must grow, its contents are lost. Throws Error.
+  void reserve(std::size_t size);
+
+  /// Replaces the contents.
+  void assign(std::span<const std::byte> bytes);
+
+  /// Replaces the contents by `size` zeros.
+  void assign_zeros(std::size_t size);
+
+  /// Copies the first bytes to `out`, once the GPU has written them. Throws Error if the context is
+  /// lost.
+  void read(std::span<std::byte> out) const;
+
+ private:
+  const Context& gl_;
+  GLenum usage_;
+  GLuint name_ = 0;
+  std::size_t size_ = 0;
+};
+
+/// Number of workgroups along each axis.
+struct Groups {
+  int x = 1;
+  int y = 1;
+};
+
+/// Number of groups of `size` that cover `count`.
+constexpr int groups_of(int size, int count) {
+  return (count + size - 1) / size;
+}
+
+/// A compute shader.
+class Kernel {
+ public:
+  /// `name` is for error messages. The source has no #version, and may use
+  /// shaders/prelude.comp. Throws Error if it does not compile.
+  Kernel(const Context& gl, std::string_view name, std::string_view source);
+  ~Kernel() { gl_.DeleteProgram(program_); }
+  Kernel(const Kernel&) = delete;
+  Kernel& operator=(const Kernel&) = delete;
+
+  /// Runs it with `buffers` at bindings 0, 1, ... and the integers `values` at uniform locations 0,
+  /// 1, ... Kernels run one after another, and see what earlier ones wrote.
+  void run(Groups groups, std::initializer_list<const Buffer*> buffers,
+           std::initializer_list<int> values) const;
+
+ private:
+  const Context& gl_;
+  GLuint program_;
+};
+
+/// A point in the GPU's command queue.
+class Fence {
+ public:
+  explicit Fence(const Context& gl) : gl_(gl) {}
+  ~Fence() { gl_.DeleteSync(sync_); }
+  Fence(const Fence&) = delete;
+  Fence& operator=(const Fence&) = delete;
+
+  /// Moves it to the end of the queue.
+  void set();
+
+  /// Waits until the GPU has reached it. Throws Error.
+  void wait() const;
+
+ private:
+  const Context& gl_;
+  GLsync sync_ = nullptr;
+};
+
+}  // namespace eventcamera::gl
