@@ -574,8 +574,8 @@ TEST_F(Bags, AreRefusedWithAReason) {
     std::copy_n("evt9", 4, at);
   }
   EXPECT_EQ(refusal(other),
-            "the events of topic /camera/events have the encoding \"evt9\"; evt2, evt21, evt3 and "
-            "mono can be read");
+            "the events of topic /camera/events have the encoding \"evt9\"; evt2, evt21, evt3, "
+            "libcaer, libcaer_cmp and mono can be read");
 }
 
 Bytes encoded(const McapSettings& settings, std::span<const AbsoluteEvent> events,
