@@ -141,6 +141,7 @@ class Simulation {
     WarnOnce warn_of_no_pts{event_simulator_debug};
     WarnOnce warn_of_times{event_simulator_debug};
     WarnOnce warn_of_equal_times{event_simulator_debug};
+    WarnOnce warn_of_long_gap{event_simulator_debug};
     WarnOnce warn_of_interlacing{event_simulator_debug};
     WarnOnce warn_of_orientation{event_simulator_debug};
   };
