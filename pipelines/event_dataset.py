@@ -56,6 +56,9 @@ def options():
                         help="the manifest that verify compares with (default: that of the folder)")
     parser.add_argument("--video", metavar="NAME", help="make one video only, as the jobs do; needs --file")
     parser.add_argument("--file", help="the file of that video")
+    parser.add_argument("--trust", action="store_true",
+                        help="run any elements, which may read and write your files and send them; otherwise a recipe"
+                        " has only elements that do neither")
     parser.add_argument("--unlock", action="store_true",
                         help="remove the lock that a killed run has left, and exit")
     parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
@@ -170,7 +173,7 @@ def run_snakemake(args, videos, *options):
     """Runs a job for each video, and returns the exit status. Jobs that fail leave no record. Snakemake locks the
     records that it makes against other runs."""
     command = [os.path.realpath(__file__), *["verify"] * args.verify, os.path.abspath(args.recipe),
-               "--output", args.output]
+               "--output", args.output, *["--trust"] * args.trust]
     jobs = ".jobs-{}-of-{}.json".format(*args.part)
     with open(os.path.join(args.output, jobs), "w", encoding="utf-8") as file:
         json.dump({"videos": {id_of(video.name): {"name": video.name, "file": os.path.abspath(video.path)}
@@ -327,7 +330,7 @@ def is_damaged(written, output):
 def main():
     args = options()
     find_plugins()
-    recipe = ec.Recipe.load(args.recipe)
+    recipe = ec.Recipe.load(args.recipe, args.trust)
     if args.video:
         make_one(args, recipe)
         return 0

@@ -52,6 +52,9 @@ inline eventcamera::Microseconds length_of(const EventInterval& interval) {
 /// Resolution of event times; times closer than this count as equal.
 inline constexpr GstClockTime event_resolution = GST_USECOND;
 
+/// Longest pause that is filled with empty pictures or tensors; longer ones are skipped.
+inline constexpr GstClockTime max_pause = 60 * GST_SECOND;
+
 /// Interval of a buffer of events. Without a duration it ends at the last event. None without a
 /// PTS, or with one of more than 292 years.
 std::optional<EventInterval> interval_of(GstBuffer* buffer);

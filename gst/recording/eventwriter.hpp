@@ -12,7 +12,7 @@
 /// An event file format, and the element that writes it: an event stream in, bytes out.
 ///
 /// The header is a separate buffer, and is part of the caps, so that late joiners can decode the
-/// stream. Written times are those of the PTS. A flush starts the file over, as in filesink. Header
+/// stream. Written times follow the PTS. A flush starts the file over, as in filesink. Header
 /// fields that are only known at the end are written if downstream can seek. A stop without EOS
 /// warns of the events that the format writes at the end.
 struct EventWriterFormat {

@@ -28,7 +28,7 @@ static GstEvent* new_event(GstEvent* create(GBytes*), std::span<const Record> re
   return event;
 }
 
-/// The records in `bytes`, which it unrefs, without those of a time out of range.
+/// The records in `bytes`, which it unrefs; without records with a time out of range.
 template <class Record>
 static std::optional<std::vector<Record>> records_in(GBytes* bytes) {
   if (bytes == nullptr) return std::nullopt;

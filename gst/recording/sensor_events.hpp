@@ -13,7 +13,7 @@
 /// other elements forward. docs/formats.md describes them. They precede the buffer or GAP of their
 /// interval. An empty one, before the first buffer, announces that there may be more.
 ///
-/// Times are those of the stream, floor(PTS / 1000) microseconds.
+/// Times count like the stream, as floor(PTS / 1000) microseconds.
 GstEvent* new_sensor_event(std::span<const eventcamera::Trigger> triggers);
 GstEvent* new_sensor_event(std::span<const eventcamera::ImuSample> samples);
 

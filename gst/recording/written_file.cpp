@@ -152,13 +152,13 @@ void WrittenFile::encode(std::span<const Trigger> triggers) {
 
 /// Encodes all queued triggers.
 void WrittenFile::encode_triggers() {
-  encode(triggers_.take_before(eventcamera::after_all_items));
+  encode(triggers_.pop_before(eventcamera::after_all_items));
 }
 
 /// Encodes events, and the queued triggers among them.
 GstFlowReturn WrittenFile::encode_all(std::span<const AbsoluteEvent> events, GstClockTime& start) {
   if (events.empty()) return GST_FLOW_OK;
-  std::span<const Trigger> triggers = triggers_.take_before(events.back().t);
+  std::span<const Trigger> triggers = triggers_.pop_before(events.back().t);
   GstFlowReturn result = GST_FLOW_OK;
   while (!events.empty() && result == GST_FLOW_OK) {
     const auto due = std::ranges::lower_bound(triggers, events.front().t, {}, &Trigger::t);
@@ -176,7 +176,7 @@ GstFlowReturn WrittenFile::encode_all(std::span<const AbsoluteEvent> events, Gst
 /// Warns of the first pause that is removed, and at the end of the file of the total, if there are
 /// more.
 void WrittenFile::warn_of_pauses(bool at_end) {
-  const auto removed = encoder_->left_out();
+  const auto removed = encoder_->removed_time();
   const auto reported = pauses_reported_;
   if (removed == reported || (reported > 0 && !at_end)) return;
   pauses_reported_ = removed;

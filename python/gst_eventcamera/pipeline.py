@@ -60,15 +60,17 @@ def printable(path: str) -> str:
 
 
 def utf8_path(path: str | os.PathLike[str]) -> str:
-    """A path as the value of a property. Raises PipelineError if it is not UTF-8."""
-    text = os.fspath(path)
+    """A path as the value of a property. Raises PipelineError if it is not UTF-8, and ValueError if it has a NUL."""
+    text = os.fsdecode(path)
+    if "\0" in text:
+        raise ValueError("embedded null byte")
     if text != printable(text):
         raise PipelineError(f"the name {printable(text)} is not UTF-8; rename it")
     return text
 
 
 def quoted(path: str | os.PathLike[str]) -> str:
-    """A path as a quoted value in a pipeline description. Raises PipelineError if it is not UTF-8."""
+    """A path as a quoted value in a pipeline description. Raises as utf8_path()."""
     return '"' + utf8_path(path).replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
@@ -76,7 +78,7 @@ def _text_of(message: Gst.Message, error: GLib.Error, cause: Optional[str]) -> s
     return f"{message.src.get_name()}: {error.message} ({cause.splitlines()[-1] if cause else ''})"
 
 
-def _warn(text: str) -> None:
+def warn(text: str) -> None:
     """Warns at the line that calls the package, also through a cached property."""
     level, frame = 1, sys._getframe()
     while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in (__package__, "functools"):
@@ -141,7 +143,7 @@ class Pipeline:
         kinds = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
         while message := self._bus.timed_pop_filtered(wait, kinds):
             if message.type == Gst.MessageType.WARNING:
-                _warn(_text_of(message, *message.parse_warning()))
+                warn(_text_of(message, *message.parse_warning()))
                 continue
             wait = 0
             if message.type == Gst.MessageType.EOS:

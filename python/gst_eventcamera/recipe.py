@@ -2,6 +2,7 @@
 """Recipes of data sets: videos, simulator, and parameters drawn for each video."""
 from __future__ import annotations
 
+import collections
 import dataclasses
 import glob
 import hashlib
@@ -16,11 +17,13 @@ from typing import Any, Iterator, Mapping, Optional
 import yaml
 
 from .pipeline import Gst, Pipeline, PipelineError, expect_limits, printable, property_limits, quoted
+from .recipe_elements import is_safe_property, reason_against
 from .recordings import WRITERS
 
 Value = float | int | str | bool
 
-MAX_RECIPE = 1 << 20  # bytes
+MAX_RECIPE = 1 << 17  # bytes; YAML is parsed at about 50 kB a second
+MAX_CHOICES = 1000
 MAX_NUMBER = 64  # characters
 FLOAT = "tag:yaml.org,2002:float"
 NUMBERS = {"tag:yaml.org,2002:int", FLOAT}
@@ -41,7 +44,7 @@ class RecipeError(ValueError):
 
 
 class _Loader(yaml.SafeLoader):
-    """Refuses duplicate keys and excessively long numbers."""
+    """Refuses duplicate keys, excessively long numbers, and merges, which may grow with each level."""
 
     def construct_scalar(self, node: yaml.ScalarNode) -> Any:
         if node.tag in NUMBERS and len(node.value) > MAX_NUMBER:
@@ -50,9 +53,11 @@ class _Loader(yaml.SafeLoader):
         return super().construct_scalar(node)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        names = [key.value for key, _ in node.value]
-        if twice := {name for name in names if names.count(name) > 1}:
-            raise RecipeError(f"line {node.start_mark.line + 1}: {min(map(str, twice))} is given twice")
+        counts = collections.Counter(str(key.value) for key, _ in node.value)
+        if twice := [name for name, count in counts.items() if count > 1]:
+            raise RecipeError(f"line {node.start_mark.line + 1}: {min(twice)} is given twice")
+        if any(key.tag == "tag:yaml.org,2002:merge" for key, _ in node.value):
+            raise RecipeError(f"line {node.start_mark.line + 1}: << is not for recipes; write the keys")
         return super().construct_mapping(node, deep)
 
 
@@ -128,13 +133,14 @@ class Recipe:
     min_frames: int = 2
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Recipe:
+    def load(cls, path: str | os.PathLike[str], trust: bool = False) -> Recipe:
+        """Reads a recipe. Without `trust`, only elements that neither open files nor send anything may occur."""
         try:
             with open(path, "rb") as file:
                 text = file.read(MAX_RECIPE + 1)
             if len(text) > MAX_RECIPE:
                 raise RecipeError("too long for a recipe")
-            return _checked(os.path.abspath(path), yaml.load(text, _Loader))
+            return _checked(os.path.abspath(path), yaml.load(text, _Loader), trust)
         except (OSError, UnicodeError, RecursionError, ValueError, yaml.YAMLError) as error:
             raise RecipeError(f"{os.fspath(path)}: {_text_of(error)}") from None
 
@@ -241,7 +247,7 @@ def _in_order(parameters: Mapping[str, Value | Distribution]) -> list[str]:
     return sorted(parameters, key=lambda name: (getattr(parameters[name], "relative_to", None) is not None, name))
 
 
-def _checked(path: str, recipe: Any) -> Recipe:
+def _checked(path: str, recipe: Any, trust: bool) -> Recipe:
     if not isinstance(recipe, dict):
         raise RecipeError("not a recipe: give keys and values, such as \"seed: 1\"")
     _expect_keys("", recipe, KEYS)
@@ -263,10 +269,12 @@ def _checked(path: str, recipe: Any) -> Recipe:
         raise RecipeError("simulator: give an element and its properties, such as \"eventsim-dvs preset=davis346\"")
     if "!" in texts["simulator"]:
         raise RecipeError("simulator: give one element; others belong to frames, before it, or filters, after it")
+    if not trust:
+        _expect_safe(texts)
     if not Gst.ElementFactory.find(texts["simulator"].split()[0]):
         raise RecipeError(f"simulator: there is no element \"{texts['simulator'].split()[0]}\"")
     checked = Recipe(path, seed, tuple(patterns), texts["simulator"], output, _framerate(recipe), _window(recipe),
-                     texts["frames"], _parameters(recipe, texts["simulator"]), texts["filters"], texts["tensors"],
+                     texts["frames"], _parameters(recipe, texts["simulator"], trust), texts["filters"], texts["tensors"],
                      _split(recipe), texts["group"], min_frames)
     if checked.window and not checked.framerate:
         raise RecipeError("window: give a framerate, too")
@@ -278,6 +286,16 @@ def _checked(path: str, recipe: Any) -> Recipe:
         raise RecipeError(f"group: {error}") from None
     _check_elements(checked)
     return checked
+
+
+def _expect_safe(texts: Mapping[str, str]) -> None:
+    chains = {key: texts[key] for key in ("frames", "simulator", "filters")} | {
+        "tensors": f"eventtensor {texts['tensors']}"}
+    if "!" in texts["tensors"]:
+        raise RecipeError("tensors: give properties of eventtensor")
+    for key, chain in chains.items():
+        if reason := reason_against(chain):
+            raise RecipeError(f"{key}: {reason}; if you trust the recipe, run it with --trust")
 
 
 def _expect_keys(where: str, given: Mapping[Any, Any], known: set[str]) -> None:
@@ -326,7 +344,7 @@ def _window(recipe: Mapping[str, Any]) -> Optional[Window]:
     return Window(**given)
 
 
-def _parameters(recipe: Mapping[str, Any], simulator: str) -> dict[str, Value | Distribution]:
+def _parameters(recipe: Mapping[str, Any], simulator: str, trust: bool) -> dict[str, Value | Distribution]:
     given = recipe.get("parameters", {})
     if not isinstance(given, dict):
         raise RecipeError("parameters: give names of properties and their values")
@@ -336,6 +354,8 @@ def _parameters(recipe: Mapping[str, Any], simulator: str) -> dict[str, Value | 
         where = f"parameters: {name}"
         if name not in limits:
             raise RecipeError(f"{where}: {simulator.split()[0]} has no such property")
+        if not trust and not is_safe_property(simulator.split()[0], name):
+            raise RecipeError(f"{where}: may name a file or an address; if you trust the recipe, run it with --trust")
         if re.search(rf"(?<!\S){re.escape(name)}=", simulator):
             raise RecipeError(f"{where}: is also set by simulator")
         if isinstance(value, dict):
@@ -370,6 +390,8 @@ def _distribution(where: str, given: Mapping[Any, Any], limits: tuple[float, flo
     needs = RecipeError(f"{where}: {kind} needs {DISTRIBUTIONS[kind]}, not {reprlib.repr(values)}")
     if not isinstance(values, list) or not values or not all(isinstance(one, (int, float, str)) for one in values):
         raise needs
+    if len(values) > MAX_CHOICES:
+        raise RecipeError(f"{where}: more than {MAX_CHOICES} values")
     numbers = [one for one in values if isinstance(one, (int, float)) and not isinstance(one, bool)]
     if not all(map(math.isfinite, numbers)):
         raise needs

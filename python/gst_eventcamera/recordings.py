@@ -7,6 +7,7 @@ import dataclasses
 import functools
 import itertools
 import math
+import operator
 import os
 import sys
 import uuid
@@ -17,11 +18,14 @@ import numpy as np
 from .events import Events, join
 from .pipeline import (
     EVENT_CAPS, LABEL, GLib, Gst, GstEventCamera, Pipeline, PipelineError, duration_of, events_of, given_size,
-    quoted, sensor_size, utf8_path)
+    quoted, sensor_size, utf8_path, warn)
 from .sources import SINK
 
 # Latest time of an event that readers of files accept, in microseconds: 142 years.
 MAX_TIME = 1 << 52
+# Longest pause whose windows are returned, in seconds and in windows.
+MAX_PAUSE = 60
+MAX_EMPTY = 10_000
 # Microseconds of the buffers that are written.
 BUFFER = 10_000
 # Bytes that may wait to be written, and nanoseconds between two looks at them.
@@ -51,8 +55,9 @@ class Stream:
     start, end: the part of the recording in seconds from its first event, end exclusive; None = to its end. A part
         past the end is empty.
 
-    Iterating yields an Events array a window, empty where nothing happened; only one is in memory. The
-    window that the recording ends in is the last one. Indexing and slices seek in the file. The duration, len(),
+    Iterating yields an Events array a window, empty where nothing happened; only one is in memory. Windows of pauses
+    of more than a minute or 10,000 windows are skipped, with a PipelineWarning; start and end of each array say
+    where it lies. The window that the recording ends in is the last one. Indexing and slices seek in the file. The duration, len(),
     and indices from the end look for the end of the recording, once: a file without an index is read to its end.
     Raises PipelineError if the file cannot be read, and ValueError for other lengths and parts."""
 
@@ -118,6 +123,7 @@ class Stream:
             if step != 1:
                 raise ValueError("a slice of a stream has no step")
             return self.between(first * self.window, None if index.stop is None else max(first, last) * self.window)
+        index = operator.index(index)
         first = index + len(self) if index < 0 else index
         if first >= 0:
             for events in self.between(first * self.window, (first + 1) * self.window):
@@ -143,6 +149,9 @@ class Stream:
                 parts.clear()
                 yield events
                 index += 1
+                if min(last, limit) - index > min(MAX_PAUSE / self.window, MAX_EMPTY):
+                    warn(f"{self.path}: a pause of {(last - index) * self.window:.0f} s: its windows are skipped")
+                    index = int(min(last, limit))
 
         with contextlib.closing(self._chunks()) as chunks:
             for events in chunks:
@@ -221,7 +230,7 @@ def stream(path: str | os.PathLike[str], window: float = 0.033) -> Stream:
     """The windows of a recording, of `window` seconds each, from a file of any format that GStreamer plays.
 
     ec.stream(path)[30:60] and ec.stream(path).between(1.0, 2.0) are parts of it."""
-    return Stream(os.fspath(path), window)
+    return Stream(os.fsdecode(path), window)
 
 
 def read(path: str | os.PathLike[str], start: float = 0, end: Optional[float] = None) -> Events:
@@ -229,7 +238,7 @@ def read(path: str | os.PathLike[str], start: float = 0, end: Optional[float] = 
 
     Shape (events,), 16 bytes each; times are those of the file. A part past the end is empty. Raises PipelineError
     if the file cannot be read or has no events to read, and ValueError unless 0 <= start <= end."""
-    part = Stream(os.fspath(path), window=1, start=start, end=end)
+    part = Stream(os.fsdecode(path), window=1, start=start, end=end)
     with part._open() as pipeline:
         events = join(part._play(pipeline))
         if events.width == 0:

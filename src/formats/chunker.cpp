@@ -31,7 +31,7 @@ void Chunker::push(std::span<const AbsoluteEvent> events) {
 /// Keeps the events up to the end of their cell if they are sorted. Returns their number.
 std::size_t Chunker::keep_sorted(std::span<const AbsoluteEvent> events) {
   const auto soon = [this](const AbsoluteEvent& event) { return event.t <= latest_ + settled; };
-  if (!ahead_.empty() || latest_ == never || events.front().t < std::max(latest_, start_) ||
+  if (!unsettled_.empty() || latest_ == never || events.front().t < std::max(latest_, start_) ||
       !soon(events.front()) || !soon(events.back()))
     return 0;
   auto& cell = cell_of(events.front().t);
@@ -50,23 +50,18 @@ std::size_t Chunker::keep_sorted(std::span<const AbsoluteEvent> events) {
 
 void Chunker::place(const AbsoluteEvent& event) {
   if (!is_time(event.t)) {
-    ++dropped_.stray;
+    ++stray_;
     return;
   }
-  if (!ahead_.empty()) {
-    if (event.t >= ahead_.front().t - settled) {
-      ahead_.push_back(event);
-      // The clock continues from where it jumped to.
-      if (event.t - ahead_.front().t >= settled || ahead_.size() >= max_ahead) keep_ahead();
-      return;
-    }
-    dropped_.stray += ahead_.size();
-    ahead_.clear();
-  }
-  if (first_ && event.t < *first_)
+  const bool goes_on =
+      latest_ != never && event.t <= latest_ + settled && event.t >= latest_ - settled;
+  if (goes_on && !unsettled_.is_near(event.t)) unsettled_.drop();
+  if (!unsettled_.empty())
+    keep_all(unsettled_.push(event, !first_));
+  else if (first_ && event.t < *first_)
     drop_early(event);
   else if (latest_ == never || event.t > latest_ + settled)
-    ahead_.push_back(event);
+    keep_all(unsettled_.push(event, !first_));
   else
     keep(event);
 }
@@ -74,7 +69,7 @@ void Chunker::place(const AbsoluteEvent& event) {
 /// Drops an event before the next interval.
 void Chunker::drop_early(const AbsoluteEvent& event) {
   const bool is_ignored = origin_ && event.t >= *origin_ && event.t < *first_;
-  dropped_.late += static_cast<std::uint64_t>(!is_ignored);
+  late_ += static_cast<std::uint64_t>(!is_ignored);
 }
 
 void Chunker::keep(const AbsoluteEvent& event) {
@@ -88,27 +83,26 @@ void Chunker::keep(const AbsoluteEvent& event) {
   latest_ = std::max(latest_, event.t);
 }
 
-void Chunker::keep_ahead() {
-  if (!first_) {
-    first_ = std::ranges::min_element(ahead_, {}, &AbsoluteEvent::t)->t;
+void Chunker::keep_all(std::span<const AbsoluteEvent> events) {
+  if (!first_ && !events.empty()) {
+    first_ = std::ranges::min_element(events, {}, &AbsoluteEvent::t)->t;
     start_ = *first_;
   }
-  for (const auto& event : ahead_) keep(event);
-  ahead_.clear();
+  for (const auto& event : events) keep(event);
 }
 
 void Chunker::advance_to(Microseconds t) {
   reached_ = std::max(reached_, std::clamp(t, -max_time, max_time));
-  if (!ahead_.empty() && ahead_.front().t < reached_ + settled) keep_ahead();
+  keep_all(unsettled_.settle_before(reached_ + settled));
 }
 
 void Chunker::pause(Microseconds t) {
-  if (!ahead_.empty() && ahead_.front().t < t) keep_ahead();
+  keep_all(unsettled_.settle_before(t));
   paused_ = true;
 }
 
 void Chunker::finish() {
-  if (!ahead_.empty()) keep_ahead();
+  keep_all(unsettled_.finish());
   finished_ = true;
 }
 

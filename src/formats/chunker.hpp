@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "src/core/label.hpp"
+#include "src/formats/unsettled_events.hpp"
 
 namespace eventcamera {
 
@@ -17,12 +18,11 @@ namespace eventcamera {
 /// with the same time keep the order in which they came. Times are whole microseconds, rounded
 /// down, so an interval includes its start and excludes its end.
 ///
-/// Events may be out of order by up to `settled`; later ones are dropped. So are events of a clock
-/// that jumps ahead and soon comes back, as after a flipped bit.
+/// Events may be out of order by up to `settled`; later ones are dropped. So are events whose times
+/// the following ones do not continue, as after a flipped bit.
 class Chunker {
  public:
-  /// Longer than the disorder of sensors, and than a clock stays wrong after a flipped bit.
-  static constexpr Microseconds settled = 10'000;
+  static constexpr Microseconds settled = UnsettledEvents::settled;
   /// Times beyond this, in either direction, are errors: 142 years.
   static constexpr Microseconds max_time = Microseconds{1} << 52;
   static constexpr bool is_time(Microseconds t) { return t >= -max_time && t <= max_time; }
@@ -67,17 +67,20 @@ class Chunker {
   /// Returns the next interval if it is complete.
   std::optional<Interval> next();
 
+  /// Exchanges the memory of the events that next() returned last, where they stay valid, for
+  /// other memory.
+  void swap_memory(std::vector<Event>& memory) { returned_.swap(memory); }
+
   /// Start of the first interval; nothing if not known yet.
   std::optional<Microseconds> first() const { return first_; }
 
   /// Time of the latest event; valid only if first() is known.
   Microseconds latest() const { return latest_; }
 
-  const Dropped& dropped() const { return dropped_; }
+  Dropped dropped() const { return {late_, stray_ + unsettled_.stray()}; }
 
  private:
   static constexpr Microseconds never = std::numeric_limits<Microseconds>::min();
-  static constexpr std::size_t max_ahead = std::size_t{1} << 16;
   static constexpr std::size_t max_spare = 2 * max_events;
 
   /// Events of an interval of the grid, or of its rest.
@@ -93,7 +96,7 @@ class Chunker {
   void place(const AbsoluteEvent& event);
   void drop_early(const AbsoluteEvent& event);
   void keep(const AbsoluteEvent& event);
-  void keep_ahead();
+  void keep_all(std::span<const AbsoluteEvent> events);
   Cell& cell_of(Microseconds t);
   Microseconds middle();
   static void sort(Cell& cell);
@@ -118,8 +121,9 @@ class Chunker {
   std::vector<Label> returned_labels_;
   std::vector<std::vector<Event>> spare_;  ///< memory for further cells
   std::size_t spare_capacity_ = 0;         ///< sum of their capacities
-  std::vector<AbsoluteEvent> ahead_;       ///< far ahead of latest_: not kept yet
-  Dropped dropped_;
+  UnsettledEvents unsettled_;              ///< not kept yet
+  std::uint64_t late_ = 0;
+  std::uint64_t stray_ = 0;
 };
 
 }  // namespace eventcamera

@@ -56,7 +56,7 @@ class Encoder {
 
   /// Total pauses between events, in microseconds, that were removed because the format does not
   /// support them.
-  virtual std::uint64_t left_out() const { return 0; }
+  virtual std::uint64_t removed_time() const { return 0; }
 
   /// Patch for the header, to be written after finish() if the output is seekable. This project's
   /// readers do not need it.

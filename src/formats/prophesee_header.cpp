@@ -19,29 +19,43 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
+/// The tool of the GenX320 evaluation kit ends some lines with a zero, in place of a line end or
+/// before it.
+template <class Iterator>
+Iterator past_zeros(Iterator at, Iterator end) {
+  return std::find_if(at, end, [](std::uint8_t byte) { return byte != 0; });
+}
+
 }  // namespace
 
 std::size_t PropheseeHeader::take(std::span<const std::uint8_t> bytes, bool ended) {
   if (ended_) return 0;
   const auto looked_at = bytes.first(std::min(bytes.size(), max_line));
   // Binary data may look like the start of a line, but is unlikely to continue as text.
-  const auto stop = std::find_if(looked_at.begin(), looked_at.end(), [](std::uint8_t byte) {
+  const auto text_end = std::find_if(looked_at.begin(), looked_at.end(), [](std::uint8_t byte) {
     return byte < ' ' && byte != '\t' && byte != '\r';
   });
+  const auto stop = past_zeros(text_end, looked_at.end());
+  const bool is_undecided = stop != text_end && (stop == looked_at.end() ||
+                                                 (looked_at.end() - stop == 1 && *stop == '%'));
+  if (is_undecided && !ended && bytes.size() < max_line) return 0;
   const bool begins = (looked_at.empty() || looked_at[0] == '%') &&
                       (looked_at.size() < 2 || looked_at[1] == ' ' || looked_at[1] == '\n');
-  const bool whole = stop != looked_at.end() && *stop == '\n';
+  const bool next = stop - text_end > 0 && text_end - looked_at.begin() > 2 &&
+                    looked_at.end() - stop >= 2 && stop[0] == '%' && stop[1] == ' ';
+  const bool whole = next || (stop != looked_at.end() && *stop == '\n');
   if (!begins || (!whole && (ended || stop != looked_at.end() || bytes.size() >= max_line))) {
     ended_ = true;
     return 0;
   }
   if (!whole) return 0;
 
-  const auto length = static_cast<std::size_t>(stop - looked_at.begin()) + 1;
+  const auto length = static_cast<std::size_t>(stop - looked_at.begin()) + (next ? 0 : 1);
   length_ += length;
   if (length_ > max_header) throw UnsupportedFormat("the header is too long");
   found_ = true;
-  const auto line = trimmed({reinterpret_cast<const char*>(looked_at.data()) + 1, length - 2});
+  const auto line = trimmed({reinterpret_cast<const char*>(looked_at.data()) + 1,
+                             static_cast<std::size_t>(text_end - looked_at.begin()) - 1});
   const auto key = line.substr(0, line.find(' '));
   if (key == "end") ended_ = true;
   values_[std::string(key)] = trimmed(line.substr(key.size()));

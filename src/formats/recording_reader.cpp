@@ -17,8 +17,7 @@ namespace {
 constexpr Microseconds max_lag = 500'000;
 /// Minimum length of a gap of such a stream. Queues of a second do not fill before.
 constexpr Microseconds min_gap = 250'000;
-/// Wrap period of the EVT3 clock, the shortest of all; those of the other formats are multiples of
-/// it.
+/// Wrap period of the EVT3 clock, the shortest of all; other formats have multiples of it.
 constexpr Microseconds clock_range = Microseconds{1} << 24;
 constexpr Microseconds always = std::numeric_limits<Microseconds>::min();
 
@@ -495,7 +494,7 @@ template <class Sample>
 std::span<const Sample> RecordingReader::samples_before(Microseconds end,
                                                         WaitingItems<Sample>& waiting) {
   const auto shift = shift_.value_or(0) - origin_;
-  const auto items = waiting.take_before(end - shift);
+  const auto items = waiting.pop_before(end - shift);
   for (auto& item : items) item.t += shift;
   const auto first =
       start_ > 0 ? std::ranges::lower_bound(items, start_, {}, &Sample::t) : items.begin();
@@ -572,7 +571,7 @@ void RecordingReader::add(const ImuItem& item) {
   counts_.stray += imu_samples_.push(item.samples);
 }
 
-/// Shifts the clock of words to that of their interval. If the two differ only by wraps of the
+/// Shifts the clock of words to the clock of their interval. If the two differ only by wraps of the
 /// words' clock, event times are preserved exactly.
 void RecordingReader::set_shift(Microseconds first) {
   first = std::clamp(first, -Chunker::max_time, Chunker::max_time);
@@ -667,7 +666,7 @@ RecordingReader::Counts RecordingReader::counts() const {
   for (const auto& stream : streams_) {
     counts.outside += stream.outside;
     if (!begun_) continue;
-    const auto& dropped = stream.chunker.dropped();
+    const auto dropped = stream.chunker.dropped();
     counts.late += dropped.late;
     counts.stray += dropped.stray;
   }

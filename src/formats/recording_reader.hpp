@@ -128,6 +128,12 @@ class RecordingReader {
   /// cannot be read, and after the end. May throw.
   std::optional<Output> next();
 
+  /// Exchanges the memory of the events of the last chunk, whose stream this is, for other memory.
+  /// The events stay valid there.
+  void swap_memory(std::size_t stream, std::vector<Event>& memory) {
+    streams_[stream].chunker.swap_memory(memory);
+  }
+
   /// True once everything up to the end of the file was returned.
   bool at_end() const { return drained_; }
 

@@ -32,14 +32,14 @@ class WaitingItems {
   bool is_full() const { return waiting_.size() > max_count; }
 
   /// Removes and returns the items before `end`, sorted by time. Valid until the next call.
-  std::span<Item> take_before(Microseconds end) {
-    taken_.clear();
-    if (waiting_.empty()) return taken_;
+  std::span<Item> pop_before(Microseconds end) {
+    popped_.clear();
+    if (waiting_.empty()) return popped_;
     std::ranges::stable_sort(waiting_, {}, &Item::t);
     const auto last = std::ranges::lower_bound(waiting_, end, {}, &Item::t);
-    taken_.assign(waiting_.begin(), last);
+    popped_.assign(waiting_.begin(), last);
     waiting_.erase(waiting_.begin(), last);
-    return taken_;
+    return popped_;
   }
 
   /// Time of the first item that waits.
@@ -54,7 +54,7 @@ class WaitingItems {
   static constexpr std::size_t max_count = std::size_t{1} << 16;
 
   std::vector<Item> waiting_;
-  std::vector<Item> taken_;
+  std::vector<Item> popped_;
 };
 
 }  // namespace eventcamera

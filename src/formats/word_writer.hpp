@@ -64,11 +64,11 @@ class GapLimiter {
   static constexpr Microseconds max_gap = Microseconds{12} * 3600 * 1'000'000;
 
   /// Must be called at least for every event after a long pause.
-  void reach(Microseconds t) {
+  void advance_to(Microseconds t) {
     const auto gap = static_cast<std::uint64_t>(t) - static_cast<std::uint64_t>(last_);
     if (t > last_ && gap > static_cast<std::uint64_t>(max_gap)) {
       shift_ += gap;
-      if (begun_) left_out_ += gap;
+      if (begun_) removed_ += gap;
     }
     begun_ = true;
     last_ = t;
@@ -82,12 +82,12 @@ class GapLimiter {
   /// Returns the time to write; unsigned, because overflow must be well-defined.
   std::uint64_t written(Microseconds t) const { return static_cast<std::uint64_t>(t) - shift_; }
 
-  std::uint64_t left_out() const { return left_out_; }
+  std::uint64_t removed_time() const { return removed_; }
 
  private:
   Microseconds last_ = 0;
   std::uint64_t shift_ = 0;
-  std::uint64_t left_out_ = 0;  ///< removed after the first event
+  std::uint64_t removed_ = 0;  ///< removed after the first event
   bool begun_ = false;
 };
 

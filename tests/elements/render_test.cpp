@@ -196,6 +196,24 @@ TEST_F(Render, DrawsThroughGaps) {
                     {120 * ms, 40 * ms, accumulated(column(2))}});
 }
 
+TEST_F(Render, SkipsThePicturesOfLongPauses) {
+  begin(grey_at("25/1"));
+  constexpr GstClockTime day = 24 * 3600 * GST_SECOND;
+  for (guint64 i = 0; i < 3; ++i) {
+    push(i * day, column(1));
+    gst_harness_push_event(h.get(), gst_event_new_gap(i * day + 40 * ms, day - 40 * ms));
+  }
+  push(3 * day, column(2));
+  const auto pictures = finish();
+  EXPECT_EQ(pictures.size(), 3U * 26 + 1);
+  EXPECT_TRUE(bytes_of(pictures[25].get()) == blank);
+  EXPECT_EQ(GST_BUFFER_PTS(pictures[26].get()), day);
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(pictures[26].get()));
+  EXPECT_TRUE(bytes_of(pictures.back().get()) == accumulated(column(2)));
+  EXPECT_NE(h.warning().find("pause for more than a minute"), std::string::npos);
+  EXPECT_EQ(h.warning(), "");
+}
+
 TEST_F(Render, DrawsThroughSilencesButNotThroughLeaps) {
   begin(grey_at("25/1"));
   push(0, column(1));

@@ -182,6 +182,22 @@ TEST_F(Tensor, GoesOnThroughGaps) {
   EXPECT_FALSE(h->pull_event(GST_EVENT_GAP));
 }
 
+TEST_F(Tensor, IsNotMadeOfLongPauses) {
+  begin("accumulation-time=10000000");
+  constexpr GstClockTime day = 24 * 3600 * GST_SECOND;
+  push_columns(0, 0);
+  gst_harness_push_event(h->get(), gst_event_new_gap(10 * ms, day - 10 * ms));
+  h->push(buffer_of(day, column(1), 10 * ms));
+  for (const auto& event : column(1))
+    events.push_back(
+        {static_cast<eventcamera::Microseconds>(day / 1000) + event.t, event.x, event.y_p});
+  expect_tensor(0, 10 * ms, 0, 2);
+  expect_tensor(10 * ms, 10 * ms, 2, 2);
+  expect_tensor(day, 10 * ms, 2, 4);
+  EXPECT_NE(h->warning().find("The events pause"), std::string::npos);
+  EXPECT_EQ(h->warning(), "");
+}
+
 TEST_F(Tensor, PassesGapsOnBetweenWindowsByCount) {
   begin("event-count=2");
   push_columns(0, 0);

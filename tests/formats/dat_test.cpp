@@ -114,12 +114,12 @@ TEST(Dat, IsWrittenAsTheToolsOfTheVendorDo) {
 
 /// The times that are read of those that are written.
 std::vector<Microseconds> read_again(std::initializer_list<Microseconds> times,
-                                     std::uint64_t left_out) {
+                                     std::uint64_t removed) {
   std::vector<AbsoluteEvent> events;
   for (const auto t : times) events.push_back(AbsoluteEvent::at(1, 2, t, Polarity::on));
   const auto encoder = make_dat_encoder({320, 240});
   const auto bytes = recordings::encode(*encoder, events);
-  EXPECT_EQ(encoder->left_out(), left_out);
+  EXPECT_EQ(encoder->removed_time(), removed);
   std::vector<Microseconds> read;
   for (const auto& event : decode(*make_dat_decoder(), bytes).events) read.push_back(event.t);
   return read;

@@ -16,6 +16,7 @@
 #include "src/formats/hdf5/hdf5_reader.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "tests/formats/table_events.hpp"
+#include "tests/fuzz/small_hdf5.hpp"
 
 namespace {
 
@@ -472,6 +473,175 @@ TEST_F(Hdf5, ASizeThatNoSensorHasIsNone) {
   std::ranges::copy(none, found);
   Hdf5Reader reader(in_memory(bytes));
   EXPECT_EQ(reader.size(), SensorSize{});
+}
+
+/// Four events as several tools store them.
+struct FourEvents {
+  std::vector<std::int64_t> t = {100, 200, 1300, 1'000'400};
+  std::vector<double> seconds = {1e-4, 2e-4, 13e-4, 1.0004};
+  std::vector<std::int64_t> x = {10, 11, 12, 13};
+  std::vector<std::int64_t> y = {20, 21, 22, 23};
+  std::vector<std::int64_t> p = {1, 0, 1, 1};
+  Events events = {AbsoluteEvent::at(10, 20, 100, Polarity::on),
+                   AbsoluteEvent::at(11, 21, 200, Polarity::off),
+                   AbsoluteEvent::at(12, 22, 1300, Polarity::on),
+                   AbsoluteEvent::at(13, 23, 1'000'400, Polarity::on)};
+
+  /// Adds columns with these names.
+  void add(fuzz::SmallHdf5& file, const std::vector<std::string>& names) const {
+    file.dataset(names[0].c_str(), H5T_NATIVE_INT64, {4}, t.data());
+    add_others(file, names);
+  }
+  void add_in_seconds(fuzz::SmallHdf5& file, const std::vector<std::string>& names) const {
+    file.dataset(names[0].c_str(), H5T_NATIVE_DOUBLE, {4}, seconds.data());
+    add_others(file, names);
+  }
+  void add_others(fuzz::SmallHdf5& file, const std::vector<std::string>& names) const {
+    file.dataset(names[1].c_str(), H5T_NATIVE_INT64, {4}, x.data());
+    file.dataset(names[2].c_str(), H5T_NATIVE_INT64, {4}, y.data());
+    file.dataset(names[3].c_str(), H5T_NATIVE_INT64, {4}, p.data());
+  }
+};
+
+TEST_F(Hdf5, ColumnsAreFoundByTheirNames) {
+  const FourEvents four;
+  const std::vector<std::string> layouts[] = {
+      {"t", "x", "y", "p"},
+      {"events/ts", "events/xs", "events/ys", "events/ps"},
+      {"events/timestamp", "events/x", "events/y", "events/polarity"},
+      {"prophesee/left/t", "prophesee/left/x", "prophesee/left/y", "prophesee/left/p"}};
+  for (const auto& names : layouts) {
+    for (const bool in_seconds : {false, true}) {
+      fuzz::SmallHdf5 file("columns");
+      for (const auto* const group :
+           {"events", "prophesee", "prophesee/left", "prophesee/right", "imu"})
+        file.group(group);
+      // Other numbers, and another camera.
+      file.dataset("imu/t", H5T_NATIVE_INT64, {4}, four.t.data());
+      file.dataset("imu/x", H5T_NATIVE_INT64, {4}, four.t.data());
+      if (names[0].starts_with("prophesee"))
+        four.add(file, {"prophesee/right/t", "prophesee/right/y", "prophesee/right/x",
+                        "prophesee/right/p"});
+      if (in_seconds)
+        four.add_in_seconds(file, names);
+      else
+        four.add(file, names);
+      Hdf5Reader reader(in_memory(file.bytes()));
+      EXPECT_EQ(read_all(reader), four.events) << names[0];
+      reader.seek(1300);
+      EXPECT_EQ(read_all(reader).size(), 2U);
+      ASSERT_TRUE(reader.time_range());
+      EXPECT_EQ(reader.time_range()->last, 1'000'400);
+    }
+  }
+  fuzz::SmallHdf5 file("nanoseconds");
+  auto nanoseconds = four;
+  for (auto& t : nanoseconds.t) t = t * 1000 + 7;
+  nanoseconds.add(file, {"t_ns", "x", "y", "p"});
+  Hdf5Reader reader(in_memory(file.bytes()));
+  EXPECT_EQ(read_all(reader), four.events);
+}
+
+TEST_F(Hdf5, RowsAreRecordsOrNumbers) {
+  const FourEvents four;
+  struct Record {
+    std::uint16_t x, y;
+    std::int16_t p;
+    std::int64_t t;
+  };
+  std::vector<Record> records;
+  std::vector<double> txyp, xytp;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto x = static_cast<std::uint16_t>(four.x[i]);
+    const auto y = static_cast<std::uint16_t>(four.y[i]);
+    records.push_back({x, y, static_cast<std::int16_t>(four.p[i]), four.t[i]});
+    const auto p = four.p[i] == 1 ? 1.0 : -1.0;
+    txyp.insert(txyp.end(), {four.seconds[i], static_cast<double>(x), static_cast<double>(y), p});
+    xytp.insert(xytp.end(), {static_cast<double>(x), static_cast<double>(y), four.seconds[i], p});
+  }
+  fuzz::SmallHdf5 compound("compound");
+  const Hdf5Handle type(H5Tcreate(H5T_COMPOUND, sizeof(Record)), H5Tclose);
+  H5Tinsert(type.get(), "x", offsetof(Record, x), H5T_NATIVE_UINT16);
+  H5Tinsert(type.get(), "y", offsetof(Record, y), H5T_NATIVE_UINT16);
+  H5Tinsert(type.get(), "polarity", offsetof(Record, p), H5T_NATIVE_INT16);
+  H5Tinsert(type.get(), "timestamp", offsetof(Record, t), H5T_NATIVE_INT64);
+  compound.dataset("events", type.get(), {4}, records.data());
+  Hdf5Reader compound_reader(in_memory(compound.bytes()));
+  EXPECT_EQ(read_all(compound_reader), four.events);
+
+  for (const auto& [path, numbers] :
+       {std::pair{"events", &txyp}, {"events", &xytp}, {"davis/right/events", &xytp}}) {
+    fuzz::SmallHdf5 file("rows");
+    file.group("davis");
+    file.group("davis/right");
+    file.dataset(path, H5T_NATIVE_DOUBLE, {4, 4}, numbers->data());
+    Hdf5Reader reader(in_memory(file.bytes()));
+    EXPECT_EQ(read_all(reader), four.events) << path;
+    EXPECT_EQ(reader.size(),
+              std::string_view(path) == "events" ? SensorSize{} : (SensorSize{346, 260}));
+  }
+}
+
+TEST_F(Hdf5, TheLargestUnsignedPolarityIsOff) {
+  const std::vector<std::uint32_t> rows = {100, 10, 20, 1, 200, 11, 21, UINT32_MAX};
+  fuzz::SmallHdf5 file("v2e");
+  file.dataset("events", H5T_NATIVE_UINT32, {2, 4}, rows.data());
+  Hdf5Reader reader(in_memory(file.bytes()));
+  EXPECT_EQ(read_all(reader), (Events{AbsoluteEvent::at(10, 20, 100, Polarity::on),
+                                      AbsoluteEvent::at(11, 21, 200, Polarity::off)}));
+}
+
+TEST_F(Hdf5, DoubtfulColumnsAreRefused) {
+  const auto error_of = [](const FourEvents& events) -> std::string {
+    fuzz::SmallHdf5 file("doubtful");
+    events.add(file, {"t", "x", "y", "p"});
+    try {
+      Hdf5Reader reader(in_memory(file.bytes()));
+    } catch (const UnsupportedFormat& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  FourEvents nanoseconds;
+  for (auto& t : nanoseconds.t) t = t * 1000 + 7;
+  EXPECT_NE(error_of(nanoseconds).find("time-unit"), std::string::npos);
+  FourEvents polarities;
+  polarities.p = {0, 1, 2, 3};
+  EXPECT_NE(error_of(polarities).find("are 0 1 2 3;"), std::string::npos);
+}
+
+TEST_F(Hdf5, TheSizeMayBeAnAttributeOfTwoNumbers) {
+  fuzz::SmallHdf5 file("size");
+  FourEvents().add(file, {"t", "x", "y", "p"});
+  const hsize_t two = 2;
+  const std::int64_t height_and_width[] = {180, 240};
+  {
+    const Hdf5Handle space(H5Screate_simple(1, &two, nullptr), H5Sclose);
+    const Hdf5Handle attribute(H5Acreate2(file.id(), "sensor_resolution", H5T_NATIVE_INT64,
+                                          space.get(), H5P_DEFAULT, H5P_DEFAULT),
+                               H5Aclose);
+    H5Awrite(attribute.get(), H5T_NATIVE_INT64, height_and_width);
+  }
+  EXPECT_EQ(Hdf5Reader(in_memory(file.bytes())).size(), (SensorSize{240, 180}));
+}
+
+TEST_F(Hdf5, LzfIsUndone) {
+  // Literal bytes, a short copy that overlaps itself, and a long one.
+  const Bytes packed = {2, 1, 2, 3, 2 << 5, 0, 7 << 5, 3, 6};
+  const Bytes plain = {1, 2, 3, 3, 3, 3, 3, 1, 2, 3, 3, 3, 3, 3, 1, 2, 3, 3, 3};
+  const int filters[] = {lzf_filter};
+  auto bytes = packed;
+  EXPECT_TRUE(undo_hdf5_filters(filters, 0, 1, plain.size(), bytes));
+  EXPECT_EQ(bytes, plain);
+  for (std::size_t length = 0; length < packed.size(); ++length) {
+    Bytes cut(packed.begin(), packed.begin() + static_cast<std::ptrdiff_t>(length));
+    EXPECT_FALSE(undo_hdf5_filters(filters, 0, 1, plain.size(), cut)) << length;
+  }
+  for (Bytes bad : {Bytes{0, 1, 1 << 5, 1}, Bytes{1 << 5, 0}, Bytes{31, 1}}) {
+    EXPECT_FALSE(undo_hdf5_filters(filters, 0, 1, 100, bad));
+  }
+  auto longer = packed;
+  EXPECT_FALSE(undo_hdf5_filters(filters, 0, 1, plain.size() - 6, longer));
 }
 
 TEST_F(Hdf5, FilesAreReadAndWrittenByThreads) {

@@ -83,6 +83,30 @@ TEST(Npz, ArraysOfTheColumns) {
   EXPECT_EQ(read(archive(named, true), {.unit = TimeUnit::seconds}).events[9].t, 27'000'000);
 }
 
+TEST(Npz, NamesOfAnyTool) {
+  const auto events = events_of(5000);
+  auto coords = columns_of_events(events);
+  coords[0].first = "x_coords.npy";
+  coords[2].first = "y_coords.npy";
+  coords[3].first = "timestamps.npy";
+  coords[4].first = "polarities.npy";
+  EXPECT_EQ(read(archive(coords, true)).events, events);
+  // EVIMO2.
+  auto evimo = columns_of_events(events);
+  std::vector<std::uint16_t> xy;
+  for (const auto& event : events) {
+    xy.push_back(event.x);
+    xy.push_back(static_cast<std::uint16_t>(event.y()));
+  }
+  evimo[0] = {"dataset_events_xy.npy",
+              npz_file::array("'<u2'", "(" + std::to_string(events.size()) + ", 2)", xy)};
+  evimo[2].first = "dataset_events_p.npy";
+  evimo[3].first = "dataset_events_t.npy";
+  evimo.pop_back();
+  evimo[2] = {"dataset_events_p.npy", columns_of_events(events)[4].second};
+  EXPECT_EQ(read(archive(evimo, true)).events, events);
+}
+
 TEST(Npz, AnArrayOfEvents) {
   const std::vector<double> numbers = {0.5, 3, 4, 1, 0.75, 5, 6, 0};
   const std::vector<AbsoluteEvent> expected = {AbsoluteEvent::at(3, 4, 500'000, Polarity::on),
@@ -169,8 +193,10 @@ TEST(Npz, WhatIsNoneIsRefused) {
   lacks.pop_back();
   refused(archive(lacks, true), "neither arrays t, x, y and p");
   refused(
-      archive({{"a.npy", npz_file::array("'<f8'", "(4, 500)", std::vector<double>(2000))}}, true),
-      "numpy.ascontiguousarray");
+      archive({{"a.npy", npz_file::array("'<f8'", "(3, 500)", std::vector<double>(1500))}}, true),
+      "must have the shape (N, 4) or (4, N)");
+  refused(archive({{"events.npy", npz_file::array("'|O'", "()", std::vector<double>(1))}}, true),
+          "pickled");
   const auto matrix = archive({plain_array("K.npy", 3, 3)}, true);
   refused(matrix, "of K.npy: the NumPy array has 3 columns; an event needs four: t, x, y and p");
   const auto poses = archive({plain_array("poses.npy", 10, 5)}, true);
@@ -179,7 +205,7 @@ TEST(Npz, WhatIsNoneIsRefused) {
   refused(poses, "poses.npy: unknown columns in the NumPy array; set column-order for all 5");
   auto wide = columns_of_events(events_of(10));
   wide[0].second = npz_file::array("'<u2'", "(10, 2)", std::vector<std::uint16_t>(20));
-  refused(archive(wide, true), "not an array of one column");
+  refused(archive(wide, true), "must have one column");
 }
 
 /// Archive as an encoder writes it. Checks that its end comes in pieces.

@@ -230,6 +230,34 @@ TEST(RawHeader, IsReadAsWritersWriteIt) {
   expect_evt2("% evt 2.0\n%\n% geometry -5x480\n% end\n", {});
 }
 
+TEST(RawHeader, MayHaveZerosAtTheEndsOfLines) {
+  using namespace std::string_literals;
+  expect_evt2("% evt 2.0\n% geometry 640x480\0% serial_number 1\n% end\n"s, vga);
+  expect_evt2("% evt 2.0\0% geometry 640x480\0\0\n% end\n"s, vga);
+  // However the bytes come.
+  const auto file = with_evt2("% evt 2.0\n% geometry 640x480\0% integrator_name x\n% end\n"s);
+  const auto decoder = make_prophesee_raw_decoder();
+  Decoded decoded;
+  for (const char byte : file)
+    decoder->decode(std::span(reinterpret_cast<const std::uint8_t*>(&byte), 1), decoded);
+  decoder->finish(decoded);
+  EXPECT_EQ(decoded.events, events({AbsoluteEvent::at(3, 2, 1, on)}));
+  EXPECT_EQ(decoder->size(), vga);
+}
+
+TEST(RawHeader, TellsTheSizeOfAKnownCamera) {
+  expect_evt2("% evt 2.0\n% plugin_name hal_plugin_gen31_fx3\n% end\n", vga);
+  expect_evt2("% evt 2.0\n% plugin_name hal_plugin_imx636_evk4\n% system_ID 49\n% end\n",
+              {1280, 720});
+  expect_evt2("% evt 2.0\n% sensor_name GenX320\n% end\n", {320, 320});
+  expect_evt2("% evt 2.0\n% sensor_generation 4.1\n% end\n", {1280, 720});
+  expect_evt2("% evt 2.0\n% system_ID 41\n% end\n", vga);
+  expect_evt2("% evt 2.0\n% system_ID 64\n% end\n", {320, 320});
+  expect_evt2("% evt 2.0\n% system_ID 52\n% end\n", {640, 512});
+  expect_evt2("% evt 2.0\n% plugin_name other\n% system_ID 4711\n% end\n", {});
+  expect_evt2("% evt 2.0\n% geometry 320x240\n% system_ID 49\n% end\n", {320, 240});
+}
+
 TEST(RawHeader, TakesDataThatBeginAsALineDoesForData) {
   // 0x2025 are the low 16 bits of an EVT2 event, before which the header did not end.
   const auto bytes = words32({0x00002025, 0x80000000, 0x10000000 | 3 << 11});
@@ -253,6 +281,7 @@ TEST(RawHeader, TellsTheOrderOfEvt21) {
   expect_order("% format EVT21;height=480;width=640;endianness=legacy\n% end\n", true);
   expect_order("% endianness legacy\n% format EVT21;height=480;width=640\n% end\n", true);
   expect_order("% evt 2.1\n% system_ID 49\n% end\n", true);
+  expect_order("% evt 2.1\n% geometry 320x320\n% system_ID 49\n% end\n", false);
 }
 
 TEST(RawHeader, IsAnErrorThatSaysWhy) {
@@ -385,6 +414,17 @@ TEST(Evt3, ReadsVectorsThatAreNoTriplets) {
       read(EvtFormat::evt3, evt3({0x8000, 0x6000, 0x0000, 0x3800, 0x5001, 0x5001, 0x4001}));
   EXPECT_EQ(decoded.events, events({AbsoluteEvent::at(0, 0, 0, on), AbsoluteEvent::at(8, 0, 0, on),
                                     AbsoluteEvent::at(16, 0, 0, on)}));
+}
+
+TEST(Evt3, PassesOverThePaddingOfLucid) {
+  const auto [decoded, corruption] =
+      read(EvtFormat::evt3, evt3({0x9999, 0x8000, 0x9999, 0x6000, 0x0000, 0x9999, 0x9999, 0x3800,
+                                  0x4001, 0x9999, 0x4001, 0x9999, 0x5001, 0x2805, 0x9999, 0x2806}));
+  EXPECT_EQ(decoded.events, events({AbsoluteEvent::at(0, 0, 0, on), AbsoluteEvent::at(12, 0, 0, on),
+                                    AbsoluteEvent::at(24, 0, 0, on), AbsoluteEvent::at(5, 0, 0, on),
+                                    AbsoluteEvent::at(6, 0, 0, on)}));
+  EXPECT_EQ(corruption.places, 0U);
+  EXPECT_EQ(read(EvtFormat::evt3, evt3({0x8000, 0x6000, 0x0000, 0x9998})).corruption.places, 1U);
 }
 
 TEST(Evt3, PassesOverWhatIsNoChange) {

@@ -145,7 +145,7 @@ TEST_P(EveryFormat, LeavesOutAnAbsurdSilence) {
                            AbsoluteEvent::at(7, 8, 2 * now + 3, Polarity::off)};
   const auto encoder = GetParam().make_encoder(size);
   const auto bytes = encode(*encoder, events);
-  EXPECT_EQ(encoder->left_out(), static_cast<std::uint64_t>(now) - 50'000);
+  EXPECT_EQ(encoder->removed_time(), static_cast<std::uint64_t>(now) - 50'000);
   EXPECT_LT(bytes.size(), 2000U);
   const auto decoded = decode(*GetParam().make_decoder(size), bytes);
   const Microseconds times[] = {0, 49'990, 50'000, 50'000, 50'003};

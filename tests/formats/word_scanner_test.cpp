@@ -412,6 +412,25 @@ TEST_P(EveryFormat, SurvivesFlippedBits) {
   }
 }
 
+/// The cameras of Lucid fill their packets, within vectors, too.
+TEST(WordScanner, KeepsThePaddingOfLucid) {
+  const auto sent = some_events(5'000, 1'000'000);
+  for (const auto& format : formats) {
+    if (format.format != EvtFormat::evt3) continue;
+    const auto bytes = Camera(format).transfer_of(sent);
+    Bytes padded;
+    for (std::size_t at = 0; at < bytes.size(); at += 2) {
+      padded.insert(padded.end(), {bytes[at], bytes[at + 1]});
+      if (at / 2 % 7 == 0) padded.insert(padded.end(), 2 * (1 + at % 3), 0x99);
+    }
+    Reader reader(format, Framing::loose);
+    reader.scan(padded);
+    reader.finish();
+    EXPECT_EQ(reader.events, sent);
+    EXPECT_EQ(reader.counts().lost_bytes, 0U);
+  }
+}
+
 TEST(WordScanner, TakesNothingFromNoise) {
   Random random(1);
   Bytes noise(1 << 18);

@@ -79,7 +79,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   pushed += events.size();
   chunker.finish();
   taken += take(chunker, end);
-  const auto& dropped = chunker.dropped();
+  const auto dropped = chunker.dropped();
   require(taken + dropped.late + dropped.stray == pushed, "no event is lost");
   return 0;
 }

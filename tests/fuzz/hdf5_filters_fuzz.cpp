@@ -9,8 +9,9 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   constexpr std::size_t before = 5;
   if (size < before) return 0;
-  constexpr int known[] = {H5Z_FILTER_DEFLATE, H5Z_FILTER_SHUFFLE, H5Z_FILTER_FLETCHER32};
-  const int filters[] = {known[data[0] % 3], known[data[1] % 3], known[data[2] % 3]};
+  constexpr int known[] = {H5Z_FILTER_DEFLATE, H5Z_FILTER_SHUFFLE, H5Z_FILTER_FLETCHER32,
+                           eventcamera::lzf_filter};
+  const int filters[] = {known[data[0] % 4], known[data[1] % 4], known[data[2] % 4]};
   const std::size_t number_bytes = 1 + data[4] % 16;
   const auto chunk_bytes = 16 * number_bytes;
   std::vector<std::uint8_t> bytes(data + before, data + size);

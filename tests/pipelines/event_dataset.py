@@ -435,7 +435,7 @@ class Recipes(unittest.TestCase):
                 "leak-rate: 9000\n  positive-threshold: {uniform: [1, 2], relative-to: leak-rate}",
         }.items():
             self.expect(error, base + f"parameters:\n  {value}")
-        for number in ("9" * 400, "0x" + "f" * 10_000, "1" + ":59" * 300_000):
+        for number in ("9" * 400, "0x" + "f" * 10_000, "1" + ":59" * 30_000):
             self.expect(f"line 3: a number has {len(number)} characters", base + f"seed: {number}")
         shutil.copy(path_of("recipes/videos/ball.mkv"), path_of("recipes/videos/ball.mp4"))
         self.expect("have the same name, ball; rename one", base)
@@ -445,6 +445,52 @@ class Recipes(unittest.TestCase):
         self.expect(path_of("recipes/videos/b\\xe4ll.mp4") + " is not UTF-8; rename it", base)
         self.assertIn("output: avi is none of",
                       event_dataset(recipe_of("recipes", base + "output: avi"), status=2))
+
+    def test_run_only_harmless_elements(self):
+        make_video("harmless/videos/ball.mkv", frames=3)
+        base = "videos: videos/*\nsimulator: eventsim-dvs\noutput: csv\n"
+        stolen = path_of("harmless/stolen.csv")
+        chain = f"tee name=z z. ! queue ! eventcsvenc ! filesink location=\"{stolen}\" z. ! queue"
+        for error, text in {
+            "filters: \"tee name=z z.\" is neither": base + f"filters: '{chain}'",
+            "frames: tee is none of the elements": base + f"frames: tee ! filesink location={stolen}",
+            "filters: udpsink is none": base + "filters: udpsink host=127.0.0.1",
+            "filters: filesink is none": base + f"filters: eventdenoise ! filesink location={stolen}",
+            "filters: eventhotpixel: location may name": base + f"filters: eventhotpixel location={stolen}",
+            "filters: \"eventdenoise name=z z.\" is": base + "filters: eventdenoise name=z z.",
+            "filters: eventdenoise: name may name": base + "filters: eventdenoise name=z",
+            'frames: "( videoconvert )" is neither': base + "frames: ( videoconvert )",
+            'frames: "queue .src" is neither': base + "frames: queue .src ! queue",
+            "simulator: filesink is none": base.replace("eventsim-dvs", f"filesink location={stolen}"),
+            'simulator: "eventsim-dvs name=z z." is': base.replace("eventsim-dvs", "eventsim-dvs name=z z."),
+            "simulator: eventsim-dvs: profile may": base.replace("dvs", "dvs profile=/etc/passwd"),
+            "parameters: profile: may name": base + "parameters: {profile: /etc/passwd}",
+            "tensors: give properties": base.replace("csv", "tensors") + "tensors: bins=5 ! queue",
+            'tensors: "eventtensor bins=5 z." is': base.replace("csv", "tensors") + "tensors: bins=5 z.",
+        }.items():
+            with self.subTest(error):
+                self.expect(error, text)
+        recipe = recipe_of("harmless", base + f"filters: '{chain}'")
+        self.assertIn("if you trust the recipe, run it with --trust", event_dataset(recipe, status=2))
+        self.assertFalse(os.path.exists(stolen))
+        event_dataset(recipe, "--trust")
+        self.assertTrue(os.path.exists(stolen))
+        harmless = ("frames: videoscale ! video/x-raw, width=(int)64,height=48 ! queue\n"
+                    "filters: eventdenoise ! eventcrop right=32 ! eventflip\n")
+        ec.Recipe.load(recipe_of("harmless", base + harmless))
+
+    def test_of_any_text_are_read_soon(self):
+        base = "videos: videos/*\nsimulator: eventsim-dvs\n"
+        merges = "".join(f"  - &m{i} {{<<: [{', '.join([f'*m{i - 1}'] * 9)}], k{i}: 1}}\n" for i in range(1, 9))
+        for error, text in {
+            "unknown key k0": base + "".join(f"k{i}: 1\n" for i in range(10_000)),
+            "too long for a recipe": base + "".join(f"k{i}: 1\n" for i in range(100_000)),
+            "<< is not for recipes": base + "parameters:\n  - &m0 {a: 1}\n" + merges,
+            "more than 1000 values": base + f"parameters: {{seed: {{choice: [{'1,' * 10_000}]}}}}",
+        }.items():
+            start = time.monotonic()
+            self.expect(error, text)
+            self.assertLess(time.monotonic() - start, 10)
 
     def test_of_the_documentation_are_right(self):
         with open(os.path.join(os.environ["SOURCE"], "docs", "data-sets.md"), encoding="utf-8") as file:

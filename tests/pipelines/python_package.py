@@ -5,6 +5,7 @@
 import copy
 import itertools
 import multiprocessing
+import math
 import os
 import shlex
 import signal
@@ -381,6 +382,31 @@ class Recordings(unittest.TestCase):
         path = path_of("decades.csv")
         ec.write(path, events)
         self.assertTrue(same(ec.read(path), events))
+
+    def test_skips_the_windows_of_long_pauses(self):
+        events = self.events[:4].copy()
+        events["t"] = 0, 10, 86_400_000_000, 200_000_000_000
+        path = path_of("pauses.csv")
+        ec.write(path, events)
+        with self.assertWarnsRegex(ec.PipelineWarning, "pause of .* s: its windows are skipped"):
+            windows = list(ec.stream(path))
+        self.assertLess(len(windows), 10)
+        self.assertEqual([len(window) for window in windows if len(window)], [2, 1, 1])
+        later = [window for window in windows if len(window)][1]
+        self.assertTrue(later.start <= 86_400 < later.end)
+
+    def test_takes_paths_of_any_type(self):
+        path = path_of("bytes.csv")
+        ec.write(os.fsencode(path), self.events)
+        self.assertTrue(same(ec.read(os.fsencode(path)), self.events))
+        self.assertEqual(ec.stream(os.fsencode(path)).width, ec.stream(path).width)
+        for wrong in (lambda: ec.read("a\0b"), lambda: ec.write("a\0b.csv", self.events)):
+            with self.assertRaisesRegex(ValueError, "null byte"):
+                wrong()
+        with self.assertRaises(TypeError):
+            ec.stream(path)[1.5]  # pylint: disable=expression-not-assigned
+        with self.assertRaises(ValueError):
+            ec.stream(path).between(math.nan)
 
     def test_joins_chunks(self):
         events = self.labelled(3000)

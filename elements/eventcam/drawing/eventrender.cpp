@@ -19,8 +19,9 @@
  * Pictures have the size of the sensor. A sensor of more than 8 million pixels is drawn at half its
  * size, or a third, and so on.
  *
- * Pictures continue without events: through GAP events and, from a live source, by the clock. At
- * framerate 0/1 each buffer of events becomes one picture.
+ * Pictures continue without events: through GAP events and, from a live source, by the clock. Of a
+ * pause of more than a minute there are pictures for a second only, with one warning. At framerate
+ * 0/1 each buffer of events becomes one picture.
  *
  * ## Example launch line
  * |[
@@ -58,8 +59,8 @@ using eventcamera::Renderer;
 
 namespace {
 
-/// Maximum gap between buffers that is filled with pictures; no interval is longer.
-constexpr GstClockTime max_gap = GstClockTime{G_MAXUINT32} * GST_USECOND;
+/// Part of a longer pause that pictures show, so that the last one is empty.
+constexpr GstClockTime shown_pause = GST_SECOND;
 
 /// Maximum time to wait for the first input of a live source.
 constexpr GstClockTime max_wait = 200 * GST_MSECOND;
@@ -115,6 +116,7 @@ class EventRender final : public EventAggregator {
   GstClockTime known_ = 0;           // time up to which events are complete
   std::optional<GstClockTime> waiting_since_;  // for the first event; running time
   bool discontinuous_ = false;                 // the next picture is discontinuous
+  WarnOnce warn_of_pause_{GST_CAT_DEFAULT};
 };
 
 /* events */
@@ -147,7 +149,7 @@ bool EventRender::approach(GstBuffer* buffer, const EventInterval& interval) {
   if (!taken_) {
     const bool returns =
         GST_BUFFER_IS_DISCONT(buffer) && interval.start + event_resolution < known_;
-    const bool leaps = times_ && interval.start > times_->events().end + max_gap;
+    const bool leaps = times_ && interval.start > times_->events().end + max_pause;
     if (returns || leaps) {
       GST_DEBUG_OBJECT(
           main_pad(), "starting over: time %s from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
@@ -166,11 +168,21 @@ bool EventRender::approach(GstBuffer* buffer, const EventInterval& interval) {
 /// Adds the events of a buffer that are due, and pushes the picture that this completes, if any.
 /// May throw.
 GstFlowReturn EventRender::handle_buffer(GstBuffer* buffer) {
-  const auto interval = interval_of(buffer);
+  auto interval = interval_of(buffer);
   if (!interval) {
     warn(interval_fault(buffer), buffer);
     drop_buffer();
     return GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
+  if (gst_buffer_get_size(buffer) == 0 && interval->end - interval->start > max_pause &&
+      state_->has_framerate()) {
+    if (!taken_)
+      warn_of_pause_(
+          element(),
+          {GST_STREAM_ERROR_FAILED,
+           "The events pause for more than a minute; skipping the pictures of pauses."},
+          "pause of " + std::to_string((interval->end - interval->start) / GST_SECOND) + " s");
+    interval->end = interval->start + shown_pause;
   }
   if (approach(buffer, *interval)) return push_next_picture();
   std::optional<GstClockTime> due;
@@ -392,6 +404,7 @@ void EventRender::stop() {
   state_.reset();
   flush();
   discontinuous_ = false;
+  warn_of_pause_.reset();
   qos.reset_counts();
 }
 

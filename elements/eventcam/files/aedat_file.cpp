@@ -65,7 +65,7 @@ AedatFile::Bytes AedatFile::begin(eventcamera::Aedat4Settings settings) {
 template <class Item>
 std::size_t AedatFile::encode(Waiting<Item>& waiting, const char* name, Bytes& out) {
   const std::span<const Item> items =
-      waiting ? waiting->take_before(eventcamera::after_all_items) : std::span<Item>();
+      waiting ? waiting->pop_before(eventcamera::after_all_items) : std::span<Item>();
   const auto count = encoder_->encode(items, out);
   if (!items.empty())
     GST_CAT_LOG_OBJECT(category_, element_, "wrote %" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT " %s",

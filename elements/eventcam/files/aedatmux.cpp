@@ -44,6 +44,7 @@
 #include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
@@ -72,10 +73,8 @@ struct Settings {
 
 using Pad = OwnedAggregatorPad;
 
-}  // namespace
-
-struct GstAedatMuxPrivate {
-  explicit GstAedatMuxPrivate(GstElement* self) : file(self, GST_CAT_DEFAULT) {}
+struct Private {
+  explicit Private(GstElement* self) : file(self, GST_CAT_DEFAULT) {}
 
   Guarded<Settings> settings;
   std::atomic<bool> has_header = false;  ///< no pads can be added
@@ -83,16 +82,10 @@ struct GstAedatMuxPrivate {
   std::optional<GstSegment> segment;  ///< of the events written last
 };
 
-G_DECLARE_FINAL_TYPE(GstAedatMux, gst_aedat_mux, GST, AEDAT_MUX, GstAggregator)
+}  // namespace
 
-struct _GstAedatMux {
-  GstAggregator parent;
-  GstAedatMuxPrivate* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstAedatMux, gst_aedat_mux, GST_TYPE_AGGREGATOR,
-                        GST_DEBUG_CATEGORY_INIT(aedat_mux_debug, "aedatmux", 0, "AEDAT 4 muxer"))
-GST_ELEMENT_REGISTER_DEFINE(aedatmux, "aedatmux", GST_RANK_PRIMARY, gst_aedat_mux_get_type())
+DEFINE_EVENT_ELEMENT(GstAedatMux, gst_aedat_mux, AEDAT_MUX, GstAggregator, GST_TYPE_AGGREGATOR,
+                     aedatmux, GST_RANK_PRIMARY, "AEDAT 4 muxer")
 #define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_aedat_mux_parent_class)
 
 #define EVENTS_CAPS EVENT_CAPS ", framerate = (fraction) [ 0, max ]"
@@ -504,13 +497,8 @@ static Guarded<Settings>& settings_of(GObject* object) {
   return GST_AEDAT_MUX(object)->priv->settings;
 }
 
-static void finalize(GObject* object) {
-  delete GST_AEDAT_MUX(object)->priv;
-  G_OBJECT_CLASS(gst_aedat_mux_parent_class)->finalize(object);
-}
-
 static void gst_aedat_mux_init(GstAedatMux* self) {
-  self->priv = new GstAedatMuxPrivate(GST_ELEMENT(self));
+  self->priv = new Private(GST_ELEMENT(self));
 }
 
 static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {

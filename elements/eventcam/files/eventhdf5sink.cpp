@@ -30,6 +30,7 @@
 #include <utility>
 
 #include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/pads.hpp"
@@ -67,29 +68,19 @@ struct State {
   bool ended = false;
 };
 
-}  // namespace
-
-struct GstEventHdf5SinkPrivate {
-  explicit GstEventHdf5SinkPrivate(GstElement* self)
-      : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_ENCODE) {}
+struct Private {
+  explicit Private(GstElement* self) : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_ENCODE) {}
 
   Guarded<Settings> settings;
   State state;
   WritableEvents writable;
 };
 
-G_DECLARE_FINAL_TYPE(GstEventHdf5Sink, gst_event_hdf5_sink, GST, EVENT_HDF5_SINK, GstBaseSink)
+}  // namespace
 
-struct _GstEventHdf5Sink {
-  GstBaseSink parent;
-  GstEventHdf5SinkPrivate* priv;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstEventHdf5Sink, gst_event_hdf5_sink, GST_TYPE_BASE_SINK,
-                        GST_DEBUG_CATEGORY_INIT(event_hdf5_sink_debug, "eventhdf5sink", 0,
-                                                "writer of HDF5 files of events"))
-GST_ELEMENT_REGISTER_DEFINE(eventhdf5sink, "eventhdf5sink", GST_RANK_NONE,
-                            gst_event_hdf5_sink_get_type())
+DEFINE_EVENT_ELEMENT(GstEventHdf5Sink, gst_event_hdf5_sink, EVENT_HDF5_SINK, GstBaseSink,
+                     GST_TYPE_BASE_SINK, eventhdf5sink, GST_RANK_NONE,
+                     "writer of HDF5 files of events")
 
 /* properties */
 
@@ -260,13 +251,8 @@ static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_HDF5_SINK(object)->priv->settings;
 }
 
-static void finalize(GObject* object) {
-  delete GST_EVENT_HDF5_SINK(object)->priv;
-  G_OBJECT_CLASS(gst_event_hdf5_sink_parent_class)->finalize(object);
-}
-
 static void gst_event_hdf5_sink_init(GstEventHdf5Sink* self) {
-  self->priv = new GstEventHdf5SinkPrivate(GST_ELEMENT(self));
+  self->priv = new Private(GST_ELEMENT(self));
   gst_base_sink_set_sync(GST_BASE_SINK(self), FALSE);
 }
 

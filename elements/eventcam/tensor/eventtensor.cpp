@@ -21,6 +21,8 @@
  * - Windows of buffers last from the start of the first to the end of the last; a GAP is a buffer
  *   without events.
  *
+ * There are no tensors of pauses of more than a minute or 10000 windows, with one warning.
+ *
  * A tensor has the PTS and duration of its window. At EOS the remaining events make a last,
  * shorter window, which ends with the stream.
  *
@@ -122,6 +124,7 @@ struct Stream {
   bool discontinuous = true;               ///< the next tensor is discontinuous
   EventFaults faults{"use", GST_CAT_DEFAULT};
   WarnOnce warn_of_excess{GST_CAT_DEFAULT};
+  WarnOnce warn_of_pause{GST_CAT_DEFAULT};
 };
 
 struct Private {
@@ -146,6 +149,14 @@ static Guarded<TensorProperties>& settings_of(GObject* object) {
 static const Report no_memory{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
                               "Not enough memory for a tensor; lower bins, the resolution or the "
                               "length of windows."};
+
+/// Longest pause that is filled with empty tensors.
+static GstClockTime max_pause_of(const State& state) {
+  constexpr GstClockTime max_windows = 10'000;
+  const auto duration = static_cast<GstClockTime>(state.format.windows.duration);
+  if (duration == 0) return max_tensor_gap;  // each interval is one window at most
+  return std::max(duration, std::min(max_pause, max_windows * duration));
+}
 
 /* tensors */
 
@@ -191,7 +202,7 @@ static GstFlowReturn approach(GstEventTensor* self, const EventInterval& interva
   if (!last) return GST_FLOW_OK;
   const auto reached = static_cast<GstClockTime>(*last);
   const bool returns = interval.start + event_resolution < reached;
-  const bool leaps = interval.start > reached + max_tensor_gap;
+  const bool leaps = interval.start > reached + max_pause_of(*self->priv->stream->state);
   if (!returns && !leaps) return GST_FLOW_OK;
   GST_DEBUG_OBJECT(self, "starting over: time %s from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
                    returns ? "goes back" : "leaps", GST_TIME_ARGS(reached),
@@ -265,6 +276,13 @@ static bool handle_gap(GstEventTensor* self, GstEvent* event) {
   if (priv.stream->state->format.windows.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
       start > max_tensor_time || duration > max_tensor_time - start)
     return priv.stream->state->windows.is_open();
+  if (duration > max_pause_of(*priv.stream->state)) {
+    priv.stream->warn_of_pause(
+        self, {GST_STREAM_ERROR_FAILED, "The events pause; skipping the tensors of long pauses."},
+        "pause of " + std::to_string(duration / GST_SECOND) + " s");
+    // One window ends what has begun; the next events start over.
+    duration = static_cast<GstClockTime>(priv.stream->state->format.windows.duration);
+  }
   priv.stream->gap_result = catch_exceptions(self, no_memory, [&] {
     return add(self, {}, 0, {start, start + duration}, nullptr);
   });

@@ -103,7 +103,10 @@ GstFlowReturn ReaderOutput::push(const RecordingReader::Chunk& chunk) {
                  "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
                  chunk.events.size(), GST_TIME_ARGS(pts), GST_TIME_ARGS(duration));
   if (chunk.events.empty()) return combined(pad, pad.push_gap(pts, duration));
-  return combined(pad, pad.push(chunk.events, chunk.labels, pts, duration));
+  auto memory = pad.spare_memory();
+  recording_->swap_memory(chunk.stream, memory);
+  const auto count = chunk.events.size();
+  return combined(pad, pad.push(std::move(memory), count, chunk.labels, pts, duration));
 }
 
 GstFlowReturn ReaderOutput::push(const RecordingReader::TimedFrame& item) {
@@ -242,8 +245,8 @@ void ReaderOutput::post_collection() {
   gst_object_unref(collection);
 }
 
-/// If the file does not state the sensor size, uses that of the properties, else the size in
-/// downstream's caps, else one that most events fit into. False if no sensor is so large.
+/// If the file does not state the sensor size, uses the properties, else downstream's caps, else a
+/// size that most events fit into. False if no sensor is so large.
 bool ReaderOutput::find_size(std::size_t index) {
   const auto& stream = recording_->streams()[index];
   if (stream.size_from != RecordingReader::SizeFrom::assumption) return true;

@@ -15,6 +15,25 @@ GstEvent* with_seqnum(GstEvent* event, guint32 seqnum) {
   return event;
 }
 
+std::vector<eventcamera::Event> SpareMemory::pop() {
+  const std::lock_guard lock(mutex_);
+  if (count_ == 0) return {};
+  auto memory = std::exchange(spare_[--count_], {});
+  capacity_ -= memory.capacity();
+  return memory;
+}
+
+void SpareMemory::push(std::vector<eventcamera::Event> memory) noexcept {
+  constexpr std::size_t min_needed = 512;
+  const std::lock_guard lock(mutex_);
+  needed_ = std::max({memory.size(), needed_ - needed_ / 64, min_needed});
+  const auto capacity = memory.capacity();
+  if (capacity / 4 > needed_ || capacity_ + capacity > max_events || count_ == spare_.size())
+    return;
+  spare_[count_++] = std::move(memory);
+  capacity_ += capacity;
+}
+
 ReaderPad::ReaderPad(GstPadTemplate* templ, const std::string& name, GstDebugCategory* category)
     : pad_(gst_pad_new_from_template(templ, name.c_str())), name_(name), category_(category) {
   gst_object_ref_sink(pad_);
@@ -29,7 +48,6 @@ ReaderPad::~ReaderPad() {
 void ReaderPad::reset() {
   interrupt();
   started_ = false;
-  buffers_.reset();
   size_ = {};
   video_.reset();
 }
@@ -114,14 +132,22 @@ GstFlowReturn ReaderPad::push(GstBuffer* buffer, GstClockTime pts) {
   return gst_pad_push(pad_, buffer);
 }
 
-GstFlowReturn ReaderPad::push(std::span<const eventcamera::Event> events,
+GstFlowReturn ReaderPad::push(std::vector<eventcamera::Event> memory, std::size_t count,
                               std::span<const eventcamera::Label> labels, GstClockTime pts,
                               GstClockTime duration) {
-  OwnedBuffer buffer;
-  const auto result = buffers_.acquire(events.size_bytes(), buffer);
-  if (result != GST_FLOW_OK) return result;
-  gst_buffer_fill(buffer.get(), 0, events.data(), events.size_bytes());
-  if (!labels.empty()) std::ranges::copy(labels, add_labels(buffer.get(), events.size()).begin());
+  struct Owner {
+    std::shared_ptr<SpareMemory> spare;
+    std::vector<eventcamera::Event> memory;
+  };
+  auto owner = std::make_unique<Owner>(Owner{spare_, std::move(memory)});
+  auto* const events = owner->memory.data();
+  const gsize size = count * sizeof(eventcamera::Event);
+  OwnedBuffer buffer(gst_buffer_new_wrapped_full(
+      static_cast<GstMemoryFlags>(0), events, size, 0, size, owner.release(), [](gpointer data) {
+        const std::unique_ptr<Owner> last(static_cast<Owner*>(data));
+        last->spare->push(std::move(last->memory));
+      }));
+  if (!labels.empty()) std::ranges::copy(labels, add_labels(buffer.get(), count).begin());
   GST_BUFFER_DURATION(buffer.get()) = duration;
   return push(buffer.release(), pts);
 }

@@ -4,14 +4,35 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "gst/base/event_caps.hpp"
-#include "gst/base/event_pool.hpp"
 #include "gst/base/owned.hpp"
 #include "src/formats/recording_reader.hpp"
+
+/// Memory of event buffers that were freed, in any thread, for further buffers. It is kept while
+/// buffers need as much, and up to a limit.
+class SpareMemory {
+ public:
+  std::vector<eventcamera::Event> pop();
+  void push(std::vector<eventcamera::Event> memory) noexcept;
+
+ private:
+  static constexpr std::size_t max_events = std::size_t{1} << 23;  // 64 MiB
+
+  std::mutex mutex_;
+  std::array<std::vector<eventcamera::Event>, 16> spare_;
+  std::size_t count_ = 0;     ///< number of them
+  std::size_t capacity_ = 0;  ///< of all of them, in events
+  std::size_t needed_ = 0;    ///< events of a recent buffer: a maximum that decays
+};
 
 /// Source pad for one stream of a file, with the state of its events: stream-start, caps, tags and
 /// segment.
@@ -56,10 +77,15 @@ class ReaderPad {
   void need_segment(bool due) { segment_due_ = due; }
 
   GstFlowReturn push(GstBuffer* buffer, GstClockTime pts);
-  /// Pushes events, at least one, and their labels, if there are any. Throws std::bad_alloc.
-  GstFlowReturn push(std::span<const eventcamera::Event> events,
+  /// Pushes the first `count` events of `memory`, at least one, without copying them, and their
+  /// labels, if there are any. Throws std::bad_alloc.
+  GstFlowReturn push(std::vector<eventcamera::Event> memory, std::size_t count,
                      std::span<const eventcamera::Label> labels, GstClockTime pts,
                      GstClockTime duration);
+
+  /// Memory of a buffer that was freed, or none.
+  std::vector<eventcamera::Event> spare_memory() { return spare_->pop(); }
+
   GstFlowReturn push_gap(GstClockTime pts, GstClockTime duration);
 
   /// Flow return after send_caps() failed.
@@ -71,7 +97,7 @@ class ReaderPad {
   GstPad* pad_;
   std::string name_;
   GstDebugCategory* category_;
-  EventBuffers buffers_;  ///< while the stream lasts
+  std::shared_ptr<SpareMemory> spare_ = std::make_shared<SpareMemory>();
   bool started_ = false;
   bool segment_due_ = true;
   bool discontinuous_ = true;

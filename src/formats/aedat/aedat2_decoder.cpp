@@ -85,14 +85,14 @@ void Aedat2Decoder::finish(Decoded& out) {
 
 bool Aedat2Decoder::read_header() {
   auto next = header_.next(queue_);
-  for (; next == AedatHeader::Next::line; next = header_.next(queue_)) take_line(header_.line());
+  for (; next == AedatHeader::Next::line; next = header_.next(queue_)) handle_line(header_.line());
   if (next == AedatHeader::Next::more) return false;
   end_header();
   return true;
 }
 
 /// Evaluates a line of the header.
-void Aedat2Decoder::take_line(const std::string& line) {
+void Aedat2Decoder::handle_line(const std::string& line) {
   constexpr std::string_view chip = "# AEChip:";
   if (line.starts_with(chip)) {
     const auto name = lowercase(std::string_view(line).substr(chip.size()));
@@ -138,7 +138,7 @@ bool Aedat2Decoder::find_layout() {
   return true;
 }
 
-/// Takes the stated size, or that of all cameras with this layout.
+/// Uses the stated size, or the size of all cameras with this layout.
 void Aedat2Decoder::find_size() {
   constexpr SensorSize max_davis_size{640, 480};
   if (stream_.size == SensorSize{}) stream_.size = assumed_;

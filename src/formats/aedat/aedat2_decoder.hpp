@@ -41,7 +41,7 @@ class Aedat2Decoder final : public EventDecoder {
   };
 
   bool read_header();
-  void take_line(const std::string& line);
+  void handle_line(const std::string& line);
   void end_header();
   bool find_camera();
   bool find_layout();

@@ -92,7 +92,7 @@ void Aedat3Decoder::finish(Decoded& out) {
 
 bool Aedat3Decoder::read_header() {
   auto next = header_.next(queue_);
-  for (; next == AedatHeader::Next::line; next = header_.next(queue_)) take_line(header_.line());
+  for (; next == AedatHeader::Next::line; next = header_.next(queue_)) handle_line(header_.line());
   if (next == AedatHeader::Next::data)
     throw UnsupportedFormat("the AEDAT 3.1 header does not end with #!END-HEADER");
   header_read_ = next == AedatHeader::Next::last;
@@ -100,7 +100,7 @@ bool Aedat3Decoder::read_header() {
 }
 
 /// Evaluates a line of the header.
-void Aedat3Decoder::take_line(const std::string& line) {
+void Aedat3Decoder::handle_line(const std::string& line) {
   if (line.starts_with("#Format:") && line.find("RAW") == std::string::npos)
     throw UnsupportedFormat("unsupported compression of AEDAT 3.1: " + line.substr(1));
   // The camera and the filters of its events are separate sources, all of the same size.
@@ -256,8 +256,7 @@ void Aedat3Decoder::append(const std::uint8_t* event, Decoded& out) {
     return;
   }
   struct Input {
-    std::uint32_t
-        rising;  ///< type of the rising edge; those of the falling edge and the pulse follow
+    std::uint32_t rising;  ///< type of the rising edge; falling edge and pulse follow
     std::uint16_t id;
   };
   constexpr Input inputs[] = {{2, 0}, {6, 1}, {9, 2}};

@@ -30,7 +30,7 @@ class Aedat3Decoder final : public EventDecoder {
   };
 
   bool read_header();
-  void take_line(const std::string& line);
+  void handle_line(const std::string& line);
   void read_packets(Decoded& out);
   bool read_packet_header();
   bool read_events(Decoded& out);

@@ -87,14 +87,14 @@ bool Aedat4Decoder::read_header() {
     if (finished_) throw UnsupportedFormat("this AEDAT4 file ends within its header");
     return false;
   }
-  take_header(bytes.subspan(size_at, size_prefix + size));
+  handle_header(bytes.subspan(size_at, size_prefix + size));
   queue_.consume(packets_at_);
   read_table();
   return true;
 }
 
 /// Takes what the FlatBuffer of the header says.
-void Aedat4Decoder::take_header(std::span<const std::uint8_t> content) {
+void Aedat4Decoder::handle_header(std::span<const std::uint8_t> content) {
   const auto at = aedat4_magic.size();
   const auto* const header = aedat4::verified<aedat4::Header>(content, "IOHE");
   if (header == nullptr) throw UnsupportedFormat("the header of this AEDAT4 file is corrupt");

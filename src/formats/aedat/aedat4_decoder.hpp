@@ -76,7 +76,7 @@ class Aedat4Decoder final : public Decoder {
   };
 
   bool read_header();
-  void take_header(std::span<const std::uint8_t> content);
+  void handle_header(std::span<const std::uint8_t> content);
   bool find_packet();
   bool read_packet();
   Place place_at(std::size_t offset);

@@ -26,7 +26,7 @@ class Aedat4Elements {
   /// True once all elements were returned.
   bool empty() const { return count_ == 0 && !frame_; }
 
-  /// Returns the next elements as those of `stream`, whose sensor has this size.
+  /// Returns the next elements as items of `stream`, whose sensor has this size.
   Item next(std::size_t stream, SensorSize size);
 
   /// Drops the rest of the packet.

@@ -186,7 +186,7 @@ class DatClock {
     return at(t);
   }
 
-  std::uint64_t left_out() const { return left_out_; }
+  std::uint64_t removed_time() const { return removed_; }
 
  private:
   static constexpr std::uint64_t half = 0x7fff'ffff;
@@ -199,12 +199,12 @@ class DatClock {
     const auto max_gap = begun_ ? DatTime::max_rise : DatTime::range - 1;
     if (gap <= max_gap && at(t) > at(last_)) return;  // no wrap
     shift_ += gap;
-    if (begun_) left_out_ += gap;
+    if (begun_) removed_ += gap;
   }
 
   Microseconds last_ = 0;
   std::uint64_t shift_ = 0;
-  std::uint64_t left_out_ = 0;  ///< removed after the first event
+  std::uint64_t removed_ = 0;  ///< removed after the first event
   bool begun_ = false;
 };
 
@@ -215,7 +215,7 @@ class DatEncoder final : public Encoder {
                 std::to_string(size.height) + "\n% Width " + std::to_string(size.width) +
                 "\n% end\n" + static_cast<char>(event_cd) + static_cast<char>(record_size)) {}
 
-  std::uint64_t left_out() const override { return clock_.left_out(); }
+  std::uint64_t removed_time() const override { return clock_.removed_time(); }
 
  private:
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {

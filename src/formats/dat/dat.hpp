@@ -14,8 +14,8 @@ namespace eventcamera {
 std::unique_ptr<EventDecoder> make_dat_decoder();
 
 /// Encodes version 2. A first time of 71 minutes or more becomes 0. Pauses that readers would
-/// misinterpret are removed: those of 71 minutes or more, and those of more than 35 minutes with a
-/// wrap. Throws std::invalid_argument for sensors of more than 16384x16384 pixels.
+/// misinterpret are removed: 71 minutes or more, or more than 35 minutes with a wrap. Throws
+/// std::invalid_argument for sensors of more than 16384x16384 pixels.
 std::unique_ptr<Encoder> make_dat_encoder(SensorSize size);
 
 }  // namespace eventcamera

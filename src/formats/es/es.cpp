@@ -196,7 +196,7 @@ class EsEncoder final : public Encoder {
                                                  high(size.height)}),
         rows_(size.height, origin) {}
 
-  std::uint64_t left_out() const override { return gaps_.left_out(); }
+  std::uint64_t removed_time() const override { return gaps_.removed_time(); }
 
  private:
   static constexpr std::size_t bytes_at_once = 5 * events_at_once;
@@ -205,7 +205,7 @@ class EsEncoder final : public Encoder {
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
     const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint8_t>& bytes) {
       for (const auto& event : few) {
-        const auto step = reach(event.t, bytes);
+        const auto step = advance_to(event.t, bytes);
         const auto x = std::uint32_t{event.x};
         const auto y = static_cast<std::uint32_t>(rows_(event.y()));
         const auto on = static_cast<std::uint32_t>(event.y_p >> 15);
@@ -217,11 +217,11 @@ class EsEncoder final : public Encoder {
   }
 
   /// Fills the pause before an event, and returns the rest of it.
-  std::uint32_t reach(Microseconds t, WordWriter<std::uint8_t>& bytes) {
+  std::uint32_t advance_to(Microseconds t, WordWriter<std::uint8_t>& bytes) {
     // Clamps decreasing times, because the format has no steps backwards.
     t = std::max(t, last_);
     last_ = t;
-    gaps_.reach(t);
+    gaps_.advance_to(t);
     auto step = gaps_.written(t) - written_;
     written_ += step;
     if (step >= max_step) [[unlikely]] {

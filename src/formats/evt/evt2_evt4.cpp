@@ -82,7 +82,7 @@ class CdEncoder final : public Encoder {
   CdEncoder(SensorSize size, std::string header)
       : Encoder(std::move(header)), width_(static_cast<std::uint32_t>(size.width)) {}
 
-  std::uint64_t left_out() const override { return gaps_.left_out(); }
+  std::uint64_t removed_time() const override { return gaps_.removed_time(); }
 
  private:
   using Words = WordWriter<typename Format::Word>;
@@ -99,7 +99,7 @@ class CdEncoder final : public Encoder {
         auto time = gaps_.written(few.front().t);
         if (time >> 6 != time_high_) [[unlikely]] {
           gaps_.pass(all.first(all.size() - few.size()));
-          time = reach(few.front().t, words);
+          time = advance_to(few.front().t, words);
         }
         few = few.subspan(Format::put(few, time, width_, words));
       }
@@ -112,7 +112,7 @@ class CdEncoder final : public Encoder {
     if (trigger.id > CdWord::max_trigger_id) return false;
     Words words(out);
     words.reserve(words_at_once);
-    const auto time = reach(trigger.t, words);
+    const auto time = advance_to(trigger.t, words);
     words.put(Format::word(CdWord::of_trigger(Format::types.trigger, time, trigger)));
     return true;
   }
@@ -122,8 +122,8 @@ class CdEncoder final : public Encoder {
   }
 
   /// Writes the words up to a time, and returns it as it is written.
-  std::uint64_t reach(Microseconds t, Words& words) {
-    gaps_.reach(t);
+  std::uint64_t advance_to(Microseconds t, Words& words) {
+    gaps_.advance_to(t);
     const auto time = gaps_.written(t);
     if (const auto count = time >> 6; count != time_high_) [[unlikely]]
       put_time_high(count, words);

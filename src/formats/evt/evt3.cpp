@@ -140,7 +140,7 @@ class Evt3Decoder final : public UnitDecoder {
       case continued_12:
         break;
       default:
-        batch.bad(at, 2, "EVT3 word of unknown type");
+        if (word != padding) batch.bad(at, 2, "EVT3 word of unknown type");
     }
     return at + 2;
   }
@@ -174,7 +174,7 @@ class Evt3Encoder final : public Encoder {
   Evt3Encoder(SensorSize size, std::string header)
       : Encoder(std::move(header)), state_(size.width) {}
 
-  std::uint64_t left_out() const override { return gaps_.left_out(); }
+  std::uint64_t removed_time() const override { return gaps_.removed_time(); }
 
  private:
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
@@ -206,7 +206,7 @@ class Evt3Encoder final : public Encoder {
 
   /// Returns the time to write, after reserving space for the words of a pause.
   std::uint64_t written(Microseconds t, WordWriter<std::uint16_t>& words) {
-    gaps_.reach(t);
+    gaps_.advance_to(t);
     const auto time = gaps_.written(t);
     const auto steps = state_.steps_to(time);
     if (steps > 1 && steps <= Evt3Words::max_steps) [[unlikely]]

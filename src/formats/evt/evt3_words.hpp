@@ -28,6 +28,9 @@ enum Type : std::uint32_t {
   continued_12 = 0xf,
 };
 
+/// Word that the cameras of Lucid fill their packets with, wherever these end.
+constexpr std::uint32_t padding = 0x9999;
+
 }  // namespace evt3
 
 /// Writes EVT3 words, restricted to what all known readers interpret equally: vectors are complete
@@ -65,7 +68,7 @@ class Evt3Words {
   template <class AnyEvent>
   std::size_t write(std::span<const AnyEvent> events, std::uint64_t time,
                     WordWriter<std::uint16_t>& words) {
-    reach(time, words);
+    advance_to(time, words);
     const auto& event = events.front();
     const auto polarity = static_cast<std::uint32_t>(event.y_p & 0x8000) >> 4;
     if (const auto y = static_cast<std::uint32_t>(event.y()) & 0x7ff; y != y_) {
@@ -88,7 +91,7 @@ class Evt3Words {
 
   /// Writes the edge of a trigger at `time`.
   void write_trigger(const Trigger& trigger, std::uint64_t time, WordWriter<std::uint16_t>& words) {
-    reach(time, words);
+    advance_to(time, words);
     words.put(word(evt3::ext_trigger, std::uint32_t{trigger.id} << 8 | (trigger.rising ? 1U : 0U)));
   }
 
@@ -106,7 +109,7 @@ class Evt3Words {
     return static_cast<std::uint16_t>(type << 12 | payload);
   }
 
-  void reach(std::uint64_t time, WordWriter<std::uint16_t>& words) {
+  void advance_to(std::uint64_t time, WordWriter<std::uint16_t>& words) {
     if (const auto high = time >> 12; high != high_) {
       if (steps_to(time) > max_steps) high_ = high - 1;
       while (high_ != high)

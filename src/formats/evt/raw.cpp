@@ -2,6 +2,7 @@
 #include "src/formats/evt/raw.hpp"
 
 #include <algorithm>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -36,6 +37,57 @@ std::string option(const std::string& format, const std::string& key) {
   return format.substr(first, format.find(';', first) - first);
 }
 
+/// Size of the sensor of a camera of Prophesee, by the numbers of its systems in OpenEB, and by the
+/// names of its plugin, sensor or generation; 0x0 if unknown.
+SensorSize size_of_camera(const PropheseeHeader& header) {
+  struct Sensor {
+    SensorSize size;
+    std::span<const std::string_view> names;
+    std::span<const std::string_view> systems;
+  };
+  constexpr std::string_view vga[] = {"gen3", "3.0", "3.1"};
+  constexpr std::string_view vga_systems[] = {"25", "29", "33", "34", "35", "40", "41"};
+  constexpr std::string_view hd[] = {"gen4", "imx636", "imx646", "4.0", "4.1", "4.2"};
+  constexpr std::string_view hd_systems[] = {"30", "31", "32", "39", "46", "48",
+                                             "49", "50", "53", "58", "66"};
+  constexpr std::string_view imx637[] = {"imx637", "imx647"};
+  constexpr std::string_view imx637_systems[] = {"52", "54"};
+  constexpr std::string_view genx320[] = {"genx320", "saphir"};
+  constexpr std::string_view genx320_systems[] = {"55", "59", "64"};
+  const Sensor cameras[] = {{{320, 320}, genx320, genx320_systems},
+                            {{640, 512}, imx637, imx637_systems},
+                            {{640, 480}, vga, vga_systems},
+                            {{1280, 720}, hd, hd_systems}};
+  for (const auto* const key : {"plugin_name", "sensor_name", "sensor_generation"}) {
+    auto text = header.value(key);
+    std::ranges::transform(text, text.begin(), [](char letter) {
+      return letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter | 0x20) : letter;
+    });
+    for (const auto& camera : cameras)
+      for (const auto name : camera.names)
+        if (text.find(name) != std::string::npos) return camera.size;
+  }
+  for (const auto& camera : cameras)
+    if (std::ranges::count(camera.systems, header.value("system_ID")) > 0) return camera.size;
+  return {};
+}
+
+/// 0x0 if it is neither stated, as in files of the first cameras, nor known of the camera.
+SensorSize size_of(const PropheseeHeader& header) {
+  const auto size_from = [](const std::string& width, const std::string& height) {
+    const SensorSize size{PropheseeHeader::number(width, max_evt_side),
+                          PropheseeHeader::number(height, max_evt_side)};
+    return size.width == 0 || size.height == 0 ? SensorSize{} : size;
+  };
+  const auto format = header.value("format");
+  const auto size = size_from(option(format, "width"), option(format, "height"));
+  const auto geometry = header.value("geometry");
+  const auto cross = geometry.find('x');
+  if (size != SensorSize{}) return size;
+  if (cross == std::string::npos) return size_of_camera(header);
+  return size_from(geometry.substr(0, cross), geometry.substr(cross + 1));
+}
+
 EvtFormat format_of(const PropheseeHeader& header) {
   const auto format = header.value("format");
   const auto name = format.substr(0, format.find(';'));
@@ -50,26 +102,13 @@ EvtFormat format_of(const PropheseeHeader& header) {
   auto order = option(format, "endianness");
   if (order.empty()) order = header.value("endianness");
   // Writers that know both orders state theirs. Older files are from cameras with the legacy order,
-  // which state their system.
-  if (order.empty()) order = header.value("system_ID").empty() ? "little" : "legacy";
+  // which state their system. The order of GenX320 is always little.
+  const bool is_legacy =
+      !header.value("system_ID").empty() && size_of(header) != SensorSize{320, 320};
+  if (order.empty()) order = is_legacy ? "legacy" : "little";
   if (order == "little") return EvtFormat::evt21;
   if (order == "legacy") return EvtFormat::evt21_legacy;
   throw UnsupportedFormat("unsupported byte order '" + order + "' of EVT21 words");
-}
-
-/// 0x0 if it is missing, as in files of the first cameras, or invalid.
-SensorSize size_of(const PropheseeHeader& header) {
-  const auto size_from = [](const std::string& width, const std::string& height) {
-    const SensorSize size{PropheseeHeader::number(width, max_evt_side),
-                          PropheseeHeader::number(height, max_evt_side)};
-    return size.width == 0 || size.height == 0 ? SensorSize{} : size;
-  };
-  const auto format = header.value("format");
-  const auto size = size_from(option(format, "width"), option(format, "height"));
-  const auto geometry = header.value("geometry");
-  const auto cross = geometry.find('x');
-  if (size != SensorSize{} || cross == std::string::npos) return size;
-  return size_from(geometry.substr(0, cross), geometry.substr(cross + 1));
 }
 
 class RawDecoder final : public UnitStreamDecoder {

@@ -177,7 +177,7 @@ class ScannedEvt3Words {
       case evt3::continued_12:
         return {other};
       default:
-        return {invalid};
+        return {word == evt3::padding ? other : invalid};
     }
   }
 

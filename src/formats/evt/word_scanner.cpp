@@ -63,8 +63,8 @@ class CameraClock {
     return true;
   }
 
-  /// Continues after the camera's clock started over, with the next time that decoders take for
-  /// that of the words.
+  /// Continues after the camera's clock started over, at the next time that decoders unwrap this
+  /// count to.
   void start_over(std::uint32_t count, std::optional<Microseconds> expected) {
     const auto earliest = std::max(time(), expected.value_or(0));
     before_ = high_ = count;
@@ -174,11 +174,11 @@ class Scanner final : public WordScanner {
         return;
       }
     }
-    hand_out(out);
+    append_pending(out);
   }
 
   /// Moves committed_at_ to the first stretches that are complete and continue the clock, or to the
-  /// first byte that may belong to such. What is before it is lost.
+  /// first byte that may belong to such. Earlier bytes are lost.
   bool find_stretches() {
     auto skipped = words_;
     skipped.interrupt();
@@ -320,7 +320,7 @@ class Scanner final : public WordScanner {
   }
 
   /// Appends what was decided to be passed on.
-  void hand_out(std::vector<Piece>& out) {
+  void append_pending(std::vector<Piece>& out) {
     if (committed_size_ == 0) return;
     Piece next{.words = {piece_.words.begin() + static_cast<std::ptrdiff_t>(committed_size_),
                          piece_.words.end()},
@@ -334,7 +334,7 @@ class Scanner final : public WordScanner {
 
   /// Ends the synchronisation; words since the last commit are not passed on.
   void close(std::vector<Piece>& out) {
-    hand_out(out);
+    append_pending(out);
     is_synchronised_ = false;
     piece_ = {};
     first_event_.reset();

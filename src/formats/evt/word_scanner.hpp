@@ -35,8 +35,8 @@ class WordScanner {
     std::optional<Microseconds> elapsed;  ///< since the transfer before, by another clock
   };
 
-  /// Valid words, in the order of bytes that decoders take. Times are the camera's, unwrapped, and
-  /// equal to those of the words modulo 2^24 microseconds, the range of the shortest clock.
+  /// Valid words, in the byte order that decoders read. Times are the camera's, unwrapped, and
+  /// equal to the times of the words modulo 2^24 microseconds, the range of the shortest clock.
   struct Piece {
     std::vector<std::uint8_t> words;
     Microseconds start = 0;         ///< no event is earlier

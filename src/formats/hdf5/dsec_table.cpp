@@ -5,7 +5,6 @@
 #include <iterator>
 #include <utility>
 
-#include "src/core/max_side.hpp"
 #include "src/formats/hdf5/hdf5_rows.hpp"
 #include "src/formats/hdf5/number_table.hpp"
 #include "src/formats/unsupported_format.hpp"
@@ -14,33 +13,32 @@ namespace eventcamera {
 
 namespace {
 
-SensorSize size_of_attributes(hid_t object) {
-  const auto width = read_number_attribute(object, "width");
-  const auto height = read_number_attribute(object, "height");
-  if (!width || !height || !is_side(*width) || !is_side(*height)) return {};
-  return {static_cast<int>(*width), static_cast<int>(*height)};
-}
-
 class DsecTable final : public NumberTable {
  public:
-  DsecTable(hid_t file, const std::string& group) : NumberTable(Hdf5Format::dsec) {
-    for (const char* const name : {"/t", "/x", "/y", "/p"})
-      columns_.emplace_back(file, group + name);
+  DsecTable(hid_t file, const ColumnDatasets& datasets) : NumberTable(Hdf5Format::dsec) {
+    for (const auto& name : datasets.names) columns_.emplace_back(file, datasets.group + name);
     rows_ = columns_[0].rows();
     for (auto& column : columns_) {
-      if (column.rank() != 1 || !column.is_integers())
-        throw UnsupportedFormat("HDF5 group /" + group + " must hold columns of integers");
+      if (column.rank() != 1 || !column.is_numbers())
+        throw UnsupportedFormat("HDF5 group /" + datasets.group + " must hold columns of numbers");
       column.require_filters();
       rows_ = std::min(rows_, column.rows());
       claimed_rows_ = std::max(claimed_rows_, column.claimed_rows());
     }
-    open_labels(file, group);
-    wraps_ = columns_[0].is_unsigned_32();
     read_offset(file);
     open_index(file);
+    // Nanoseconds of 32 bits would wrap after four seconds.
+    const bool are_microseconds = index_ || (columns_[0].is_unsigned_32() && !datasets.unit);
+    const auto unit =
+        detect(read_sample(), *columns_of("txyp"),
+               are_microseconds ? std::optional(TimeUnit::microseconds) : datasets.unit,
+               !columns_[0].is_integers(), datasets.group + datasets.names[0]);
+    columns_[0].set_unit(0, unit);
+    wraps_ = columns_[0].is_unsigned_32() && unit == TimeUnit::microseconds;
+    open_labels(file, datasets.group);
     size_ = size_of_attributes(file);
-    if (size_ == SensorSize{}) {
-      const Hdf5Handle events(H5Gopen2(file, group.c_str(), H5P_DEFAULT), H5Gclose);
+    if (size_ == SensorSize{} && !datasets.group.empty()) {
+      const Hdf5Handle events(H5Gopen2(file, datasets.group.c_str(), H5P_DEFAULT), H5Gclose);
       size_ = size_of_attributes(events.get());
     }
   }
@@ -89,10 +87,21 @@ class DsecTable final : public NumberTable {
   }
 
  private:
+  /// Returns the first rows; none if they are corrupt.
+  TableSample read_sample() {
+    TableSample sample;
+    std::array<std::vector<TableSample::Row>, event_columns> columns;
+    for (std::size_t i = 0; i < event_columns; ++i)
+      if (!columns_[i].sample(sample_rows(), columns[i])) return sample;
+    for (std::size_t row = 0; row < sample_rows(); ++row)
+      sample.add({columns[0][row][0], columns[1][row][0], columns[2][row][0], columns[3][row][0]});
+    return sample;
+  }
+
   /// Opens the columns cause and class, if both are there and have a number for each event.
   void open_labels(hid_t file, const std::string& group) {
     std::vector<Hdf5Dataset> labels;
-    for (const char* const name : {"/cause", "/class"}) {
+    for (const char* const name : {"cause", "class"}) {
       if (!Hdf5Dataset::exists(file, group + name, H5O_TYPE_DATASET)) return;
       auto& column = labels.emplace_back(file, group + name);
       if (column.rank() != 1 || !column.is_integers() || column.rows() < rows_) return;
@@ -128,14 +137,14 @@ class DsecTable final : public NumberTable {
     return static_cast<std::uint64_t>(row[0]);
   }
 
-  std::vector<Hdf5Dataset> columns_;  ///< t, x, y and p, and those of labels
+  std::vector<Hdf5Dataset> columns_;  ///< t, x, y and p, and labels
   std::optional<Hdf5Dataset> index_;  ///< first event at or after each millisecond
 };
 
 }  // namespace
 
-std::unique_ptr<Hdf5Table> make_dsec_table(hid_t file, const std::string& group) {
-  return std::make_unique<DsecTable>(file, group);
+std::unique_ptr<Hdf5Table> make_dsec_table(hid_t file, const ColumnDatasets& datasets) {
+  return std::make_unique<DsecTable>(file, datasets);
 }
 
 }  // namespace eventcamera

@@ -47,7 +47,7 @@ void put_times(std::span<const AbsoluteEvent> events, ByteAppender& writer) {
   }
 }
 
-bool take_times(ByteCursor& reader, std::span<AbsoluteEvent> events) {
+bool read_times(ByteCursor& reader, std::span<AbsoluteEvent> events) {
   auto t = reader.number<std::uint64_t>();
   for (std::size_t i = 0; i < events.size();) {
     auto byte = reader.number<std::uint8_t>();
@@ -82,7 +82,7 @@ void put_runs(std::span<const AbsoluteEvent> events, ByteAppender& writer, const
 }
 
 template <class Word, unsigned count_mask, class SetValue>
-bool take_runs(ByteCursor& reader, std::span<AbsoluteEvent> events, const SetValue& set_value) {
+bool read_runs(ByteCursor& reader, std::span<AbsoluteEvent> events, const SetValue& set_value) {
   for (std::size_t i = 0; i < events.size();) {
     const unsigned word = reader.number<Word>();
     std::size_t count = word & count_mask;
@@ -99,8 +99,8 @@ void put_rows(std::span<const AbsoluteEvent> events, ByteAppender& writer) {
   put_runs<std::uint16_t, 31>(events, writer, [](const AbsoluteEvent& event) { return event.y(); });
 }
 
-bool take_rows(ByteCursor& reader, std::span<AbsoluteEvent> events) {
-  return take_runs<std::uint16_t, 31>(reader, events,
+bool read_rows(ByteCursor& reader, std::span<AbsoluteEvent> events) {
+  return read_runs<std::uint16_t, 31>(reader, events,
                                       [](AbsoluteEvent& event, std::uint16_t y) { event.y_p = y; });
 }
 
@@ -108,8 +108,8 @@ void put_polarities(std::span<const AbsoluteEvent> events, ByteAppender& writer)
   put_runs<std::uint8_t, 127>(events, writer, polarity_bit);
 }
 
-bool take_polarities(ByteCursor& reader, std::span<AbsoluteEvent> events) {
-  return take_runs<std::uint8_t, 127>(reader, events, [](AbsoluteEvent& event, std::uint16_t on) {
+bool read_polarities(ByteCursor& reader, std::span<AbsoluteEvent> events) {
+  return read_runs<std::uint8_t, 127>(reader, events, [](AbsoluteEvent& event, std::uint16_t on) {
     event.y_p |= static_cast<std::uint16_t>(on << 15);
   });
 }
@@ -127,7 +127,7 @@ void put_columns(std::span<const AbsoluteEvent> events, ByteAppender& writer) {
   }
 }
 
-bool take_columns(ByteCursor& reader, std::span<AbsoluteEvent> events) {
+bool read_columns(ByteCursor& reader, std::span<AbsoluteEvent> events) {
   for (std::size_t i = 0; i < events.size();) {
     const auto word = reader.number<std::uint16_t>();
     if (reader.failed()) return false;
@@ -161,7 +161,7 @@ void put_all_packed(std::span<const AbsoluteEvent> events, ByteAppender& writer)
   }
 }
 
-bool take_all_packed(ByteCursor& reader, std::span<AbsoluteEvent> events) {
+bool read_all_packed(ByteCursor& reader, std::span<AbsoluteEvent> events) {
   for (std::size_t i = 0; i < events.size(); i += 4) {
     const auto w0 = reader.number<std::uint32_t>();
     const auto w1 = reader.number<std::uint32_t>();
@@ -187,7 +187,7 @@ void put_xp_packed(std::span<const AbsoluteEvent> events, ByteAppender& writer) 
   }
 }
 
-bool take_xp_packed(ByteCursor& reader, std::span<AbsoluteEvent> events) {
+bool read_xp_packed(ByteCursor& reader, std::span<AbsoluteEvent> events) {
   for (std::size_t i = 0; i < events.size(); i += 4) {
     const unsigned h0 = reader.number<std::uint16_t>();
     const unsigned h1 = reader.number<std::uint16_t>();
@@ -258,14 +258,14 @@ bool decode_ecf(std::span<const std::uint8_t> chunk, std::vector<AbsoluteEvent>&
   const auto begin = out.size();
   out.resize(begin + count);
   const auto events = std::span(out).subspan(begin);
-  bool sound = take_times(reader, events);
+  bool sound = read_times(reader, events);
   if ((head & all_packed) != 0) {
-    sound = sound && take_all_packed(reader, events);
+    sound = sound && read_all_packed(reader, events);
   } else if ((head & xp_packed) != 0) {
-    sound = sound && take_rows(reader, events) && take_xp_packed(reader, events);
+    sound = sound && read_rows(reader, events) && read_xp_packed(reader, events);
   } else {
-    sound = sound && take_rows(reader, events) && take_columns(reader, events) &&
-            take_polarities(reader, events);
+    sound = sound && read_rows(reader, events) && read_columns(reader, events) &&
+            read_polarities(reader, events);
   }
   if (!sound) out.resize(begin);
   return sound;

@@ -126,27 +126,27 @@ void Hdf5Dataset::check_storage(hid_t file) {
 bool Hdf5Dataset::load(std::uint64_t block) {
   if (loaded_block_ == block) return true;
   loaded_block_.reset();
-  const std::uint64_t all_columns = columns();
+  const std::uint64_t row_columns = columns();
   const auto chunk_columns =
-      chunk_.size() < 2 ? 1 : std::min<std::uint64_t>(chunk_[1], all_columns);
+      chunk_.size() < 2 ? 1 : std::min<std::uint64_t>(chunk_[1], row_columns);
   const auto chunk_stride = chunk_.size() < 2 ? 1 : chunk_[1];
-  loaded_.resize(chunk_[0] * all_columns * type_bytes_);
+  loaded_.resize(chunk_[0] * row_columns * type_bytes_);
   std::vector<std::uint8_t> bytes;
-  for (std::uint64_t column = 0; column < all_columns; column += chunk_stride) {
+  for (std::uint64_t column = 0; column < row_columns; column += chunk_stride) {
     const hsize_t offset[] = {block * chunk_[0], column};
     // Incompressible chunks are stored slightly larger.
     const auto max_bytes = chunk_bytes_ + chunk_bytes_ / 64 + 1024;
-    std::uint32_t left_out = 0;
-    if (!read_stored(offset, max_bytes, bytes, left_out) ||
-        !undo_hdf5_filters(filters_, left_out, type_bytes_, chunk_bytes_, bytes))
+    std::uint32_t filter_mask = 0;
+    if (!read_stored(offset, max_bytes, bytes, filter_mask) ||
+        !undo_hdf5_filters(filters_, filter_mask, type_bytes_, chunk_bytes_, bytes))
       return false;
-    if (all_columns == chunk_stride) {
+    if (row_columns == chunk_stride) {
       loaded_.swap(bytes);
       break;
     }
-    const auto part = std::min(chunk_columns, all_columns - column) * type_bytes_;
+    const auto part = std::min(chunk_columns, row_columns - column) * type_bytes_;
     for (std::uint64_t row = 0; row < chunk_[0]; ++row)
-      std::memcpy(loaded_.data() + (row * all_columns + column) * type_bytes_,
+      std::memcpy(loaded_.data() + (row * row_columns + column) * type_bytes_,
                   bytes.data() + row * chunk_stride * type_bytes_, part);
   }
   loaded_block_ = block;
@@ -198,30 +198,33 @@ void Hdf5Dataset::widen(const std::uint8_t* element, const Number& number,
   }
 }
 
-bool Hdf5Dataset::take_fractions(std::size_t seconds_column) {
-  if (H5Tequal(type_.get(), H5T_IEEE_F64LE) <= 0) return false;
-  seconds_column_ = seconds_column;
-  numbers_ = {{.offset = 0, .bytes = sizeof(double)}};
-  return true;
+double floating(std::int64_t bits, std::size_t bytes) {
+  if (bytes == sizeof(double)) return std::bit_cast<double>(bits);
+  return std::bit_cast<float>(static_cast<std::uint32_t>(bits));
 }
 
-/// Turns numbers that were read as the bits of fractions into integers. Impossible ones become the
-/// least integer.
-void Hdf5Dataset::round_fractions(std::span<std::int64_t> numbers) const {
+/// Turns the bits of a number into an integer. Impossible ones become the least integer.
+std::int64_t Hdf5Dataset::number_from(std::int64_t bits, std::size_t column) const {
+  constexpr auto impossible = std::numeric_limits<std::int64_t>::min();
   constexpr double max = 4e18;
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const auto fraction = std::bit_cast<double>(numbers[i]);
-    const auto number =
-        i % columns() == *seconds_column_ ? std::floor(fraction * 1e6 + 0.5) : fraction;
-    numbers[i] = std::abs(number) < max ? static_cast<std::int64_t>(number)
-                                        : std::numeric_limits<std::int64_t>::min();
+  const auto& number = numbers_[column % numbers_.size()];
+  const auto power = column == time_column_ ? power_ : 0;
+  if (number.is_floating) {
+    auto value = floating(bits, number.bytes);
+    if (column == time_column_) value = value * std::pow(10, power) + max_rounding_up;
+    return std::abs(value) < max ? static_cast<std::int64_t>(std::floor(value)) : impossible;
   }
+  for (auto left = power; left > 0; --left)
+    if (__builtin_mul_overflow(bits, 10, &bits)) return impossible;
+  if (power >= 0) return bits;
+  const auto divisor = static_cast<std::int64_t>(std::pow(10, -power));
+  return bits / divisor - (bits % divisor < 0 ? 1 : 0);
 }
 
-bool Hdf5Dataset::read(std::uint64_t first, std::uint64_t count, std::vector<std::int64_t>& out) {
-  std::vector<std::uint8_t> bytes;
-  if (!read_elements(first, count, bytes)) return false;
-  out.resize(count * columns() * numbers_.size());
+/// Widens the numbers of elements to 64 bits.
+void Hdf5Dataset::read_bits(std::span<const std::uint8_t> bytes,
+                            std::vector<std::int64_t>& out) const {
+  out.resize(bytes.size() / type_bytes_ * numbers_.size());
   for (std::size_t i = 0; i < numbers_.size(); ++i) {
     const auto& number = numbers_[i];
     const std::span to(out.data() + i, out.size() - i);
@@ -239,17 +242,49 @@ bool Hdf5Dataset::read(std::uint64_t first, std::uint64_t count, std::vector<std
         widen<std::uint64_t>(bytes.data() + number.offset, number, to);
     }
   }
-  if (seconds_column_) round_fractions(out);
+}
+
+bool Hdf5Dataset::read(std::uint64_t first, std::uint64_t count, std::vector<std::int64_t>& out) {
+  std::vector<std::uint8_t> bytes;
+  if (!read_elements(first, count, bytes)) return false;
+  read_bits(bytes, out);
+  const auto step = columns() * numbers_.size();
+  for (std::size_t column = 0; column < step; ++column) {
+    if (!numbers_[column % numbers_.size()].is_floating && (column != time_column_ || power_ == 0))
+      continue;
+    for (auto i = column; i < out.size(); i += step) out[i] = number_from(out[i], column);
+  }
   return true;
 }
 
-/// Returns the properties of an integer type; nothing if it is not a supported one.
+bool Hdf5Dataset::sample(std::uint64_t count, std::vector<TableSample::Row>& out) {
+  std::vector<std::uint8_t> bytes;
+  std::vector<std::int64_t> bits;
+  if (!read_elements(0, count, bytes)) return false;
+  read_bits(bytes, bits);
+  out.resize(count);
+  const auto step = columns() * numbers_.size();
+  for (std::size_t i = 0; i < bits.size(); ++i) {
+    const auto& number = numbers_[i % numbers_.size()];
+    out[i / step].push_back(number.is_floating ? TableNumber{floating(bits[i], number.bytes),
+                                                             TableNumber::Form::floating}
+                                               : TableNumber{static_cast<double>(bits[i])});
+  }
+  return true;
+}
+
+/// Returns the properties of a type of numbers; nothing if it is not a supported one.
 std::optional<Hdf5Dataset::Number> Hdf5Dataset::number_of(hid_t type) {
   const auto kind = H5Tget_class(type);
   // h5py writes booleans as an enumeration of bytes.
   const Hdf5Handle integer(kind == H5T_ENUM ? H5Tget_super(type) : H5Tcopy(type), H5Tclose);
-  if (H5Tget_class(integer.get()) != H5T_INTEGER) return std::nullopt;
   Number number;
+  number.is_floating = H5Tget_class(integer.get()) == H5T_FLOAT;
+  if (H5Tequal(integer.get(), H5T_IEEE_F64LE) > 0 || H5Tequal(integer.get(), H5T_IEEE_F32LE) > 0) {
+    number.bytes = H5Tget_size(integer.get());
+    return number;
+  }
+  if (H5Tget_class(integer.get()) != H5T_INTEGER) return std::nullopt;
   number.bytes = H5Tget_size(integer.get());
   number.is_signed = H5Tget_sign(integer.get()) != H5T_SGN_NONE;
   number.big_endian = H5Tget_order(integer.get()) == H5T_ORDER_BE;
@@ -261,23 +296,35 @@ std::optional<Hdf5Dataset::Number> Hdf5Dataset::number_of(hid_t type) {
   return number;
 }
 
-void Hdf5Dataset::choose(std::span<const char* const> members) {
+std::vector<std::string> Hdf5Dataset::members() const {
+  std::vector<std::string> names;
+  if (H5Tget_class(type_.get()) != H5T_COMPOUND || columns() != 1) return names;
+  const int count = H5Tget_nmembers(type_.get());
+  for (int i = 0; i < count; ++i) {
+    char* const name = H5Tget_member_name(type_.get(), static_cast<unsigned>(i));
+    names.emplace_back(name != nullptr ? name : "");
+    H5free_memory(name);
+  }
+  return names;
+}
+
+void Hdf5Dataset::choose(std::span<const std::string> members) {
   if (H5Tget_class(type_.get()) != H5T_COMPOUND || columns() != 1)
     refuse(path_, "does not hold rows of named members");
-  for (const auto* const member : members) {
-    const int found = H5Tget_member_index(type_.get(), member);
+  for (const auto& member : members) {
+    const int found = H5Tget_member_index(type_.get(), member.c_str());
     const auto index = static_cast<unsigned>(found);
     const Hdf5Handle type(found < 0 ? -1 : H5Tget_member_type(type_.get(), index), H5Tclose);
     auto number = number_of(type.get());
     if (number) number->offset = H5Tget_member_offset(type_.get(), index);
     if (!number || number->offset > type_bytes_ || number->bytes > type_bytes_ - number->offset)
-      refuse(path_, std::string("has no integer member ") + member);
+      refuse(path_, "has no number as its member " + member);
     numbers_.push_back(*number);
   }
 }
 
 bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t max_stored,
-                              std::vector<std::uint8_t>& out, std::uint32_t& left_out) {
+                              std::vector<std::uint8_t>& out, std::uint32_t& filter_mask) {
   if (filters_.empty()) {
     // The library reads as many bytes as the file's index states, without reporting the number
     // beforehand, but not more than the file has. Untouched pages of this buffer take no memory.
@@ -288,7 +335,7 @@ bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t max_stored,
       if (!scratch_) throw std::bad_alloc();
     }
     if (chunk_bytes_ > max_stored ||
-        H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &left_out, scratch_.get()) < 0)
+        H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &filter_mask, scratch_.get()) < 0)
       return false;
     out.assign(scratch_.get(), scratch_.get() + chunk_bytes_);
     return true;
@@ -298,14 +345,14 @@ bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t max_stored,
       bytes > max_stored)
     return false;
   out.resize(bytes);
-  return H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &left_out, out.data()) >= 0;
+  return H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &filter_mask, out.data()) >= 0;
 }
 
 bool Hdf5Dataset::read_chunk(std::uint64_t row, std::size_t max_stored,
                              std::vector<std::uint8_t>& out) {
   const hsize_t offset[] = {row, 0};
-  std::uint32_t left_out = 0;
-  return read_stored(offset, max_stored, out, left_out) && left_out == 0;
+  std::uint32_t filter_mask = 0;
+  return read_stored(offset, max_stored, out, filter_mask) && filter_mask == 0;
 }
 
 std::uint64_t Hdf5Dataset::position(std::uint64_t row) const {
@@ -314,9 +361,9 @@ std::uint64_t Hdf5Dataset::position(std::uint64_t row) const {
     offset[0] = row / chunk_[0] * chunk_[0];
     haddr_t address = 0;
     hsize_t bytes = 0;
-    unsigned left_out = 0;
-    const bool known =
-        H5Dget_chunk_info_by_coord(dataset_.get(), offset.data(), &left_out, &address, &bytes) >= 0;
+    unsigned filter_mask = 0;
+    const bool known = H5Dget_chunk_info_by_coord(dataset_.get(), offset.data(), &filter_mask,
+                                                  &address, &bytes) >= 0;
     return known && address != HADDR_UNDEF ? address : 0;
   }
   const auto offset = H5Dget_offset(dataset_.get());
@@ -328,9 +375,9 @@ void Hdf5Dataset::require_filters() {
     int filter;
     const char* name;
   };
-  static constexpr Name names[] = {{307, "bzip2"},    {32000, "LZF"},        {32001, "Blosc"},
-                                   {32004, "LZ4"},    {32008, "bitshuffle"}, {32015, "Zstandard"},
-                                   {32026, "Blosc2"}, {ecf_filter, "ECF"}};
+  static constexpr Name names[] = {{307, "bzip2"},        {32001, "Blosc"},     {32004, "LZ4"},
+                                   {32008, "bitshuffle"}, {32015, "Zstandard"}, {32026, "Blosc2"},
+                                   {ecf_filter, "ECF"}};
   if (own_filters_) return;
   for (const int filter : filters_) {
     if (filter >= 0 && H5Zfilter_avail(filter) > 0) continue;

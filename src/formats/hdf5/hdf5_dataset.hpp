@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <memory>
 #include <optional>
@@ -9,11 +10,13 @@
 #include <string>
 #include <vector>
 
+#include "src/formats/event_table.hpp"
 #include "src/formats/hdf5/hdf5_handle.hpp"
+#include "src/formats/table_sample.hpp"
 
 namespace eventcamera {
 
-/// Dataset with rows of integers in an untrusted file. Ensures that it is stored in the file
+/// Dataset with rows of numbers in an untrusted file. Ensures that it is stored in the file
 /// itself, chunk sizes are bounded, and there are no more rows than are stored.
 class Hdf5Dataset {
  public:
@@ -27,20 +30,30 @@ class Hdf5Dataset {
   std::uint64_t rows() const { return rows_; }
   std::uint64_t claimed_rows() const { return extent_.empty() ? 1 : extent_[0]; }
   std::uint64_t columns() const { return extent_.size() < 2 ? 1 : extent_[1]; }
-  bool is_integers() const { return !numbers_.empty() && !seconds_column_; }
+  bool is_numbers() const { return !numbers_.empty(); }
+  bool is_integers() const { return is_numbers() && !numbers_[0].is_floating; }
   bool is_unsigned_32() const {
     return is_integers() && numbers_[0].bytes == 4 && !numbers_[0].is_signed;
   }
 
+  /// Names of the members of a compound type; none for another type.
+  std::vector<std::string> members() const;
+
   /// Selects the members of a compound type to read. Throws UnsupportedFormat if one is missing or
-  /// not an integer.
-  void choose(std::span<const char* const> members);
+  /// not a number.
+  void choose(std::span<const std::string> members);
 
-  /// Reads numbers of 64-bit floating point, of which those in one column are seconds and are
-  /// read as microseconds; fractions of others are cut off. False if the dataset has others.
-  bool take_fractions(std::size_t seconds_column);
+  /// Reads a column, or chosen member, as a time in this unit, and returns microseconds.
+  void set_unit(std::size_t column, TimeUnit unit) {
+    time_column_ = column;
+    power_ = power_of(unit);
+  }
 
-  /// Reads rows, with all columns or the chosen members. False if the file is corrupt there.
+  /// Reads the first rows as they are. False if the file is corrupt there.
+  bool sample(std::uint64_t count, std::vector<TableSample::Row>& out);
+
+  /// Reads rows, with all columns or the chosen members. Numbers with a fraction are rounded down,
+  /// or times as by max_rounding_up. False if the file is corrupt there.
   bool read(std::uint64_t first, std::uint64_t count, std::vector<std::int64_t>& out);
 
   /// Rows per chunk; 0 if the dataset is not chunked.
@@ -64,31 +77,34 @@ class Hdf5Dataset {
   void require_filters();
 
  private:
-  /// Integer within an element.
+  /// Number within an element.
   struct Number {
     std::size_t offset = 0;
     std::size_t bytes = 0;
     bool is_signed = false;
     bool big_endian = false;
+    bool is_floating = false;
   };
 
   static std::optional<Number> number_of(hid_t type);
   template <class Unsigned>
   void widen(const std::uint8_t* element, const Number& number, std::span<std::int64_t> out) const;
-  void round_fractions(std::span<std::int64_t> numbers) const;
+  void read_bits(std::span<const std::uint8_t> bytes, std::vector<std::int64_t>& out) const;
+  std::int64_t number_from(std::int64_t bits, std::size_t column) const;
   void check_chunks();
   void check_storage(hid_t file);
 
   bool read_stored(const hsize_t* offset, std::size_t max_stored, std::vector<std::uint8_t>& out,
-                   std::uint32_t& left_out);
+                   std::uint32_t& filter_mask);
   bool load(std::uint64_t block);
   bool read_elements(std::uint64_t first, std::uint64_t count, std::vector<std::uint8_t>& out);
 
   std::string path_;
   Hdf5Handle dataset_, type_, creation_;
-  std::size_t type_bytes_ = 0;                 ///< size of an element
-  std::optional<std::size_t> seconds_column_;  ///< of fractional numbers
-  std::vector<Number> numbers_;                ///< numbers to read of each element
+  std::size_t type_bytes_ = 0;  ///< size of an element
+  std::size_t time_column_ = 0;
+  int power_ = 0;                ///< power of ten from the unit of times to microseconds
+  std::vector<Number> numbers_;  ///< numbers to read of each element
   std::vector<hsize_t> extent_;
   std::uint64_t rows_ = 0;
   std::uint64_t file_bytes_ = 0;

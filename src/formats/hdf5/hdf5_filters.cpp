@@ -22,6 +22,37 @@ bool inflate_within(std::size_t max_bytes, std::vector<std::uint8_t>& bytes) {
   return true;
 }
 
+/// Decompresses LZF data. False if it is corrupt or larger than `max_bytes`.
+bool expand_lzf_within(std::size_t max_bytes, std::vector<std::uint8_t>& bytes) {
+  std::vector<std::uint8_t> out;
+  out.reserve(max_bytes);
+  for (std::size_t at = 0; at < bytes.size();) {
+    const std::size_t control = bytes[at++];
+    if (control < 32) {  // literal bytes
+      const auto count = control + 1;
+      if (count > bytes.size() - at || count > max_bytes - out.size()) return false;
+      out.insert(out.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at),
+                 bytes.begin() + static_cast<std::ptrdiff_t>(at + count));
+      at += count;
+      continue;
+    }
+    // A copy of bytes at some distance before, which may overlap their copy.
+    constexpr std::size_t long_copy = 7;
+    auto count = control >> 5;
+    if (count == long_copy) {
+      if (at == bytes.size()) return false;
+      count += bytes[at++];
+    }
+    count += 2;
+    if (at == bytes.size()) return false;
+    const auto distance = ((control & 31) << 8 | bytes[at++]) + 1;
+    if (distance > out.size() || count > max_bytes - out.size()) return false;
+    for (; count > 0; --count) out.push_back(out[out.size() - distance]);
+  }
+  bytes = std::move(out);
+  return true;
+}
+
 /// Undoes the shuffle filter, which stores all first bytes of the numbers, then all second bytes,
 /// and so on.
 void unshuffle(std::size_t number_bytes, std::vector<std::uint8_t>& bytes) {
@@ -52,7 +83,7 @@ std::uint32_t fletcher_sum(std::span<const std::uint8_t> bytes) {
 }
 
 /// Removes the checksum at the end. False if it does not match the bytes before it.
-bool take_fletcher_sum(std::vector<std::uint8_t>& bytes) {
+bool remove_fletcher_sum(std::vector<std::uint8_t>& bytes) {
   if (bytes.size() < sizeof(std::uint32_t)) return false;
   bytes.resize(bytes.size() - sizeof(std::uint32_t));
   const auto sum = little_endian<std::uint32_t>(bytes.data() + bytes.size());
@@ -63,21 +94,24 @@ bool take_fletcher_sum(std::vector<std::uint8_t>& bytes) {
 
 bool is_own_hdf5_filter(int filter) {
   return filter == H5Z_FILTER_DEFLATE || filter == H5Z_FILTER_SHUFFLE ||
-         filter == H5Z_FILTER_FLETCHER32;
+         filter == H5Z_FILTER_FLETCHER32 || filter == lzf_filter;
 }
 
-bool undo_hdf5_filters(std::span<const int> filters, std::uint32_t left_out,
+bool undo_hdf5_filters(std::span<const int> filters, std::uint32_t filter_mask,
                        std::size_t number_bytes, std::size_t chunk_bytes,
                        std::vector<std::uint8_t>& bytes) {
   for (auto i = filters.size(); i-- > 0;) {
-    if ((left_out >> i & 1) != 0) continue;
+    if ((filter_mask >> i & 1) != 0) continue;
     switch (filters[i]) {
       case H5Z_FILTER_DEFLATE:
         // Each further filter may have added a checksum.
         if (!inflate_within(chunk_bytes + 4 * filters.size(), bytes)) return false;
         break;
+      case lzf_filter:
+        if (!expand_lzf_within(chunk_bytes + 4 * filters.size(), bytes)) return false;
+        break;
       case H5Z_FILTER_FLETCHER32:
-        if (!take_fletcher_sum(bytes)) return false;
+        if (!remove_fletcher_sum(bytes)) return false;
         break;
       default:
         unshuffle(number_bytes, bytes);

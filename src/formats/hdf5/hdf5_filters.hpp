@@ -10,12 +10,16 @@
 
 namespace eventcamera {
 
-/// True for a supported filter: deflate, shuffle or Fletcher-32.
+/// Number of the filter LZF, h5py's own; its plugin in Debian cannot be loaded.
+constexpr int lzf_filter = 32000;
+
+/// True for a supported filter: deflate, LZF, shuffle or Fletcher-32.
 bool is_own_hdf5_filter(int filter);
 
 /// Undoes the filters of a chunk of numbers of the given size, the last filter first. Set bits of
-/// `left_out` mark filters that were not applied. False if the result does not have `chunk_bytes`.
-bool undo_hdf5_filters(std::span<const int> filters, std::uint32_t left_out,
+/// `filter_mask` mark filters that were not applied. False if the result does not have
+/// `chunk_bytes`.
+bool undo_hdf5_filters(std::span<const int> filters, std::uint32_t filter_mask,
                        std::size_t number_bytes, std::size_t chunk_bytes,
                        std::vector<std::uint8_t>& bytes);
 

@@ -8,11 +8,11 @@ namespace {
 constexpr std::size_t max_text = 4096;
 
 struct Attribute {
-  Attribute(hid_t object, const char* name) {
+  Attribute(hid_t object, const char* name, hssize_t numbers = 1) {
     if (H5Aexists(object, name) <= 0) return;
     attribute = {H5Aopen(object, name, H5P_DEFAULT), H5Aclose};
     const Hdf5Handle space(H5Aget_space(attribute.get()), H5Sclose);
-    if (H5Sget_simple_extent_npoints(space.get()) == 1)
+    if (H5Sget_simple_extent_npoints(space.get()) == numbers)
       type = {H5Aget_type(attribute.get()), H5Tclose};
   }
 
@@ -47,6 +47,14 @@ std::optional<std::int64_t> read_number_attribute(hid_t object, const char* name
   std::int64_t number = 0;
   if (H5Aread(found.attribute.get(), H5T_NATIVE_INT64, &number) < 0) return std::nullopt;
   return number;
+}
+
+std::optional<std::array<std::int64_t, 2>> read_pair_attribute(hid_t object, const char* name) {
+  const Attribute found(object, name, 2);
+  if (!found.type || H5Tget_class(found.type.get()) != H5T_INTEGER) return std::nullopt;
+  std::array<std::int64_t, 2> numbers = {};
+  if (H5Aread(found.attribute.get(), H5T_NATIVE_INT64, numbers.data()) < 0) return std::nullopt;
+  return numbers;
 }
 
 bool write_text_attribute(hid_t object, const char* name, const std::string& text) {

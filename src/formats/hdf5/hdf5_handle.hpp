@@ -3,6 +3,7 @@
 
 #include <hdf5.h>
 
+#include <array>
 #include <cstdint>
 #include <mutex>
 #include <optional>
@@ -69,6 +70,9 @@ std::optional<std::string> read_text_attribute(hid_t object, const char* name);
 
 /// Reads an integer attribute of a group or dataset.
 std::optional<std::int64_t> read_number_attribute(hid_t object, const char* name);
+
+/// Reads an attribute of two integers.
+std::optional<std::array<std::int64_t, 2>> read_pair_attribute(hid_t object, const char* name);
 
 /// Writes a string attribute, of variable length as Metavision readers expect. False on failure.
 bool write_text_attribute(hid_t object, const char* name, const std::string& text);

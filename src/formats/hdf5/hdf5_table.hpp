@@ -14,6 +14,9 @@
 
 namespace eventcamera {
 
+/// Sensor size in the attributes of a group or file; 0x0 if there is none.
+SensorSize size_of_attributes(hid_t object);
+
 /// Events of an HDF5 file of any layout, as rows.
 class Hdf5Table {
  public:

@@ -11,7 +11,7 @@ namespace eventcamera {
 Hdf5Triggers::Hdf5Triggers(hid_t file) : dataset_(file, "EXT_TRIGGER/events") {
   if (dataset_.rank() != 1)
     throw UnsupportedFormat("HDF5 dataset /EXT_TRIGGER/events must hold rows");
-  constexpr const char* members[] = {"t", "p", "id"};
+  const std::string members[] = {"t", "p", "id"};
   dataset_.choose(members);
   dataset_.require_filters();
 }

@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "src/formats/hdf5/hdf5_rows.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 
@@ -28,10 +29,29 @@ std::uint64_t NumberTable::read(std::uint64_t row, RowValidator& validator,
       note(corruption, t_dataset(), row, "timestamp out of range");
       continue;
     }
+    const auto on = polarities_.is_on(p_[i]);
+    if (!on) {
+      note(corruption, t_dataset(), row, "polarity other than 0, 1 and -1");
+      continue;
+    }
     const auto label = has_labels_ ? label_from(cause_[i], object_class_[i]) : Label{};
-    validator.take(t, x_[i], y_[i], p_[i] > 0, label, out, corruption);
+    validator.take(t, x_[i], y_[i], *on, label, out, corruption);
   }
   return end;
+}
+
+TimeUnit NumberTable::detect(const TableSample& sample, const Columns& columns,
+                             std::optional<TimeUnit> unit, bool are_floating,
+                             const std::string& path) {
+  if (!sample.empty()) polarities_ = sample.find_polarities(columns);
+  if (unit) return *unit;
+  if (sample.empty()) return are_floating ? TimeUnit::seconds : TimeUnit::microseconds;
+  unit = sample.find_unit(columns, false);
+  if (!unit)
+    throw UnsupportedFormat("the time unit of the HDF5 dataset " + path +
+                            " is ambiguous; rename the times to t_s, t_us or t_ns, or convert them "
+                            "to text or NumPy, whose readers have time-unit");
+  return *unit;
 }
 
 std::uint64_t NumberTable::row_before(Microseconds t) {
@@ -51,7 +71,7 @@ std::optional<Microseconds> NumberTable::time_at(std::uint64_t row) {
 
 Microseconds NumberTable::unwrapped(std::uint64_t row, std::int64_t number) {
   if (!wraps_) return number;
-  if (samples_.empty()) take_samples();
+  if (samples_.empty()) read_samples();
   auto clock = std::prev(std::ranges::upper_bound(samples_, row, {}, &Sample::row))->clock;
   return clock.follow(static_cast<std::uint32_t>(number));
 }
@@ -64,7 +84,7 @@ std::optional<std::int64_t> NumberTable::time_number(std::uint64_t row) {
 }
 
 /// Follows the clock through rows that must be less than about half an hour apart.
-void NumberTable::take_samples() {
+void NumberTable::read_samples() {
   constexpr std::uint64_t max_samples = 256;
   const auto steps = std::clamp<std::uint64_t>(rows_, 2, max_samples) - 1;
   Clock clock;

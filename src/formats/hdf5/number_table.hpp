@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "src/formats/hdf5/hdf5_table.hpp"
+#include "src/formats/table_sample.hpp"
 #include "src/formats/unwrapped_clock.hpp"
 
 namespace eventcamera {
@@ -27,12 +32,23 @@ class NumberTable : public Hdf5Table {
   /// be read, or nullptr.
   virtual const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) = 0;
 
+  /// Number of rows to detect what the numbers mean.
+  std::uint64_t sample_rows() const {
+    return std::min<std::uint64_t>(rows_, TableSample::max_binary_rows);
+  }
+
+  /// Detects the polarities of these columns, and returns the time unit unless it is known. Throws
+  /// UnsupportedFormat if they do not tell.
+  TimeUnit detect(const TableSample& sample, const Columns& columns, std::optional<TimeUnit> unit,
+                  bool are_floating, const std::string& path);
+
   /// First row after the chunk of this row.
   virtual std::uint64_t chunk_end(std::uint64_t row) const = 0;
 
   /// Time of the row with this number, before the offset is added.
   virtual Microseconds unwrapped(std::uint64_t row, std::int64_t number);
 
+  PolarityCode polarities_;
   Microseconds offset_ = 0;
   bool wraps_ = false;  ///< times have 32 bits and wrap after 71 minutes
   std::vector<std::int64_t> t_, x_, y_, p_, cause_, object_class_;
@@ -45,7 +61,7 @@ class NumberTable : public Hdf5Table {
   };
 
   std::optional<std::int64_t> time_number(std::uint64_t row);
-  void take_samples();
+  void read_samples();
 
   std::vector<Sample> samples_;  ///< once they are needed
   std::uint64_t next_row_ = 0;

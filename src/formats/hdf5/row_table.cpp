@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "src/formats/hdf5/number_table.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 
@@ -11,14 +12,34 @@ namespace {
 
 class RowTable final : public NumberTable {
  public:
-  RowTable(Hdf5Format format, Hdf5Dataset events, SensorSize size, bool wraps,
-           const ColumnOrder& order)
-      : NumberTable(format), events_(std::move(events)), order_(order) {
+  RowTable(Hdf5Format format, Hdf5Dataset events, const std::string& path, SensorSize size,
+           std::optional<ColumnOrder> order, std::optional<TimeUnit> unit)
+      : NumberTable(format), events_(std::move(events)) {
     events_.require_filters();
     size_ = size;
     rows_ = events_.rows();
     claimed_rows_ = events_.claimed_rows();
-    wraps_ = wraps;
+    TableSample sample;
+    std::vector<TableSample::Row> rows;
+    if (events_.sample(sample_rows(), rows))
+      for (auto& row : rows) sample.add(std::move(row));
+    Columns columns(event_columns);
+    if (order) {
+      for (std::size_t i = 0; i < event_columns; ++i)
+        columns[(*order)[i]] = static_cast<EventColumn>(i);
+    } else {
+      const auto found = sample.find_columns();
+      if (!found || found->size() != event_columns)
+        throw UnsupportedFormat("unknown columns in the HDF5 dataset " + path +
+                                "; store datasets named t, x, y and p");
+      columns = *found;
+    }
+    for (std::size_t i = 0; i < event_columns; ++i)
+      order_[static_cast<std::size_t>(*columns[i])] = i;
+    if (events_.rank() == 2 && events_.is_unsigned_32()) unit = TimeUnit::microseconds;
+    const auto detected = detect(sample, columns, unit, !events_.is_integers(), path);
+    events_.set_unit(order_[0], detected);
+    wraps_ = events_.rank() == 2 && events_.is_unsigned_32() && detected == TimeUnit::microseconds;
   }
 
  protected:
@@ -40,15 +61,17 @@ class RowTable final : public NumberTable {
 
  private:
   Hdf5Dataset events_;
-  ColumnOrder order_;
+  ColumnOrder order_ = {};
   std::vector<std::int64_t> numbers_;
 };
 
 }  // namespace
 
-std::unique_ptr<Hdf5Table> make_row_table(Hdf5Format format, Hdf5Dataset events, SensorSize size,
-                                          bool wraps, const ColumnOrder& order) {
-  return std::make_unique<RowTable>(format, std::move(events), size, wraps, order);
+std::unique_ptr<Hdf5Table> make_row_table(Hdf5Format format, Hdf5Dataset events,
+                                          const std::string& path, SensorSize size,
+                                          std::optional<ColumnOrder> order,
+                                          std::optional<TimeUnit> unit) {
+  return std::make_unique<RowTable>(format, std::move(events), path, size, order, unit);
 }
 
 }  // namespace eventcamera

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "src/formats/hdf5/hdf5_table.hpp"
 
@@ -11,9 +13,12 @@ namespace eventcamera {
 /// Columns of rows, by their place: t, x, y and p.
 using ColumnOrder = std::array<std::size_t, event_columns>;
 
-/// Creates the table of a layout with the numbers of each event in a row: v2e, Metavision without
-/// compression, and MVSEC. Times have 32 bits if `wraps`. Throws UnsupportedFormat.
-std::unique_ptr<Hdf5Table> make_row_table(Hdf5Format format, Hdf5Dataset events, SensorSize size,
-                                          bool wraps, const ColumnOrder& order = {0, 1, 2, 3});
+/// Creates the table of a dataset with the numbers of each event in a row: v2e, MVSEC, Metavision
+/// without compression, and others. Detects the order and the unit unless they are known. Throws
+/// UnsupportedFormat.
+std::unique_ptr<Hdf5Table> make_row_table(Hdf5Format format, Hdf5Dataset events,
+                                          const std::string& path, SensorSize size,
+                                          std::optional<ColumnOrder> order,
+                                          std::optional<TimeUnit> unit);
 
 }  // namespace eventcamera

@@ -16,6 +16,8 @@ namespace eventcamera {
 
 namespace {
 
+constexpr const char* save_rows = "save numpy.ascontiguousarray(events) of the shape (N, 4)";
+
 double half_of(std::uint16_t bits) {
   const int exponent = bits >> 10 & 31;
   const int mantissa = bits & 1023;
@@ -47,15 +49,8 @@ std::optional<std::int64_t> scaled(std::int64_t number, int power) {
   return number / divisor - (number % divisor < 0 ? 1 : 0);
 }
 
-/// Rounds down, except where a number of `digits` binary digits cannot be distinguished from the
-/// integer above: 3e-6 s may be stored as slightly less.
-double rounded_down(double number, int digits) {
-  const double above = std::floor(number) + 1;
-  return above - number <= std::min(std::ldexp(std::abs(above), -digits), 0.5) ? above : above - 1;
-}
-
-/// Multiplies the number in a field by a power of ten and rounds down; nothing if the result
-/// exceeds 64 bits.
+/// Multiplies the number in a field by a power of ten and rounds down, or up by at most
+/// `max_rounding_up` if it has a fraction; nothing if the result exceeds 64 bits.
 std::optional<std::int64_t> number_of(const NpyField& field, const std::uint8_t* element,
                                       int power = 0) {
   const unsigned unused = 64 - 8 * field.bytes;
@@ -65,6 +60,7 @@ std::optional<std::int64_t> number_of(const NpyField& field, const std::uint8_t*
     case NpyField::Kind::unsigned_integer:
     case NpyField::Kind::boolean: {
       const auto word = word_of(field, element);
+      if (~word == 0) return -1;  // a signed number that was stored as an unsigned one
       if (word > std::numeric_limits<std::int64_t>::max()) return std::nullopt;
       return scaled(static_cast<std::int64_t>(word), power);
     }
@@ -73,8 +69,7 @@ std::optional<std::int64_t> number_of(const NpyField& field, const std::uint8_t*
   }
   constexpr double factors[] = {1e-3, 1, 1e3, 1e6};
   const double factor = factors[power / 3 + 1];
-  const int digits = field.bytes == 8 ? 52 : field.bytes == 4 ? 23 : 10;
-  const double number = rounded_down(floating_of(field, element) * factor, digits);
+  const double number = std::floor(floating_of(field, element) * factor + max_rounding_up);
   if (!(std::abs(number) < 0x1p63)) return std::nullopt;  // also rejects NaN
   return static_cast<std::int64_t>(number);
 }
@@ -136,7 +131,7 @@ void NpyDecoder::begin(NpyHeader header) {
   left_ = header.count;
   position_ = preamble_.size();
   const auto rows =
-      std::clamp<std::uint64_t>(max_sample / header.element_bytes, 1, TableSample::max_rows);
+      std::clamp<std::uint64_t>(max_sample / header.element_bytes, 1, TableSample::max_binary_rows);
   sample_bytes_ = static_cast<std::size_t>(std::min(rows, left_) * header.element_bytes);
   header_ = std::move(header);
 }
@@ -148,6 +143,7 @@ void NpyDecoder::read_sample(Decoded& out) {
   const auto end = whole * header_->element_bytes;
   find_layout(std::span(elements).first(end));
   read_elements(elements.data(), whole, out);
+  rows_.check(true);
   rest_.assign(elements.begin() + static_cast<std::ptrdiff_t>(end), elements.end());
 }
 
@@ -176,19 +172,20 @@ void NpyDecoder::find_layout(std::span<const std::uint8_t> elements) {
   if (!unit) unit = sample.find_unit(*columns, false);
   if (!unit)
     throw UnsupportedFormat(
-        "the time unit of the NumPy array is ambiguous; set "
-        "time-unit");
+        "the time unit of the NumPy array is ambiguous; set time-unit, or name the times t_s, t_us "
+        "or t_ns");
+  if (!sample.empty()) polarities_ = sample.find_polarities(*columns);
   power_ = power_of(*unit);
   const std::span<const NpyField> all(header_->fields);
   stream_.labelled = std::ranges::any_of(all.subspan(event_columns),
                                          [](const NpyField& field) { return field.bytes > 0; });
-  plain_ = power_ == 0 && header_->element_bytes >= sizeof(std::uint64_t) && !stream_.labelled &&
-           std::ranges::all_of(all.first(event_columns), [](const NpyField& field) {
-             // Unsigned 64-bit numbers may not fit.
-             return field.kind != NpyField::Kind::floating &&
-                    (!field.big_endian || field.bytes == 1) &&
-                    (field.kind == NpyField::Kind::signed_integer || field.bytes < 8);
-           });
+  plain_ =
+      power_ == 0 && !polarities_.is_one_two() && header_->element_bytes >= sizeof(std::uint64_t) &&
+      !stream_.labelled && std::ranges::all_of(all.first(event_columns), [](const NpyField& field) {
+        // Unsigned 64-bit numbers may not fit.
+        return field.kind != NpyField::Kind::floating && (!field.big_endian || field.bytes == 1) &&
+               (field.kind == NpyField::Kind::signed_integer || field.bytes < 8);
+      });
   layout_known_ = true;
 }
 
@@ -199,6 +196,42 @@ void NpyDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
     if (!header) return;
     begin(*std::move(header));
   }
+  if (!header_->by_columns) {
+    decode_rows(bytes, out);
+    return;
+  }
+  constexpr std::size_t max_collected = std::size_t{1} << 30;
+  if (bytes.size() > max_collected - columns_.size())
+    throw UnsupportedFormat(std::string("the NumPy array is too large for its order of numbers; ") +
+                            save_rows);
+  columns_.insert(columns_.end(), bytes.begin(), bytes.end());
+}
+
+/// Reads the collected array in blocks of rows.
+void NpyDecoder::decode_columns(Decoded& out) {
+  constexpr std::size_t max_rows = std::size_t{1} << 14;
+  const auto count = header_->columns.size();
+  const std::size_t number_bytes = header_->element_bytes / count;
+  if (columns_.size() / header_->element_bytes < header_->count)
+    throw UnsupportedFormat(
+        std::string(
+            "the NumPy array is cut short, and its numbers are not in the order of events; ") +
+        save_rows);
+  const auto rows = static_cast<std::size_t>(header_->count);
+  std::vector<std::uint8_t> block;
+  for (std::size_t row = 0; row < rows; row += max_rows) {
+    const auto part = std::min(rows - row, max_rows);
+    block.resize(part * header_->element_bytes);
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t j = 0; j < part; ++j)
+        std::memcpy(block.data() + (j * count + i) * number_bytes,
+                    columns_.data() + (i * rows + row + j) * number_bytes, number_bytes);
+    decode_rows(block, out);
+  }
+}
+
+/// Reads elements, in pieces of any size.
+void NpyDecoder::decode_rows(std::span<const std::uint8_t> bytes, Decoded& out) {
   if (!layout_known_) {
     const auto count = std::min(sample_bytes_ - rest_.size(), bytes.size());
     rest_.insert(rest_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count));
@@ -217,6 +250,7 @@ void NpyDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
   }
   const auto count = std::min<std::uint64_t>(bytes.size() / size, left_);
   read_elements(bytes.data(), count, out);
+  rows_.check(false);
   bytes = bytes.subspan(count * size);
   if (left_ > 0) {
     rest_.assign(bytes.begin(), bytes.end());
@@ -228,7 +262,9 @@ void NpyDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
 
 void NpyDecoder::finish(Decoded& out) {
   if (!header_) throw UnsupportedFormat("truncated NumPy header");
+  if (header_->by_columns) decode_columns(out);
   if (!layout_known_) read_sample(out);
+  rows_.check(true);
   if (!rest_.empty()) {
     corruption_.note(position_, "truncated last event");
   } else if (left_ > 0 && header_->count != npy_unknown_count) {
@@ -237,7 +273,7 @@ void NpyDecoder::finish(Decoded& out) {
 }
 
 void NpyDecoder::decode_tail(ByteSource& source, Decoded& out) const {
-  if (!layout_known_) return;
+  if (!layout_known_ || header_->by_columns) return;
   const std::uint64_t size = header_->element_bytes;
   const std::uint64_t begin = preamble_.size();
   if (source.size() < begin + size) return;
@@ -249,15 +285,24 @@ void NpyDecoder::decode_tail(ByteSource& source, Decoded& out) const {
   tail.layout_known_ = true;
   tail.power_ = power_;
   tail.plain_ = plain_;
+  tail.polarities_ = polarities_;
   tail.stream_.labelled = stream_.labelled;
   tail.left_ = last;
   tail.decode(bytes, out);
+}
+
+/// Records that the row which `rows_to_read` rows end is not an event.
+void NpyDecoder::note_unreadable(std::uint64_t rows_to_read) {
+  corruption_.note(position_, "number out of range");
+  rows_.add("row " + std::to_string(rows_.rows() - rows_to_read) +
+            ": a time or a coordinate out of range, or a polarity other than 0, 1 and -1");
 }
 
 void NpyDecoder::read_elements(const std::uint8_t* bytes, std::uint64_t count, Decoded& out) {
   const auto size = header_->element_bytes;
   const auto* const end = bytes + count * size;
   left_ -= count;
+  rows_.count(count);
   const auto field = [&](EventColumn column) -> const NpyField& {
     return header_->fields[static_cast<std::size_t>(column)];
   };
@@ -267,9 +312,12 @@ void NpyDecoder::read_elements(const std::uint8_t* bytes, std::uint64_t count, D
   const auto& p_field = field(EventColumn::p);
   if (plain_) {
     const Window t(t_field, size), x(x_field, size), y(y_field, size), p(p_field, size);
-    for (; bytes < end; bytes += size, position_ += size)
-      validator_.take(t.read(bytes), x.read(bytes), y.read(bytes), p.read(bytes) > 0, out.events,
-                      corruption_);
+    for (; bytes < end; bytes += size, position_ += size) {
+      if (const auto on = polarities_.is_on(p.read(bytes)); on)
+        validator_.take(t.read(bytes), x.read(bytes), y.read(bytes), *on, out.events, corruption_);
+      else
+        note_unreadable(static_cast<std::uint64_t>(end - bytes) / size);
+    }
     return;
   }
   const auto label_number = [&](EventColumn column) {
@@ -280,12 +328,13 @@ void NpyDecoder::read_elements(const std::uint8_t* bytes, std::uint64_t count, D
     const auto x = number_of(x_field, bytes);
     const auto y = number_of(y_field, bytes);
     const auto p = number_of(p_field, bytes);
-    if (t && x && y && p) {
+    const auto on = p ? polarities_.is_on(*p) : std::nullopt;
+    if (t && x && y && on) {
       const auto label =
           label_from(label_number(EventColumn::cause), label_number(EventColumn::object_class));
-      validator_.take(*t, *x, *y, *p > 0, label, out.events, corruption_);
+      validator_.take(*t, *x, *y, *on, label, out.events, corruption_);
     } else {
-      corruption_.note(position_, "number out of range");
+      note_unreadable(static_cast<std::uint64_t>(end - bytes) / size);
     }
   }
 }

@@ -106,6 +106,11 @@ struct Type {
 };
 
 Type read_type(std::string_view text) {
+  if (text.ends_with('O'))
+    throw UnsupportedFormat(
+        "the NumPy file holds pickled Python objects, which are not read; save arrays of numbers, "
+        "as "
+        "numpy.savez(file, t=t, x=x, y=y, p=p) does");
   if (text.size() < 3) Literal::fail();
   Literal size(text.substr(2));
   const auto number = size.integer();
@@ -214,14 +219,18 @@ std::vector<std::uint64_t> read_shape(Literal& literal) {
 }
 
 /// Sets up the columns of an array of plain numbers.
-void make_columns(const Type& type, bool by_columns, const std::vector<std::uint64_t>& shape,
+void make_columns(const Type& type, bool is_fortran, const std::vector<std::uint64_t>& shape,
                   NpyHeader& header) {
   constexpr std::uint64_t max_columns = 16;
-  const auto count = shape.size() == 2 ? shape[1] : 1;
-  if (count == 0 || count > max_columns || (by_columns && count > 1 && shape[0] > 1))
-    throw UnsupportedFormat(
-        "a row of the NumPy array must be an event: save numpy.ascontiguousarray(events) of the "
-        "shape (N, 4)");
+  // Rows with an index or labels have up to six columns.
+  const bool is_transposed = shape.size() == 2 && shape[0] >= event_columns &&
+                             shape[0] <= max_columns &&
+                             shape[1] > (shape[0] == event_columns ? all_columns : max_columns);
+  if (is_transposed) header.count = shape[1];
+  const auto count = shape.size() < 2 ? 1 : shape[is_transposed ? 0 : 1];
+  if (count == 0 || count > max_columns)
+    throw UnsupportedFormat("the NumPy array must have the shape (N, 4) or (4, N)");
+  header.by_columns = is_fortran != is_transposed && count > 1 && header.count > 1;
   for (std::uint64_t i = 0; i < count; ++i) {
     const auto field = number_of(type, header.element_bytes);
     if (!field) throw UnsupportedFormat("the NumPy array is not of numbers of 8 to 64 bits");
@@ -236,7 +245,7 @@ NpyHeader read_npy_header(std::string_view dictionary) {
   NpyHeader header;
   std::optional<Type> type;
   bool has_fields = false;
-  bool by_columns = false;
+  bool is_fortran = false;
   std::optional<std::vector<std::uint64_t>> shape;
   Literal literal(dictionary);
   literal.expect('{');
@@ -250,7 +259,7 @@ NpyHeader read_npy_header(std::string_view dictionary) {
       else
         type = read_type(literal.string());
     } else if (key == "fortran_order") {
-      by_columns = literal.boolean();
+      is_fortran = literal.boolean();
     } else if (key == "shape" && !shape) {
       shape = read_shape(literal);
     } else {
@@ -262,7 +271,7 @@ NpyHeader read_npy_header(std::string_view dictionary) {
   if (has_fields && shape->size() != 1)
     throw UnsupportedFormat("the NumPy array must have one dimension");
   header.count = shape->empty() ? 1 : shape->front();
-  if (type) make_columns(*type, by_columns, *shape, header);
+  if (type) make_columns(*type, is_fortran, *shape, header);
   return header;
 }
 

@@ -37,11 +37,12 @@ struct NpyHeader {
   std::vector<NpyField> columns;  ///< columns of an array of plain numbers, without names
   std::uint32_t element_bytes = 0;
   std::uint64_t count = 0;
+  bool by_columns = false;  ///< the numbers of a column follow each other: Fortran order, or (4, N)
 };
 
 /// Parses the dictionary of the header. Throws UnsupportedFormat unless it describes a
-/// one-dimensional structured array with fields t, x, y and p, or an array of numbers with one
-/// column, or up to 16 columns in rows. A number without dimensions is an array of one.
+/// one-dimensional structured array with fields t, x, y and p, or an array of numbers with up to 16
+/// columns, in any order. A number without dimensions is an array of one.
 NpyHeader read_npy_header(std::string_view dictionary);
 
 /// Returns the preamble of a file with this dictionary.

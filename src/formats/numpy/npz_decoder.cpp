@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <iterator>
+#include <utility>
+#include <vector>
 
 #include "src/core/max_side.hpp"
 #include "src/formats/collected_bytes.hpp"
@@ -73,17 +74,19 @@ class WholeArray final : public Elements {
   std::vector<std::uint8_t> block_;
 };
 
-/// Joins arrays of one column each to elements of t, x, y and p, or of these and labels.
+/// Joins arrays to elements of t, x, y and p, or of these and labels.
 class JoinedColumns final : public Elements {
  public:
-  explicit JoinedColumns(std::vector<ArrayFile> arrays) : arrays_(std::move(arrays)) {
-    for (std::size_t i = 0; i < arrays_.size(); ++i) {
-      auto& field = header_.fields[i] = arrays_[i].header.columns.front();
-      field.offset = header_.element_bytes;
-      header_.element_bytes += field.bytes;
-      // More than there are if an array is shorter, which NpyDecoder reports.
-      header_.count = std::max(header_.count, arrays_[i].header.count);
+  /// Adds an array with these columns.
+  void add(ArrayFile array, std::span<const EventColumn> columns) {
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      auto& field = header_.fields[static_cast<std::size_t>(columns[i])] = array.header.columns[i];
+      field.offset += header_.element_bytes;
     }
+    header_.element_bytes += array.header.element_bytes;
+    // More than there are if an array is shorter, which NpyDecoder reports.
+    header_.count = std::max(header_.count, array.header.count);
+    arrays_.push_back(std::move(array));
   }
 
   NpyHeader header(std::optional<TimeUnit> unit) const {
@@ -106,20 +109,21 @@ class JoinedColumns final : public Elements {
       rows = std::min(rows, rest.size() / header.element_bytes);
     }
     joined_.resize(rows * header_.element_bytes);
-    for (std::size_t i = 0; i < arrays_.size(); ++i) {
-      auto& rest = arrays_[i].rest;
-      const auto& field = header_.fields[i];
+    std::size_t offset = 0;
+    for (auto& [entry, header, rest] : arrays_) {
+      const std::size_t size = header.element_bytes;
       for (std::size_t row = 0; row < rows; ++row)
-        std::copy_n(rest.data() + row * field.bytes, field.bytes,
-                    joined_.data() + row * header_.element_bytes + field.offset);
-      rest.erase(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(rows * field.bytes));
+        std::copy_n(rest.data() + row * size, size,
+                    joined_.data() + row * header_.element_bytes + offset);
+      rest.erase(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(rows * size));
+      offset += size;
     }
     return joined_;
   }
 
  private:
-  std::vector<ArrayFile> arrays_;  ///< by EventColumn
-  NpyHeader header_;               ///< header of the joined elements
+  std::vector<ArrayFile> arrays_;
+  NpyHeader header_;  ///< header of the joined elements
   std::vector<std::uint8_t> joined_;
 };
 
@@ -198,7 +202,7 @@ class Archive {
     return static_cast<std::size_t>(found - names.begin());
   }
 
-  /// Opens arrays t, x, y and p. False unless all of them exist.
+  /// Opens arrays t, x, y and p, or t, xy (of two columns) and p. False unless all of them exist.
   bool open_columns(const TableSettings& settings) {
     std::array<std::optional<std::size_t>, all_columns> indices;
     std::optional<TimeUnit> unit;
@@ -210,24 +214,42 @@ class Archive {
       index = i;
       if (name->column == EventColumn::t) unit = name->unit;
     }
-    std::vector<ArrayFile> arrays;
-    for (const auto& index : std::span(indices).first(event_columns)) {
-      if (!index) return false;
-      arrays.push_back(open_array(archive_, *index));
-      if (arrays.back().header.columns.size() != 1)
-        throw UnsupportedFormat(archive_.names()[*index] +
-                                " in the NumPy archive is not an array of one column");
+    struct Part {
+      std::optional<std::size_t> index;
+      std::vector<EventColumn> columns;
+    };
+    std::vector<Part> parts;
+    for (const auto column : {EventColumn::t, EventColumn::x, EventColumn::y, EventColumn::p})
+      parts.push_back({indices[static_cast<std::size_t>(column)], {column}});
+    if (!parts[1].index && !parts[2].index) {
+      const auto& names = archive_.names();
+      const auto xy = std::ranges::find_if(names, [](const std::string& name) {
+        const auto array = array_name(name);
+        return array == "xy" || array.ends_with("_xy");
+      });
+      if (xy == names.end()) return false;
+      parts[1] = {static_cast<std::size_t>(xy - names.begin()), {EventColumn::x, EventColumn::y}};
+      parts.erase(parts.begin() + 2);
     }
-    add_labels(std::span(indices).subspan(event_columns), arrays);
-    auto joined = std::make_unique<JoinedColumns>(std::move(arrays));
+    auto joined = std::make_unique<JoinedColumns>();
+    for (const auto& [index, columns] : parts)
+      if (!index) return false;
+    for (const auto& [index, columns] : parts) {
+      auto array = open_array(archive_, *index);
+      if (array.header.columns.size() != columns.size() || array.header.by_columns)
+        throw UnsupportedFormat(archive_.names()[*index] +
+                                " in the NumPy archive must have one column" +
+                                (columns.size() > 1 ? " for x and one for y" : ""));
+      joined->add(std::move(array), columns);
+    }
+    add_labels(std::span(indices).subspan(event_columns), *joined);
     decoder_ = std::make_unique<NpyDecoder>(joined->header(unit), settings);
     elements_ = std::move(joined);
     return true;
   }
 
   /// Opens the arrays cause and class, if both are there and have a number for each event.
-  void add_labels(std::span<const std::optional<std::size_t>> indices,
-                  std::vector<ArrayFile>& arrays) {
+  void add_labels(std::span<const std::optional<std::size_t>> indices, JoinedColumns& joined) {
     std::vector<ArrayFile> labels;
     for (const auto& index : indices) {
       if (!index) return;
@@ -237,9 +259,11 @@ class Archive {
         return;
       }
       const auto& header = labels.back().header;
-      if (header.columns.size() != 1 || header.count < arrays.front().header.count) return;
+      if (header.columns.size() != 1 || header.count < joined.header({}).count) return;
     }
-    std::ranges::move(labels, std::back_inserter(arrays));
+    constexpr EventColumn columns[] = {EventColumn::cause, EventColumn::object_class};
+    for (std::size_t i = 0; i < labels.size(); ++i)
+      joined.add(std::move(labels[i]), std::span(columns).subspan(i, 1));
   }
 
   /// Opens the first array that may be one of events.

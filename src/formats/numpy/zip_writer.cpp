@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Numbers and names are those of PKWARE's APPNOTE.TXT.
+// Numbers and names as in PKWARE's APPNOTE.TXT.
 #include "src/formats/numpy/zip_writer.hpp"
 
 #include <cstddef>

@@ -24,12 +24,12 @@ constexpr std::size_t max_listed = 8;
 struct Format {
   std::string_view magic;
   const char* name;
-  std::unique_ptr<BagFile> (*make)(BagFile::TakeTopic take_topic);
+  std::unique_ptr<BagFile> (*make)(BagFile::AddTopic add_topic);
 };
 
 template <class File>
-std::unique_ptr<BagFile> make_file(BagFile::TakeTopic take_topic) {
-  return std::make_unique<File>(std::move(take_topic));
+std::unique_ptr<BagFile> make_file(BagFile::AddTopic add_topic) {
+  return std::make_unique<File>(std::move(add_topic));
 }
 
 constexpr Format formats[] = {
@@ -61,13 +61,13 @@ BagDecoder::BagDecoder(std::string topics) {
   if (!topics.empty()) wanted_ = "," + topics + ",";
 }
 
-/// Throws UnsupportedFormat if `start` is that of no known format.
+/// Throws UnsupportedFormat if no known format starts with `start`.
 void BagDecoder::choose_format(std::span<const std::uint8_t> start) {
   const auto* const found = std::ranges::find_if(
       formats, [&](const Format& format) { return has_at(0, format.magic, start); });
   if (found == std::end(formats)) throw UnsupportedFormat("this is not a ROS bag");
   format_name_ = found->name;
-  file_ = found->make([this](const BagTopic& topic) { return take_topic(topic); });
+  file_ = found->make([this](const BagTopic& topic) { return add_topic(topic); });
 }
 
 void BagDecoder::push(std::span<const std::uint8_t> piece) {
@@ -86,7 +86,7 @@ const Corruption& BagDecoder::corruption() const {
   return file_ ? file_->corruption() : none;
 }
 
-std::optional<std::size_t> BagDecoder::take_topic(const BagTopic& topic) {
+std::optional<std::size_t> BagDecoder::add_topic(const BagTopic& topic) {
   const auto kind = kind_of_messages(topic);
   if (kind == StreamKind::other || !is_wanted(topic, kind)) {
     auto& names = kind == StreamKind::other ? others_ : unread_;

@@ -41,7 +41,7 @@ class BagDecoder final : public Decoder {
 
  private:
   void choose_format(std::span<const std::uint8_t> start);
-  std::optional<std::size_t> take_topic(const BagTopic& topic);
+  std::optional<std::size_t> add_topic(const BagTopic& topic);
   bool is_wanted(const BagTopic& topic, StreamKind kind) const;
   std::optional<Item> next_part();
   void learn_delay(Microseconds t);

@@ -27,7 +27,7 @@ struct BagTopic {
 
 /// A message of a topic.
 struct BagMessage {
-  std::size_t topic;    ///< as BagFile::TakeTopic returned it
+  std::size_t topic;    ///< as BagFile::AddTopic returned it
   Microseconds logged;  ///< when it was recorded
   std::span<const std::uint8_t> bytes;
   std::uint64_t position;  ///< offset in the file, or of its chunk
@@ -40,7 +40,7 @@ class BagFile {
  public:
   /// Called with every topic before its first message; returns a number for its messages, or
   /// nothing if they are not to be returned.
-  using TakeTopic = std::function<std::optional<std::size_t>(const BagTopic&)>;
+  using AddTopic = std::function<std::optional<std::size_t>(const BagTopic&)>;
 
   virtual ~BagFile() = default;
   BagFile(const BagFile&) = delete;
@@ -73,14 +73,14 @@ class BagFile {
   Corruption& corruption() { return corruption_; }
 
  protected:
-  explicit BagFile(TakeTopic take_topic) : take_topic_(std::move(take_topic)) {}
+  explicit BagFile(AddTopic add_topic) : add_topic_(std::move(add_topic)) {}
 
   /// Limit of the name of a topic or type, bytes.
   static constexpr std::size_t max_name = 1024;
 
   /// `position`: of the record or row that states the topic.
   std::optional<std::size_t> take(const BagTopic& topic, std::uint64_t position) {
-    if (std::max(topic.name.size(), topic.type.size()) <= max_name) return take_topic_(topic);
+    if (std::max(topic.name.size(), topic.type.size()) <= max_name) return add_topic_(topic);
     corruption_.note(position, "a topic with an overlong name");
     return std::nullopt;
   }
@@ -88,7 +88,7 @@ class BagFile {
   Corruption corruption_;
 
  private:
-  TakeTopic take_topic_;
+  AddTopic add_topic_;
 };
 
 /// Name of a message type without the folder that ROS 2 adds: package/Type of package/msg/Type.

@@ -36,7 +36,7 @@ std::optional<BagMessage> ChunkedBagFile::next() {
     index_.reached(position);
     if (kind_ == Head::Kind::chunk)
       chunk_ = records_of(record, position, ended_);
-    else if (const auto message = take_record(record, position))
+    else if (const auto message = read_record(record, position))
       return message;
   }
   queue_.keep();
@@ -147,7 +147,7 @@ std::optional<BagMessage> ChunkedBagFile::next_in_chunk() {
     const auto record = chunk_->first(static_cast<std::size_t>(head->size));
     chunk_ = chunk_->subspan(record.size());
     if (head->kind != Head::Kind::read) continue;
-    if (const auto message = take_record(record, position)) return message;
+    if (const auto message = read_record(record, position)) return message;
   }
   chunk_.reset();
   return std::nullopt;

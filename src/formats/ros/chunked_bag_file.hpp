@@ -41,7 +41,7 @@ class ChunkedBagFile : public BagFile {
   /// Limit of topics.
   static constexpr std::size_t max_topics = 4096;
 
-  /// What the first bytes of a record say.
+  /// First bytes of a record, parsed.
   struct Head {
     enum class Kind : std::uint8_t { none, skipped, read, chunk, end };
     Kind kind = Kind::none;  ///< none: this is not a record
@@ -51,8 +51,8 @@ class ChunkedBagFile : public BagFile {
   using Bytes = std::span<const std::uint8_t>;
 
   /// `magic`: first bytes of the file. `scanned_bytes`: as many as begins_record() needs.
-  ChunkedBagFile(TakeTopic take_topic, std::string_view magic, std::size_t scanned_bytes)
-      : BagFile(std::move(take_topic)), magic_(magic), scanned_bytes_(scanned_bytes) {}
+  ChunkedBagFile(AddTopic add_topic, std::string_view magic, std::size_t scanned_bytes)
+      : BagFile(std::move(add_topic)), magic_(magic), scanned_bytes_(scanned_bytes) {}
 
   /// Reads topics and the index of chunks. A file without them, or a truncated one, is read anyway.
   virtual void read_index(ByteSource& source) = 0;
@@ -65,7 +65,7 @@ class ChunkedBagFile : public BagFile {
   virtual bool begins_record(Bytes bytes) const = 0;
 
   /// Reads a record. Returns the message that it is, if it is one of a topic that is read.
-  virtual std::optional<BagMessage> take_record(Bytes record, std::uint64_t position) = 0;
+  virtual std::optional<BagMessage> read_record(Bytes record, std::uint64_t position) = 0;
 
   /// Returns the records of a chunk; nothing if they are corrupt, which is noted. `is_cut`: the
   /// file ends within the chunk.

@@ -22,7 +22,7 @@ constexpr std::int64_t before_all = std::numeric_limits<std::int64_t>::min();
 
 }  // namespace
 
-Db3File::Db3File(TakeTopic take_topic) : BagFile(std::move(take_topic)) {}
+Db3File::Db3File(AddTopic add_topic) : BagFile(std::move(add_topic)) {}
 Db3File::~Db3File() = default;
 
 void Db3File::finish() {

@@ -22,7 +22,7 @@ class SqliteRows;
 /// databases need random access. The position of a seek point is the ID of a message.
 class Db3File final : public BagFile {
  public:
-  explicit Db3File(TakeTopic take_topic);
+  explicit Db3File(AddTopic add_topic);
   ~Db3File() override;
   Db3File(const Db3File&) = delete;
   Db3File& operator=(const Db3File&) = delete;

@@ -22,7 +22,7 @@ class EventArrayDecoder final : public TopicDecoder {
     const auto height = fields_->number<std::uint32_t>();
     const auto width = fields_->number<std::uint32_t>();
     left_ = fields_->number<std::uint32_t>();
-    if (!fields_->failed()) take_size(width, height);
+    if (!fields_->failed()) set_size(width, height);
   }
 
   bool next() override {

@@ -40,7 +40,7 @@ constexpr Microseconds microseconds(std::uint64_t nanoseconds) {
   return time / 1000 - (time % 1000 < 0 ? 1 : 0);
 }
 
-/// What the clocks of the sensor and of ROS may drift apart in a recording, less than half of the
+/// Maximum drift between the clocks of the sensor and of ROS in a recording, less than half of the
 /// wrap period of EVT3. If they are further apart after a seek, the camera was started again.
 constexpr Microseconds max_drift = 4'000'000;
 
@@ -83,7 +83,7 @@ class EvtPackets {
   }
 
  private:
-  /// Turns times of the sensor into those of ROS. The sensor's clock wraps; the stamp determines
+  /// Turns times of the sensor into times of ROS. The sensor's clock wraps; the stamp determines
   /// how often.
   void shift(Decoded& out, std::optional<std::uint64_t>& offset) {
     if (!shift_) {
@@ -188,7 +188,7 @@ class EventPacketDecoder final : public TopicDecoder {
       return;
     }
     if (encoding_.empty()) {
-      take_size(packet.width, packet.height);
+      set_size(packet.width, packet.height);
       choose(packet);
     }
     if (packet.encoding != encoding_ || packet.is_big_endian) {

@@ -44,7 +44,7 @@ class ImageDecoder final : public TopicDecoder {
   void restart() override { due_.reset(); }
 
  private:
-  /// Returns what is wrong, or nullptr.
+  /// Returns the fault of a message, or nullptr.
   const char* read(MessageCursor& fields) {
     Frame frame;
     frame.t = static_cast<Microseconds>(fields.header_stamp() / 1000);
@@ -64,7 +64,7 @@ class ImageDecoder final : public TopicDecoder {
         stride < width * static_cast<std::size_t>(bytes_per_pixel(encoding->format)) ||
         stride > pixels.size() / height)
       return "an image whose size does not match its pixels";
-    take_size(width, height);
+    set_size(width, height);
     frame.format = encoding->format;
     frame.width = static_cast<int>(width);
     frame.height = static_cast<int>(height);

@@ -65,8 +65,8 @@ bool is_skipped(std::uint8_t opcode) {
 
 }  // namespace
 
-McapFile::McapFile(TakeTopic take_topic)
-    : ChunkedBagFile(std::move(take_topic), mcap_magic, chunk_head) {}
+McapFile::McapFile(AddTopic add_topic)
+    : ChunkedBagFile(std::move(add_topic), mcap_magic, chunk_head) {}
 
 void McapFile::read_index(ByteSource& source) {
   constexpr std::size_t end_size = mcap_record_header + mcap_footer + mcap_magic.size();
@@ -94,8 +94,8 @@ void McapFile::read_index(ByteSource& source) {
     const auto opcode = static_cast<McapOpcode>(records.number<std::uint8_t>());
     ByteCursor content(records.sized_bytes<std::uint64_t>());
     if (records.failed()) return;
-    if (opcode == McapOpcode::schema) take_schema(content, record_at);
-    if (opcode == McapOpcode::channel) take_channel(content, record_at);
+    if (opcode == McapOpcode::schema) add_schema(content, record_at);
+    if (opcode == McapOpcode::channel) add_channel(content, record_at);
     if (opcode != McapOpcode::chunk_index) continue;
     content.number<std::uint64_t>();  // first time
     const auto last = microseconds(content.number<std::uint64_t>());
@@ -145,14 +145,14 @@ bool McapFile::begins_record(Bytes bytes) const {
          channels_.contains(little_endian<std::uint16_t>(bytes.data() + mcap_record_header));
 }
 
-std::optional<BagMessage> McapFile::take_record(Bytes record, std::uint64_t position) {
+std::optional<BagMessage> McapFile::read_record(Bytes record, std::uint64_t position) {
   const ByteCursor content(record.subspan(mcap_record_header));
   switch (static_cast<McapOpcode>(record[0])) {
     case McapOpcode::schema:
-      take_schema(content, position);
+      add_schema(content, position);
       break;
     case McapOpcode::channel:
-      take_channel(content, position);
+      add_channel(content, position);
       break;
     case McapOpcode::message:
       return message_of(content, position);
@@ -162,7 +162,7 @@ std::optional<BagMessage> McapFile::take_record(Bytes record, std::uint64_t posi
   return std::nullopt;
 }
 
-void McapFile::take_schema(ByteCursor content, std::uint64_t position) {
+void McapFile::add_schema(ByteCursor content, std::uint64_t position) {
   const auto id = content.number<std::uint16_t>();
   const auto name = content.text();
   if (name.size() > max_name)
@@ -171,7 +171,7 @@ void McapFile::take_schema(ByteCursor content, std::uint64_t position) {
     schemas_.try_emplace(id, name);
 }
 
-void McapFile::take_channel(ByteCursor content, std::uint64_t position) {
+void McapFile::add_channel(ByteCursor content, std::uint64_t position) {
   const auto id = content.number<std::uint16_t>();
   const auto schema = schemas_.find(content.number<std::uint16_t>());
   const auto name = content.text();

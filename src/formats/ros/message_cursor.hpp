@@ -69,7 +69,7 @@ class MessageCursor {
         failed_(is_cdr_ && !skip_encapsulation(message)),
         fields_(message.rest()) {}
 
-  /// False unless what follows is little-endian XCDR1.
+  /// False unless little-endian XCDR1 follows.
   static bool skip_encapsulation(ByteCursor& message) {
     constexpr std::uint16_t little_endian_cdr = 0x0100;
     const auto scheme = message.number<std::uint16_t>();

@@ -90,8 +90,8 @@ bool is_compression(std::string_view name) {
 
 }  // namespace
 
-RosbagFile::RosbagFile(TakeTopic take_topic)
-    : ChunkedBagFile(std::move(take_topic), rosbag_magic, chunk_head) {}
+RosbagFile::RosbagFile(AddTopic add_topic)
+    : ChunkedBagFile(std::move(add_topic), rosbag_magic, chunk_head) {}
 
 void RosbagFile::read_index(ByteSource& source) {
   constexpr std::size_t first_record = 4096;
@@ -116,7 +116,7 @@ void RosbagFile::read_index(ByteSource& source) {
     const auto record = rest.first(static_cast<std::size_t>(head->size));
     rest = rest.subspan(record.size());
     const Record whole(record);
-    if (whole.header.op() == Op::connection) take_record(record, 0);
+    if (whole.header.op() == Op::connection) read_record(record, 0);
     const auto position = whole.header.number<std::uint64_t>("chunk_pos");
     const auto last = whole.header.time("end_time");
     if (whole.header.op() != Op::chunk_info || !position || !last) continue;
@@ -161,7 +161,7 @@ bool RosbagFile::begins_record(Bytes bytes) const {
   return head && head->kind == Head::Kind::chunk && head->size <= max_record;
 }
 
-std::optional<BagMessage> RosbagFile::take_record(Bytes bytes, std::uint64_t position) {
+std::optional<BagMessage> RosbagFile::read_record(Bytes bytes, std::uint64_t position) {
   const Record record(bytes);
   const auto connection = record.header.number<std::uint32_t>("conn");
   if (!connection) {

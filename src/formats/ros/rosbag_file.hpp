@@ -15,13 +15,13 @@ namespace eventcamera {
 /// Reads ROS 1 bags, version 2.0: wiki.ros.org/Bags/Format/2.0.
 class RosbagFile final : public ChunkedBagFile {
  public:
-  explicit RosbagFile(TakeTopic take_topic);
+  explicit RosbagFile(AddTopic add_topic);
 
  private:
   void read_index(ByteSource& source) override;
   std::optional<Head> head_of(Bytes bytes) const override;
   bool begins_record(Bytes bytes) const override;
-  std::optional<BagMessage> take_record(Bytes record, std::uint64_t position) override;
+  std::optional<BagMessage> read_record(Bytes record, std::uint64_t position) override;
   std::optional<Bytes> records_of(Bytes record, std::uint64_t position, bool is_cut) override;
 
   std::optional<Bytes> decompressed(std::string_view compression, Bytes content);

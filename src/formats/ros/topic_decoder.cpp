@@ -41,7 +41,7 @@ std::unique_ptr<TopicDecoder> make_topic_decoder(const BagTopic& topic, Corrupti
   return type_of(topic)->make_decoder(topic, corruption);
 }
 
-void TopicDecoder::take_size(std::uint32_t width, std::uint32_t height) {
+void TopicDecoder::set_size(std::uint32_t width, std::uint32_t height) {
   if (!std::exchange(size_taken_, true) && is_side(width) && is_side(height))
     size_ = {static_cast<int>(width), static_cast<int>(height)};
 }

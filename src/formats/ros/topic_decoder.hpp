@@ -44,9 +44,9 @@ class TopicDecoder {
  protected:
   explicit TopicDecoder(Corruption& corruption) : corruption_(corruption) {}
 
-  /// Takes the size of the first message, if it is valid; that of a later one might not hold the
-  /// events before it.
-  void take_size(std::uint32_t width, std::uint32_t height);
+  /// Sets the size that the first message states, if it is valid. Later messages change nothing:
+  /// the events before them might not fit.
+  void set_size(std::uint32_t width, std::uint32_t height);
 
   Corruption& corruption_;
   Decoded decoded_;

@@ -114,7 +114,7 @@ void CsvDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
   std::string converted;
   auto text = utf8_.text_of(bytes, converted);
   if (in_head_) {
-    const auto count = take_head(text);
+    const auto count = append_head(text);
     if (head_lines_ < head_lines && head_.size() < max_head) return;
     text.remove_prefix(count);
     read_head();
@@ -144,7 +144,7 @@ void CsvDecoder::finish(Decoded& out) {
 }
 
 /// Appends `text` to the head, up to the head's end, and returns the number of characters appended.
-std::size_t CsvDecoder::take_head(std::string_view text) {
+std::size_t CsvDecoder::append_head(std::string_view text) {
   std::size_t count = 0;
   while (count < text.size() && head_lines_ < head_lines && head_.size() < max_head) {
     const char letter = text[count++];

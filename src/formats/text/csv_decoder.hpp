@@ -24,8 +24,8 @@ namespace eventcamera {
 /// commas before thousands.
 ///
 /// Properties not given in the settings are detected from the header and the first 256 lines:
-/// - the columns, by a line of names, which may include those of labels, cause and class, and
-///   further ones that are ignored, by names in a comment, or by the numbers (TableSample);
+/// - the columns, by a line of names, which may include labels, cause and class, and
+///   further columns that are ignored, by names in a comment, or by the numbers (TableSample);
 /// - the time unit, by the name of its column or by the numbers. Integer times in blank-separated
 ///   columns without names may be microseconds (DVS-Voltmeter) or nanoseconds (rpg_esim); an
 ///   ambiguous file is refused. Times are rounded as by read_decimal();
@@ -66,7 +66,7 @@ class CsvDecoder final : public EventDecoder {
   void find_commas(const std::vector<std::vector<std::string_view>>& rows);
   std::string_view plain_number(std::string_view field, std::string& buffer) const;
   std::optional<Row> read_row(std::span<const std::string_view> fields) const;
-  std::size_t take_head(std::string_view text);
+  std::size_t append_head(std::string_view text);
   void read_head();
   bool read_header_line(std::string_view line);
   Columns columns_named(std::span<const std::string_view> names);

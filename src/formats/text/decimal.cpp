@@ -34,11 +34,11 @@ struct Number {
 std::optional<Number> parsed(std::string_view text) {
   std::size_t at = 0;
   const auto more = [&] { return at < text.size(); };
-  const auto take_sign = [&] {
+  const auto read_sign = [&] {
     const bool is_sign = more() && (text[at] == '-' || text[at] == '+');
     return is_sign && text[at++] == '-';
   };
-  Number number{.negative = take_sign()};
+  Number number{.negative = read_sign()};
   // Up to 19 digits are exact in 64 bits.
   constexpr auto room = std::numeric_limits<std::uint64_t>::max() / 10 - 1;
   bool any = false;
@@ -61,7 +61,7 @@ std::optional<Number> parsed(std::string_view text) {
   if (more() && (text[at] == 'e' || text[at] == 'E')) {
     ++at;
     number.has_fraction = true;
-    const bool down = take_sign();
+    const bool down = read_sign();
     const auto rest = text.substr(at);
     if (rest.empty() || !std::ranges::all_of(rest, is_digit)) return std::nullopt;
     number.power += down ? -read_exponent(rest) : read_exponent(rest);

@@ -26,7 +26,7 @@ class PlainLines {
     bool on;
   };
 
-  /// `columns` are t, x, y and p in any order. `power` is that of ten from the time unit to
+  /// `columns` are t, x, y and p in any order. The time unit is 10^`power`
   /// microseconds.
   PlainLines(const Columns& columns, char separator, int power)
       : separator_(separator), power_(power) {
