@@ -92,7 +92,23 @@ bool Simulation::set_caps(GstCaps* in, GstCaps* out) {
   draws_ = state_->draws;
   stream_.interval.expect(static_cast<Nanoseconds>(frame_duration(video)));
   update_latency(before);
+  if (!state_->draws) check_sink();
   return true;
+}
+
+/// Warns of a file that gets the events without the times of their buffers.
+void Simulation::check_sink() {
+  const OwnedPad peer(gst_pad_get_peer(GST_BASE_TRANSFORM_SRC_PAD(element_)));
+  const OwnedElement sink(peer ? gst_pad_get_parent_element(peer.get()) : nullptr);
+  const gchar* const klass =
+      sink ? gst_element_get_metadata(sink.get(), GST_ELEMENT_METADATA_KLASS) : nullptr;
+  if (klass == nullptr || !g_str_equal(klass, "Sink/File")) return;
+  stream_.warn_of_bare_file(
+      element_,
+      {GST_STREAM_ERROR_FORMAT,
+       "A file of these buffers cannot be read: event times count from the start of a buffer, "
+       "which is not in it. Insert a writer of event files, such as eventnpzenc, before the file."},
+      std::string("linked to ") + GST_OBJECT_NAME(sink.get()));
 }
 
 /// Ensures that there is a state. Errors drop it while the pads keep their caps; if the application
