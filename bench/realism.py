@@ -42,12 +42,10 @@ ROWS = {
     "diff": "eventsim-diff",
     "`eventsim-dvs`": "eventsim-dvs",
 }
-with open(os.path.join(os.path.dirname(__file__), "..", "docs", "which-simulator.md"), encoding="utf-8") as file:
-    RECOMMENDED = re.search("`(eventsim-dvs upsampling=motion .*?)`", file.read())[1]
 # Of these, only the thresholds are fitted.
 PRESETS = {f"`{element}`": element for element in ("eventsim-dvs preset=esim", "eventsim-dvs preset=v2e-noisy")} | {
-    "`eventsim-dvs`, recommended": RECOMMENDED,
-    "`eventsim-dvs`, recommended, straight lines": RECOMMENDED.replace("upsampling=motion", "upsampling=linear"),
+    "`eventsim-dvs`, thresholds only": "eventsim-dvs",
+    "`eventsim-dvs`, thresholds only, straight lines": "eventsim-dvs upsampling=linear",
 }
 CALIBRATED = "`eventsim-dvs`"
 # Fields of matches.

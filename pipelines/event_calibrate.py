@@ -1,10 +1,12 @@
 #!/usr/bin/python3 -B
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Finds the contrast thresholds at which a simulator generates as many ON and OFF events from a
-video as a real camera recorded of the same scene. For eventsim-dvs it also finds response, upsampling,
-denoising, adaptation, threshold jitter, refractory period and exposure pulses, and balances the errors of
-mean and standard deviation over the pixels. Prints the settings, and how similar the two streams are.
-Overexposed parts of the frames are excluded.
+video as a real camera recorded of the same scene. For eventsim-dvs it then tries changes one at a time:
+exposure compensation, refractory period, threshold jitter, upsampling, the offset of the logarithm,
+overexposed light, adaptation, denoising and exposure pulses, and keeps those that make the streams more
+similar by more than the noise of that figure. Balances the errors of mean and standard deviation over the
+pixels. Prints the settings, and how similar the two streams are. Overexposed parts of the frames are
+excluded.
 
     event-calibrate drive.mp4 drive.raw --profile camera.profile --to 2
 
@@ -24,41 +26,39 @@ from event_streams import (GLib, Gst, Span, compare, delayed, expect_writable, r
                            read_video, seconds, simulate, until)
 import numpy as np
 from plugins import find_plugins
-from threshold_search import ROUGH_PRECISION, Setting, find_thresholds
+from threshold_search import PRECISION, ROUGH_PRECISION, Setting, find_thresholds
 
 # Parts of the calibrated time for cross-validation.
 PARTS = 4
-# Values tried for eventsim-dvs: the response to the frames, with the offset of a logarithmic one as a share of white;
-# and stages of the pixel.
-RESPONSE = {
-    "log-eps": [0.001, 0.0018, 0.0025, 0.0035, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04, 0.057, 0.08, 0.11, 0.16,
-                0.22, 0.32],
-    "overexposed-light": [1, 1.25, 1.5, 2, 3, 4, 6],
-    "response": ["linear", "log", "lin-log"],
-    "linear-light": ["false", "true"],
-    "exposure-compensation": ["false", "true"],
-}
-# Exposure compensation changes nothing while the exposure is constant, and the exposure may change later.
-FIRST_RESPONSE = {"log-eps": 0.02, "overexposed-light": 1, "response": "log", "linear-light": "false",
-                  "exposure-compensation": "true"}
-UPSAMPLING = ["linear", "motion"]
-STAGES = {
-    "denoise": [0, 2, 4, 8, 12],
-    "adaptation": [0, 0.05, 0.1, 0.2, 0.3, 0.4],
-    "refractory-period": [0, 300_000, 600_000, 1_000_000, 2_000_000],
-}
-# Stages in units of the response, as shares of the mean threshold.
-RELATIVE_STAGES = {
-    "threshold-jitter": [0, 0.1, 0.2, 0.3, 0.4],
-    "exposure-pulse": [0, 0.04, 0.08, 0.12, 0.16, 0.24],
-}
-# Their first value turns them off; it is chosen if they improve the likeness by less than MIN_GAIN.
-OPTIONAL = {"overexposed-light", *STAGES, *RELATIVE_STAGES}
-MIN_GAIN = 0.002
+# Changes of eventsim-dvs that suit some cameras, tried one after the other.
+CHANGES = [
+    {"linear-light": "true", "log-eps": 0.001},
+    {"exposure-compensation": "false"},
+    {"refractory-period": 300_000, "refractory-reset": "signal"},
+    {"refractory-period": 1_000_000, "refractory-reset": "signal"},
+    {"threshold-jitter": 0.1},
+    {"threshold-jitter": 0.2},
+    {"upsampling": "linear"},
+    {"log-eps": 0.02},
+    {"log-eps": 0.1},
+    {"overexposed-light": 1},
+    {"overexposed-light": 3},
+    {"adaptation": 0},
+    {"adaptation": 0.1},
+    {"adaptation": 0.2},
+    {"denoise": 0},
+]
+PULSES = [0.04, 0.08, 0.12, 0.16]
+# Values of these are shares of the mean threshold.
+SHARES = {"threshold-jitter", "exposure-pulse"}
+# A change has to gain at least this likeness.
+MIN_GAIN = 0.003
 # Maximum factor between the numbers of events, when mean and standard deviation are balanced.
 MAX_BALANCE = 1.1
 # The element that has profiles.
 PROFILED = "eventsim-dvs"
+# Seconds between two lines of progress where there is no terminal.
+PROGRESS_INTERVAL = 60
 
 
 def likeness(figures):
@@ -70,144 +70,67 @@ def likeness(figures):
         return harmonic_mean([figures[f"{side}-matches"][f"within-{limit}ms"] for side in ("reference", "candidate")])
 
     deviations = sorted(figures[side]["std-dev"] for side in ("reference", "candidate"))
-    return float(np.average([figures["map-correlation"], both(1), both(5), both(10),
-                             (deviations[0] / deviations[1]) ** 2, 10 ** -figures["interval-distance"]],
+    variances = (deviations[0] / deviations[1]) ** 2 if deviations[1] > 0 else 0
+    return float(np.average([figures["map-correlation"], both(1), both(5), both(10), variances,
+                             10 ** -figures["interval-distance"]],
                             weights=[1, 2, 2, 2, 1, 1]))
 
 
 class Progress:
-    """Prints progress: one line, overwritten, on a terminal; a line per step elsewhere."""
+    """Prints progress: one line, overwritten, on a terminal; elsewhere a line a minute, and every result."""
 
     def __init__(self):
         self.on_terminal = sys.stderr.isatty()
+        self.told = time.monotonic()
 
     def tell(self, text):
-        print(f"\r{text:<78}" if self.on_terminal else text, end="" if self.on_terminal else "\n", file=sys.stderr,
-              flush=True)
+        if self.on_terminal:
+            print(f"\r{text:<78}", end="", file=sys.stderr, flush=True)
+        elif time.monotonic() > self.told + PROGRESS_INTERVAL:
+            self.say(text)
+
+    def say(self, text):
+        """Prints a result, which stays."""
+        print(f"\r{text:<78}" if self.on_terminal else text, file=sys.stderr, flush=True)
+        self.told = time.monotonic()
 
     def end(self):
         if self.on_terminal:
             print(file=sys.stderr)
 
 
-class Choices:
-    """Tries property values and rates them by cross-validation: each part of a stream is simulated with
-    thresholds that fit the other parts; the likeness of the stream is the rating."""
+class Search:
+    """Rates settings by cross-validation: each part of the time is simulated with thresholds that fit the other
+    parts, and rated by its likeness."""
 
-    def __init__(self, video, recorded, span, element, progress):
-        self.video, self.recorded, self.span = video, recorded, span
-        self.element, self.progress = element, progress
-        self.made = Gst.ElementFactory.make(element.split()[0])
+    def __init__(self, video, recorded, span, progress):
+        self.video, self.recorded, self.span, self.progress = video, recorded, span, progress
         self.parts = parts_of(video, span)
         # The last stream of a threshold search is rated.
         self.simulated_by = functools.lru_cache(maxsize=4)(functools.partial(simulate, video))
-        self.rated = {}
         self.thresholds = None  # of the last setting, the first guess for the next one
-        self.began = time.monotonic()
-        self.expected = 0
 
-    def is_free(self, name):
-        return (self.made is not None and self.made.find_property(name) is not None
-                and f"{name}=" not in self.element)
-
-    def setting(self, chosen):
-        chosen = dict(chosen)
-        if chosen.get("response", "log") != "log":
-            chosen.pop("log-eps", None)
-        for name, default in (("overexposed-light", 1), ("linear-light", "false"), ("exposure-compensation", "false")):
-            if chosen.get(name) == default:
-                del chosen[name]
-        if chosen.get("refractory-period") == 0:
-            del chosen["refractory-period"]
-        elif "refractory-period" in chosen and self.is_free("refractory-reset"):
-            chosen["refractory-reset"] = "signal"
-        shares = {name: chosen.pop(name) for name in RELATIVE_STAGES if name in chosen}
-        values = [f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"
-                  for name, value in chosen.items()]
-        return Setting(" ".join([self.element, *values]), shares)
-
-    def rating(self, chosen):
-        """The likeness by cross-validation."""
-        return self.rated_by(chosen, self.parts)
-
-    def rough_rating(self, chosen):
-        """The likeness without cross-validation."""
-        return self.rated_by(chosen, [self.span])
-
-    def rated_by(self, chosen, parts):
-        setting = self.setting(chosen)
-        key = str(setting), len(parts)
-        if key not in self.rated:
-            simulated = np.concatenate([self.predicted(part, parts, setting) for part in parts])
-            self.rated[key] = likeness(compare(self.video, self.recorded, simulated, self.span))
-            self.tell_progress(f"{setting}: likeness {self.rated[key]:.4f}")
-        return self.rated[key]
-
-    def predicted(self, part, parts, setting):
-        """The simulated events of a part, with thresholds that fit the other parts, or itself if it is the only
-        one."""
-        others = [other for other in parts if other is not part] or [part]
-        self.thresholds = find_thresholds(self.simulated_by, self.recorded, others, setting, self.progress,
-                                          self.thresholds, ROUGH_PRECISION)
-        return part.of(self.simulated_by(setting.with_thresholds(self.thresholds)))
-
-    def calibrated(self, chosen, share=1.0):
-        """The element with thresholds that fit the whole span, or this share of its events."""
-        setting = self.setting(chosen)
-        self.thresholds = find_thresholds(self.simulated_by, self.recorded, self.parts, setting, self.progress,
-                                          self.thresholds, share=share)
+    def fit(self, setting, spans, precision=PRECISION, share=1.0):
+        """The element with thresholds that fit this share of the events of the spans."""
+        self.thresholds = find_thresholds(self.simulated_by, self.recorded, spans, setting, self.progress,
+                                          self.thresholds, precision, share)
         return setting.with_thresholds(self.thresholds)
 
-    def balanced(self, chosen):
+    def likenesses(self, setting):
+        """The likeness of each part."""
+        found = []
+        for part in self.parts:
+            others = [other for other in self.parts if other is not part] or [part]
+            simulated = self.simulated_by(self.fit(setting, others, ROUGH_PRECISION))
+            found.append(likeness(compare(self.video, self.recorded, simulated, part)))
+        return np.array(found)
+
+    def balanced(self, setting):
         """The element with thresholds that balance the errors of the mean event rate and of its standard deviation
         over the pixels: one is too small by the factor that the other is too large."""
-        figures = compare(self.video, self.recorded, self.simulated_by(self.calibrated(chosen)), self.span)
+        figures = compare(self.video, self.recorded, self.simulated_by(self.fit(setting, self.parts)), self.span)
         mean, deviation = (figures["candidate"][field] / figures["reference"][field] for field in ("mean", "std-dev"))
-        return self.calibrated(chosen, np.clip(np.sqrt(mean / deviation), 1 / MAX_BALANCE, MAX_BALANCE))
-
-    def best_response(self):
-        """The best response with motion, and the values of its free properties."""
-        axes = {name: values for name, values in RESPONSE.items() if self.is_free(name)}
-        if "response" not in axes and "response=log" not in self.element.split():
-            axes.pop("log-eps", None)
-        if not any(self.video.overexposed(frame).any() for frame in self.video.frames):
-            axes.pop("overexposed-light", None)
-        start = {"upsampling": "motion"} if self.is_free("upsampling") else {}
-        start |= {name: FIRST_RESPONSE[name] for name in axes}
-        starts = [start | {"linear-light": light} for light in axes.get("linear-light", [])] or [start]
-        climbed = [self.climb(start, axes, self.rough_rating) for start in starts]
-        return max(climbed, key=self.rough_rating) if len(climbed) > 1 else climbed[0], axes
-
-    def climb(self, chosen, axes, rating):
-        """Hill climbing: steps to neighbouring values while that improves the rating."""
-        self.expected += 4 * len(axes)  # two passes
-        improved = True
-        while improved:
-            improved = False
-            for name, values in axes.items():
-                for step in (1, -1):
-                    while True:
-                        i = values.index(chosen[name]) + step
-                        if not 0 <= i < len(values):
-                            break
-                        other = chosen | {name: values[i]}
-                        if rating(other) <= rating(chosen):
-                            break
-                        chosen, improved = other, True
-        return chosen
-
-    def pruned(self, chosen, axes):
-        """`chosen` without the OPTIONAL stages that improve nothing."""
-        for name in filter(OPTIONAL.__contains__, axes):
-            without = chosen | {name: axes[name][0]}
-            if self.rating(without) > self.rating(chosen) - MIN_GAIN:
-                chosen = without
-        return chosen
-
-    def tell_progress(self, text):
-        done = len(self.rated)
-        left = max(self.expected - done, 1) * (time.monotonic() - self.began) / done
-        self.progress.tell(f"{text}; {done} settings, about {left // 60:.0f}:{left % 60:02.0f} left")
+        return self.fit(setting, self.parts, share=np.clip(np.sqrt(mean / deviation), 1 / MAX_BALANCE, MAX_BALANCE))
 
 
 def parts_of(video, span):
@@ -218,30 +141,47 @@ def parts_of(video, span):
     return [Span(start, end) for start, end in zip([span.start, *cuts], [*cuts, span.end])]
 
 
+def changes_of(video, recorded, span, element):
+    """The changes to try: those of properties that the element does not set."""
+    if element.split()[0] != PROFILED:
+        return []
+    changes = list(CHANGES)
+    if not any(video.overexposed(frame).any() for frame in video.frames):
+        changes = [change for change in changes if "overexposed-light" not in change]
+    lead = find_exposure_lead(video, recorded, span)
+    if lead is not None:
+        changes += [{"exposure-lead": lead, "exposure-pulse": pulse} for pulse in PULSES]
+    return [change for change in changes if not any(f"{name}=" in element for name in change)]
+
+
+def changed(element, change):
+    shares = {name: value for name, value in change.items() if name in SHARES}
+    values = [f"{name}={value}" for name, value in change.items() if name not in SHARES]
+    return Setting(" ".join([element, *values]), shares)
+
+
 def calibrate(video, recorded, span, element, progress):
-    """The element with calibrated thresholds; for eventsim-dvs also with a response and its offset,
-    denoising, adaptation, threshold jitter, refractory period, upsampling, and exposure pulses if the
-    recording shows any."""
-    choices = Choices(video, recorded, span, element, progress)
-    chosen, axes = choices.best_response()
-    if choices.is_free("upsampling"):
-        axes["upsampling"] = UPSAMPLING
-    stages = {name: values for name, values in (STAGES | RELATIVE_STAGES).items() if choices.is_free(name)}
-    if "exposure-pulse" in stages:
-        lead = find_exposure_lead(video, recorded, span) if choices.is_free("exposure-lead") else None
-        if lead is None:
-            del stages["exposure-pulse"]
-        else:
-            chosen |= {"exposure-lead": lead}
-    if not axes | stages:
-        return choices.calibrated(chosen)
-    # Start without any stage and with all of them, since they depend on each other.
-    starts = [chosen | {name: values[i] for name, values in stages.items()} for i in (0, 2)]
-    climbed = (choices.climb(start, axes | stages, choices.rating) for start in starts)
-    best = choices.pruned(max(climbed, key=choices.rating), axes | stages)
-    if best.get("exposure-pulse") == 0:
-        best.pop("exposure-lead", None)
-    return choices.balanced(best)
+    """The element with calibrated thresholds, and with those of its changes that gain more than their noise."""
+    search = Search(video, recorded, span, progress)
+    began = time.monotonic()
+    progress.say(f"calibrated thresholds: {search.fit(Setting(element), search.parts)}")
+    changes = changes_of(video, recorded, span, element)
+    if not changes:
+        return search.balanced(Setting(element))
+    kept = {}
+    rating = search.likenesses(Setting(element))
+    for tried, change in enumerate(changes, 1):
+        other = search.likenesses(changed(element, kept | change))
+        gains = other - rating
+        noise = gains.std(ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else 0
+        text = " ".join(f"{name}={value}" for name, value in change.items())
+        left = (time.monotonic() - began) / tried * (len(changes) - tried)
+        progress.tell(f"{text}: likeness {gains.mean():+.4f}; {tried} of {len(changes)} changes,"
+                      f" about {left // 60:.0f}:{left % 60:02.0f} left")
+        if gains.mean() > max(noise, MIN_GAIN):
+            kept, rating = kept | change, other
+            progress.say(f"kept {text}: likeness {gains.mean():+.4f}, now {rating.mean():.4f}")
+    return search.balanced(changed(element, kept))
 
 
 def fit_thresholds(video, recorded, span, element, progress):
@@ -309,8 +249,7 @@ def find_lag(video, recorded, span, element, progress):
 
     lag = lag_of_polarities(video, recorded)
     shown, over = late(lag)
-    choices = Choices(shown, shown.visible(recorded), over, element, progress)
-    fitted = choices.calibrated(choices.best_response()[0])
+    fitted = fit_thresholds(shown, shown.visible(recorded), over, element, progress)
 
     @functools.cache
     def likeness_at(lag):
@@ -444,11 +383,11 @@ def main():
     progress = Progress()
     start = getattr(args, "from")
     ends = [end for end in (args.to, args.measure_to) if end is not None]
-    progress.tell(f"reading {args.video}")
+    progress.say(f"reading {args.video}")
     video = read_video(args.video, start or 0, max(ends) if len(ends) else float("inf"))
     if len(video.frames) < 2:
         raise RuntimeError(f"{args.video}: fewer than two frames")
-    progress.tell(f"reading {args.recording}")
+    progress.say(f"reading {args.recording}")
     if args.mask:
         video.mask = read_mask(args.mask, video)
     recorded = video.of_camera(read_recording(args.recording, video))

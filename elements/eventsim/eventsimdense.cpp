@@ -68,6 +68,7 @@ static const EventSimulatorMethod dense = {
     .long_name = "Event camera simulator: dense interpolation",
     .description = "Turns video into events: interpolates frames with dense optical flow",
     .threshold = 2,
+    .denoises = true,
     .interpolates = true,
     .has_flow = true,
     .create = in_system_memory<eventcamera::make_dense_simulator>,

@@ -16,8 +16,7 @@
  * is a change of light by 22 %; linear has the same range from black to white as lin-log, ln(255)
  * = 5.54, so 0.2 is 9.2 grey levels of 8-bit video.
  *
- * If a static or dark scene fires because of a webcam's sensor noise, denoise removes the noise and
- * keeps the edges.
+ * Noise of the frame camera is found and removed by default; see #GstEventSimDvs:denoise.
  *
  * The same video, settings and seed give the same events for any number of threads.
  *
@@ -100,6 +99,9 @@ static GType refractory_reset_type() {
 
 static GType preset_type() {
   static const GEnumValue values[] = {
+      {static_cast<int>(DvsPreset::standard),
+       "A typical event camera: logarithmic, with motion between frames, for any frame camera",
+       "standard"},
       {static_cast<int>(DvsPreset::ideal), "No noise, no delay; lin-log", "ideal"},
       {static_cast<int>(DvsPreset::esim), "ESIM: like ideal, with a logarithmic response", "esim"},
       {static_cast<int>(DvsPreset::v2e_clean), "v2e, clean: threshold mismatch only", "v2e-clean"},
@@ -141,11 +143,7 @@ struct PixelProperty {
 };
 
 const PixelProperty pixel_properties[] = {
-    {"denoise", "Denoise",
-     "Remove camera noise from each frame first: smooth differences between neighbouring pixels of "
-     "up to this size, and keep larger ones such as edges (grey levels, white is 255; 0 = off, 8 "
-     "suits noisy webcams)",
-     &DvsSettings::denoise, 0, 255, controllable},
+    {"denoise", "Denoise", denoise_blurb, &DvsSettings::denoise, -1, 255, controllable},
     {"linear-light", "Linear light",
      "Invert the sRGB transfer function (IEC 61966-2-1) first, to recover the light that reached "
      "the camera; otherwise luma is used as light",
@@ -297,7 +295,7 @@ Overrides read_profile(const std::string& path, GObjectClass* klass) {
 
 /// User-settable values.
 struct Settings {
-  DvsPreset preset = DvsPreset::ideal;
+  DvsPreset preset = DvsPreset::standard;
   std::string profile;
   Overrides of_profile;       ///< override the preset
   std::string profile_error;  ///< reason why the profile could not be read; empty if it was

@@ -31,6 +31,7 @@ static const EventSimulatorMethod frame = {
     .long_name = "Event camera simulator: difference frame",
     .description = "Turns video into events: thresholds the difference of successive frames",
     .threshold = 20,
+    .denoises = true,
     .create = in_system_memory<eventcamera::make_frame_simulator>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventsim_frame, "eventsim-frame", GST_RANK_NONE,
@@ -64,6 +65,7 @@ static const EventSimulatorMethod sparse = {
         "Turns video into events: tracks only the pixels that changed to interpolate "
         "frames",
     .threshold = 10,
+    .denoises = true,
     .interpolates = true,
     .create = in_system_memory<eventcamera::make_sparse_simulator>,
 };
@@ -97,6 +99,7 @@ static const EventSimulatorMethod diff = {
         "Turns video into events: tracks what changed from one difference frame to the "
         "next",
     .threshold = 20,
+    .denoises = true,
     .interpolates = true,
     .create = in_system_memory<eventcamera::make_diff_simulator>,
 };

@@ -301,6 +301,19 @@ static void install_thresholds(GObjectClass* klass, double grey_levels) {
                           0, 255, grey_levels, controllable_flags));
 }
 
+const char* const denoise_blurb =
+    "Remove camera noise from each frame first: smooth differences between neighbouring pixels of "
+    "up to this size, and keep larger ones such as edges (grey levels, white is 255; 0 = off, "
+    "-1 = automatic: four standard deviations of the noise, found where successive frames differ "
+    "least)";
+
+static void install_denoise(GObjectClass* klass) {
+  Properties<settings_of>(klass).add(
+      [](SimulatorSettings& settings) -> double& { return settings.simulation.denoise; },
+      g_param_spec_double("denoise", "Denoise", denoise_blurb, eventcamera::automatic_denoise, 255,
+                          eventcamera::Settings().denoise, controllable_flags));
+}
+
 static void install_interpolated_frames(GObjectClass* klass) {
   Properties<settings_of>(klass).add(
       [](SimulatorSettings& settings) -> int& { return settings.simulation.interpolated_frames; },
@@ -459,6 +472,7 @@ static void method_class_init(gpointer klass, gpointer row) {
   GST_EVENT_SIMULATOR_CLASS(klass)->method = &method;
   method.video.install_pads(GST_ELEMENT_CLASS(klass));
   if (method.threshold) install_thresholds(object_class, *method.threshold);
+  if (method.denoises) install_denoise(object_class);
   if (method.interpolates) install_interpolated_frames(object_class);
   if (method.labels) install_label(object_class);
   if (method.has_flow) install_write_flow(object_class);

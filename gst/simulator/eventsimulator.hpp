@@ -30,6 +30,7 @@ struct EventSimulatorMethod {
   /// Default of positive-threshold and negative-threshold, in grey levels; if unset, the element
   /// does not have these properties.
   std::optional<double> threshold;
+  bool denoises = false;      ///< has the property denoise, off by default
   bool interpolates = false;  ///< has the property interpolated-frames
   bool labels = false;        ///< has the property label
   bool has_flow = false;      ///< reads the flow of frames, and has the property write-flow
@@ -48,6 +49,9 @@ struct EventSimulatorMethod {
   /// If set, returns why an element cannot start with its properties; empty if it can.
   std::string (*fault)(GObject* object) = nullptr;
 };
+
+/// Text of the property denoise.
+extern const char* const denoise_blurb;
 
 /// Name of the base class in the plugin that this library is linked to. Each plugin defines its
 /// own.

@@ -22,7 +22,7 @@ def _chunks(playing: Pipeline) -> Iterator[Events]:
             yield events_of(sample)
 
 
-def simulate(video: str | os.PathLike[str], simulator: str = "eventsim-dvs denoise=8") -> Iterator[Events]:
+def simulate(video: str | os.PathLike[str], simulator: str = "eventsim-dvs") -> Iterator[Events]:
     """Yields the events that an event camera would have seen, one array per pair of consecutive frames of a video.
 
     video: a file that GStreamer plays.

@@ -34,7 +34,7 @@ enum class RefractoryReset {
 /// Parameters of a pixel array. Every stage except response and upsampling is off if its parameters
 /// are 0.
 struct DvsSettings {
-  double denoise = 0;                  ///< maximum noise amplitude in the frames; white is 255
+  double denoise = 0;                  ///< Settings::denoise
   bool linear_light = false;           ///< undo the sRGB transfer function first
   bool exposure_compensation = false;  ///< divide out the gain of the frame camera's exposure
   Response response = Response::lin_log;
@@ -78,6 +78,7 @@ struct DvsSettings {
 
 /// Named sets of settings; their values are in presets.cpp.
 enum class DvsPreset {
+  standard,   ///< a typical event camera, for frames of any camera
   ideal,      ///< no noise, no delay
   esim,       ///< ESIM
   v2e_clean,  ///< v2e, its model "clean"

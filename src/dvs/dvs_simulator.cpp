@@ -8,7 +8,6 @@
 
 #include "src/core/luma.hpp"
 #include "src/core/thread_pool.hpp"
-#include "src/dvs/denoise.hpp"
 #include "src/dvs/exposure_gain.hpp"
 #include "src/dvs/interval_events.hpp"
 #include "src/dvs/light_response.hpp"
@@ -42,6 +41,8 @@ class PixelSimulator final : public DvsSimulator {
   explicit PixelSimulator(const LumaFormat& format) : DvsSimulator(format) {}
 
  private:
+  double denoise_setting(const Settings&) const override { return settings_.denoise; }
+
   bool needs_flow() const override { return settings_.upsampling == Upsampling::motion; }
 
   void start(const LumaView& frame) override {
@@ -88,15 +89,9 @@ class PixelSimulator final : public DvsSimulator {
 
   void label(const LabelledEvents& events) override { separate_causes(events); }
 
-  /// Copies the luma of a frame, denoised.
   void see(const LumaView& frame, Image<Pixel>& out) {
     response_.set_range(frame.is_narrow);
-    const int white = (1 << format().bits) - 1;
-    const int limit = static_cast<int>(std::lround(settings_.denoise / 255 * white));
-    if (limit > 0)
-      denoise(frame.as<Pixel>(), limit, threads(), out);
-    else
-      out.assign(frame.as<Pixel>());
+    out.assign(frame.as<Pixel>());
   }
 
   void set_labels() {

@@ -8,7 +8,6 @@
 
 // Guide to this folder, from frames to events; the equations are in docs/methods.md.
 //
-//   denoise.cpp           removes the noise of the frame camera
 //   light_response.cpp    response of the photoreceptor to luma, without the exposure that
 //                         exposure_gain.cpp finds
 //   moving_light.cpp      number of steps between two frames for each tile, and the luma of moving

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "src/dvs/dvs_settings.hpp"
+#include "src/simulate/denoiser.hpp"
 
 namespace eventcamera {
 namespace {
@@ -12,9 +13,10 @@ using enum RefractoryReset;
 
 // Settings that are not listed have the defaults of DvsSettings. Sources:
 //
-// esim: Rebecq et al., ESIM, CoRL 2018; thresholds of rpg_vid2e, offset of esim_py.
-// v2e: Hu, Liu, Delbruck, CVPRW 2021; set_dvs_params("clean") and, for dim light, ("noisy").
-// icns: Joubert et al., Event camera simulator improvements via characterized parameters, Front.
+// standard: docs/realism.md. Thresholds of cameras differ by a factor of 2.7; these are in the
+// middle. esim: Rebecq et al., ESIM, CoRL 2018; thresholds of rpg_vid2e, offset of esim_py. v2e:
+// Hu, Liu, Delbruck, CVPRW 2021; set_dvs_params("clean") and, for dim light, ("noisy"). icns:
+// Joubert et al., Event camera simulator improvements via characterized parameters, Front.
 //   Neurosci. 2021, with the parameters of its example. White is 10 klux; the response ln(lux + 1)
 //   is ln(1e-4 + I) plus a constant. The time constant is 40 us at 1 klux and proportional to
 //   1 / (lux + 1), so 4 us at white. Noise of 0.1 Hz ON and 0.01 Hz OFF is a single rate here.
@@ -28,6 +30,16 @@ using enum RefractoryReset;
 //
 // The fractions of hot pixels are guesses.
 constexpr std::pair<DvsPreset, DvsSettings> table[] = {
+    {DvsPreset::standard,
+     {.denoise = automatic_denoise,
+      .exposure_compensation = true,
+      .response = log,
+      .log_eps = 0.05,
+      .overexposed_light = 1.5,
+      .upsampling = Upsampling::motion,
+      .positive_threshold = 0.26,
+      .negative_threshold = 0.26,
+      .adaptation = 0.05}},
     {DvsPreset::ideal, {}},
     {DvsPreset::esim, {.response = log}},
     {DvsPreset::v2e_clean, {.threshold_sigma = 0.02}},

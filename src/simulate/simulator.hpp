@@ -10,6 +10,7 @@
 #include "src/core/luma.hpp"
 #include "src/core/thread_pool.hpp"
 #include "src/flow/dense_flow.hpp"
+#include "src/simulate/denoiser.hpp"
 
 namespace eventcamera {
 
@@ -18,8 +19,9 @@ struct Settings {
   double positive_threshold = 20;  ///< C+, 8-bit grey levels; a rise must exceed it
   double negative_threshold = 20;  ///< C-, 8-bit grey levels, a magnitude; a fall must exceed it
   int interpolated_frames = 10;    ///< n, between two frames; 0 or more
-  int threads = 0;                 ///< thread limit for one frame; 0 = one per processor
-  bool labels = false;             ///< label the events, if the simulator can
+  double denoise = 0;   ///< largest noise in the frames, grey levels, or automatic_denoise
+  int threads = 0;      ///< thread limit for one frame; 0 = one per processor
+  bool labels = false;  ///< label the events, if the simulator can
 };
 
 /// C+ and C- in the grey levels of a frame, integers like its pixel differences.
@@ -136,14 +138,19 @@ class Simulator : public IntervalSimulator {
                            const std::optional<ImageView<Flow>>& known_flow = {});
 
  protected:
-  using IntervalSimulator::IntervalSimulator;
+  explicit Simulator(const LumaFormat& format) : IntervalSimulator(format), denoiser_(format) {}
 
+  /// Settings::denoise, unless the simulator has its own.
+  virtual double denoise_setting(const Settings& settings) const { return settings.denoise; }
   /// Stores the first frame.
   virtual void start(const LumaView& frame) = 0;
   /// Fills `events` with the events between the last frame and this one, and stores this one. Sets
   /// flow_ if it needs flow that is not known.
   virtual void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
                         StepBuckets& events) = 0;
+
+ private:
+  Denoiser denoiser_;
 };
 
 }  // namespace eventcamera

@@ -12,46 +12,6 @@ namespace {
 using namespace harness;
 using namespace aedat_recordings;
 
-TEST(AedatDemux, HandsOutTheEventsOfEveryVersion) {
-  recordings::Random random(7);
-  auto made = recordings::random_events(random, sensor, 30'000, 200'000);
-  const auto first = made.front().t;
-  std::map<std::string, Bytes> files;
-  for (const int compression : {0, 1, 2, 3, 4})
-    files["4, compression " + std::to_string(compression)] =
-        aedat4_file(made, static_cast<Aedat4Compression>(compression));
-  files["4, without a table"] = aedat4_file(made, Aedat4Compression::lz4, false);
-  files["4, of today"] = aedat4_file(shifted(made, of_1970));
-  files["3"] = aedat_files::aedat3(made, "DAVIS346", 1000);
-  files["3, camera unknown"] = aedat_files::aedat3(made, "a camera", 1000);
-  files["2"] = aedat_files::aedat2_davis(made, sensor, "eu.seebetter.DAVIS346");
-  for (const auto& [name, bytes] : files) {
-    const TemporaryFile file(bytes);
-    for (const char* between : {"", "identity ! "}) {
-      SCOPED_TRACE(name + ", " + between);
-      AedatPlayer player(file.source() + between);
-      ASSERT_TRUE(player.play()) << player.error;
-      EXPECT_TRUE(player.warnings.empty()) << player.warnings.front();
-      EXPECT_EQ(player.pads(), 1U);
-      EXPECT_EQ(player.no_more_pads, 1);
-      const auto track = player.track("events_0");
-      const bool of_today = name == "4, of today";
-      const auto expected = shifted(made, of_today ? of_1970 : 0);
-      EXPECT_EQ(track.segment.start,
-                static_cast<GstClockTime>(first + (of_today ? of_1970 : 0)) * GST_USECOND);
-      EXPECT_EQ(track.segment.time, 0U);
-      EXPECT_EQ(track.caps,
-                "application/x-event-camera, format=(string)XYTP, width=(int)346, "
-                "height=(int)260, framerate=(fraction)0/1");
-      EXPECT_TRUE(track.events == expected) << track.events.size() << " of " << expected.size();
-      EXPECT_EQ(track.eos, 1U);
-      EXPECT_EQ(player.stat("events"), expected.size());
-      for (const char* const dropped : {"outside-events", "late-items", "stray-items"})
-        EXPECT_EQ(player.stat(dropped), 0U);
-    }
-  }
-}
-
 TEST(AedatDemux, Aedat2WithoutACameraHasTheSizeThatIsAskedFor) {
   recordings::Random random(3);
   constexpr SensorSize davis240{240, 180};
@@ -83,18 +43,6 @@ TEST(AedatDemux, Aedat2WithoutACameraHasTheSizeThatIsAskedFor) {
   EXPECT_TRUE(dvs128.play()) << dvs128.error;
   EXPECT_TRUE(dvs128.events == few);
   EXPECT_TRUE(dvs128.warnings.empty());
-}
-
-TEST(AedatDemux, PiecesOfAnySizeChangeNothing) {
-  const auto events = steady_events(300'000, 100);
-  const TemporaryFile file(aedat4_with_frames(events, PixelFormat::grey8, 7));
-  for (const int size : {1, 7, 100, 4096}) {
-    AedatPlayer player("filesrc blocksize=" + std::to_string(size) +
-                       " location=" + in_quotes(file.path()) + " ! identity ! ");
-    ASSERT_TRUE(player.play()) << player.error;
-    EXPECT_TRUE(shifted(player.track("events_0").events, -3'000) == events) << size;
-    EXPECT_EQ(player.track("video_0").pictures.size(), 7U) << size;
-  }
 }
 
 TEST(AedatDemux, PutsFramesInSyncWithEvents) {
@@ -203,36 +151,25 @@ TEST(AedatDemux, ReadsStreamsThatAreWrittenOneAfterTheOther) {
   }
 }
 
-TEST(AedatDemux, PlaysAgainAfterAStop) {
-  const auto events = steady_events(500'000, 100);
-  const TemporaryFile file(aedat4_with_frames(events, PixelFormat::grey8, 10));
-  for (const char* between : {"", "identity ! "}) {
-    AedatPlayer player(file.source() + between);
-    for (int times = 0; times < 3; ++times) {
-      ASSERT_TRUE(player.play()) << player.error;
-      EXPECT_EQ(player.track("events_0").events.size(), events.size());
-      EXPECT_EQ(player.track("video_0").pictures.size(), 10U);
-      player.stop();
-    }
+TEST(AedatDemux, SeeksWhilePlayingAgainAndAgain) {
+  const auto events = steady_events(10'000'000, 100);
+  const TemporaryFile file(aedat4_with_frames(events, PixelFormat::bgr, 250));
+  AedatPlayer player(file.source());
+  player.preroll();
+  ASSERT_TRUE(player.seek(GST_SECOND));
+  EXPECT_EQ(player.flushes, 2) << "the bin sends a seek to both sinks; it is done once";
+  player.set(GST_STATE_PLAYING);
+  recordings::Random random(3);
+  for (int i = 0; i < 60; ++i) {
+    ASSERT_TRUE(
+        player.seek(static_cast<GstClockTime>(recordings::below(random, 9'000)) * GST_MSECOND));
+    if (i % 4 == 0) g_usleep(1000);
   }
-}
-
-/// After a flush in push mode, a demuxer starts over at the start of the file.
-TEST(AedatDemux, BeginsAnewAfterAFlush) {
-  const auto events = steady_events(200'000, 100);
-  const auto bytes = aedat4_file(events);
-  Harness h(Harness::with_late_pad("aedatdemux"), "aedatdemux");
-  gst_harness_set_src_caps_str(h.get(), "application/x-aedat, version=(int)4");
-  const auto push = [&](std::size_t size) {
-    return h.push(gst_buffer_new_memdup(bytes.data(), size));
-  };
-  EXPECT_EQ(push(bytes.size() / 2), GST_FLOW_OK);
-  flush({h.get()});
-  pull_events(h);
-  push_segment(h.get(), GST_FORMAT_BYTES);
-  EXPECT_EQ(push(bytes.size()), GST_FLOW_OK);
-  EXPECT_TRUE(gst_harness_push_event(h.get(), gst_event_new_eos()));
-  EXPECT_TRUE(pull_events(h) == events);
+  ASSERT_TRUE(player.seek(8 * GST_SECOND));
+  while (player.track("events_0").eos == 0 || player.track("video_0").eos == 0)
+    ASSERT_TRUE(player.wait()) << player.error;
+  EXPECT_TRUE(player.track("events_0").events == from(shifted(events, 3'000), 8'000'000));
+  EXPECT_EQ(player.track("video_0").pictures.size(), 50U);
 }
 
 }  // namespace

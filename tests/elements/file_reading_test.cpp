@@ -145,26 +145,6 @@ TEST_P(EveryFormat, EndsEachOfTwoFilesInItsOwnStream) {
   EXPECT_EQ(streams.start_at, (std::vector<std::size_t>{0, events.size()}));
 }
 
-TEST_P(EveryFormat, IsFoundByDecodebin) {
-  const auto events = some_events();
-  const TemporaryFile file(file_of(format(), events));
-  Player player(file.source() + "decodebin caps=application/x-event-camera");
-  ASSERT_TRUE(player.play()) << player.error;
-  EXPECT_EQ(player.events, events);
-}
-
-TEST_P(EveryFormat, PlaysAgainAfterAStop) {
-  const TemporaryFile file(file_of(format(), some_events()));
-  Player player(file.source() + format().reader);
-  for (int times = 0; times < 3; ++times) {
-    EXPECT_TRUE(player.reaches(GST_STATE_PAUSED));
-    EXPECT_TRUE(player.play()) << player.error;
-    EXPECT_EQ(player.events.size(), 20'000U);
-    EXPECT_TRUE(player.reaches(times % 2 == 0 ? GST_STATE_READY : GST_STATE_NULL));
-  }
-  EXPECT_TRUE(player.reaches(GST_STATE_PAUSED));
-}
-
 TEST_P(EveryFormat, BeginsAnewAfterAFlush) {
   const auto events = some_events();
   const auto file = file_of(format(), events);
@@ -176,20 +156,6 @@ TEST_P(EveryFormat, BeginsAnewAfterAFlush) {
   h.read(file, 10'000);
   EXPECT_EQ(pull_events(h), events);
   EXPECT_EQ(h.warning(), "");
-}
-
-TEST_P(EveryFormat, IsFreedWhileInUse) {
-  const auto file = file_of(format(), some_events());
-  for (const std::size_t count : {std::size_t{1}, file.size() / 2}) {
-    bool freed = false;
-    {
-      Reader h(format());
-      tell_when_freed(h.element(), freed);
-      gst_harness_push_event(h.get(), gst_event_new_tag(gst_tag_list_new_empty()));
-      h.push_bytes(file.substr(0, count));
-    }
-    EXPECT_TRUE(freed);
-  }
 }
 
 /// Subtitles and letters have the extensions of text files, too.

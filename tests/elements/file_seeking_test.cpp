@@ -21,41 +21,6 @@ Events between(Events events, GstClockTime from, GstClockTime to = GST_CLOCK_TIM
   return events;
 }
 
-TEST_P(EveryFormat, IsPulledAndSoughtIn) {
-  const auto events = some_events();
-  const TemporaryFile file(file_of(format(), events));
-  for (const std::string way : {"", "queue ! "}) {
-    Player player(file.source() + way + format().reader);
-    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-    if (way.empty()) {
-      EXPECT_EQ(player.duration(), 3'999'951 * GST_USECOND);
-    }
-    EXPECT_EQ(player.position(), 0U);
-    ASSERT_TRUE(player.play()) << player.error;
-    EXPECT_NE(player.duration(), GST_CLOCK_TIME_NONE);
-
-    const GstClockTime from = 3'700 * GST_MSECOND;
-    const GstClockTime to = 3'804'321 * GST_USECOND;
-    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-    ASSERT_TRUE(player.seek(from, GST_CLOCK_TIME_NONE, GST_SEEK_FLAG_ACCURATE));
-    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-    EXPECT_EQ(player.position(), from);
-    ASSERT_TRUE(player.play()) << player.error;
-    EXPECT_EQ(player.events, between(events, from));
-
-    // Backwards, and with a stop position.
-    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-    ASSERT_TRUE(player.seek(100 * GST_MSECOND));
-    ASSERT_TRUE(player.seek(from, to));
-    ASSERT_TRUE(player.play()) << player.error;
-    EXPECT_EQ(player.events, between(events, from, to));
-
-    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-    EXPECT_FALSE(gst_element_seek(player.get(), -1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
-                                  GST_SEEK_TYPE_SET, GST_SECOND, GST_SEEK_TYPE_NONE, -1));
-  }
-}
-
 TEST_P(EveryFormat, SeeksToBothEnds) {
   const auto events = some_events();
   const TemporaryFile file(file_of(format(), events));

@@ -39,13 +39,6 @@ Events some_events() {
   return events;
 }
 
-Events from(const Events& events, Microseconds start, Microseconds end) {
-  Events found;
-  std::ranges::copy_if(events, std::back_inserter(found),
-                       [&](const auto& event) { return event.t >= start && event.t < end; });
-  return found;
-}
-
 class Folder {
  public:
   Folder()
@@ -97,69 +90,11 @@ Events read(const std::string& path) {
   return events;
 }
 
-TEST_P(Hdf5, IsReadPulledAndPushed) {
-  const auto events = some_events();
-  const auto path = written(events);
-  for (const auto& launch :
-       {"filesrc location=" + in_quotes(path) + " ! eventhdf5dec",
-        "filesrc location=" + in_quotes(path) + " ! queue ! eventhdf5dec",
-        "filesrc blocksize=777 location=" + in_quotes(path) + " ! identity ! eventhdf5dec"}) {
-    SCOPED_TRACE(launch);
-    Player player(launch);
-    for (int times = 0; times < 2; ++times) {
-      ASSERT_TRUE(player.play()) << player.error;
-      EXPECT_TRUE(player.events == events) << player.events.size();
-      EXPECT_EQ(player.buffers, 100);
-      EXPECT_TRUE(player.warnings.empty());
-      ASSERT_TRUE(player.reaches(times == 0 ? GST_STATE_READY : GST_STATE_NULL));
-    }
-  }
-}
-
-TEST_P(Hdf5, IsFoundByDecodebin) {
-  const auto events = some_events();
-  Player player("filesrc location=" + in_quotes(written(events)) +
-                " ! decodebin caps=application/x-event-camera");
-  ASSERT_TRUE(player.play()) << player.error;
-  EXPECT_TRUE(player.events == events);
-}
-
 TEST_P(Hdf5, CutsByBufferTime) {
   Player player("filesrc location=" + in_quotes(written(some_events())) +
                 " ! eventhdf5dec buffer-duration=100000000");
   ASSERT_TRUE(player.play()) << player.error;
   EXPECT_EQ(player.buffers, 10);
-}
-
-TEST_P(Hdf5, IsSoughtIn) {
-  const auto events = some_events();
-  Player player("filesrc location=" + in_quotes(written(events)) + " ! eventhdf5dec");
-  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-  EXPECT_EQ(player.duration(),
-            static_cast<GstClockTime>(events.back().t - events.front().t + 1) * GST_USECOND);
-  for (const Microseconds start : {3'700'000, 100'000, 0, 499'999, 2'000'000, 3'999'000}) {
-    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-    ASSERT_TRUE(player.seek(static_cast<GstClockTime>(start) * 1000, 3'999'990 * GST_USECOND));
-    ASSERT_TRUE(player.play()) << player.error;
-    EXPECT_TRUE(player.events == from(events, 2'000'000 + start, 5'999'990)) << start;
-  }
-  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-  ASSERT_TRUE(player.seek(0, 100 * GST_MSECOND, GST_SEEK_FLAG_SEGMENT));
-  ASSERT_TRUE(player.play()) << player.error;
-  EXPECT_EQ(player.end, GST_MESSAGE_SEGMENT_DONE);
-  EXPECT_TRUE(player.events == from(events, 2'000'000, 2'100'000));
-}
-
-TEST_P(Hdf5, IsSoughtInWhilePlaying) {
-  Player player("filesrc location=" + in_quotes(written(some_events())) + " ! eventhdf5dec");
-  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-  player.set(GST_STATE_PLAYING);
-  std::mt19937 random(3);
-  for (int i = 0; i < 60; ++i) {
-    ASSERT_TRUE(player.seek(random() % 3900 * GST_MSECOND));
-    if (i % 4 == 0) g_usleep(1000);
-  }
-  EXPECT_TRUE(player.wait()) << player.error;
 }
 
 TEST_P(Hdf5, IsEmptyWhereThereAreNoEvents) {

@@ -40,7 +40,7 @@ INSTANTIATE_TEST_SUITE_P(
     , EverySimulator,
     testing::Values(Defaults{"eventsim-frame", 20, false}, Defaults{"eventsim-dense", 2, true},
                     Defaults{"eventsim-sparse", 10, true}, Defaults{"eventsim-diff", 20, true},
-                    Defaults{"eventsim-dvs", 0.2, false, 0.1},
+                    Defaults{"eventsim-dvs", 0.26, false, 0.1},
                     Defaults{"gleventsim-frame", 20, false}, Defaults{"gleventsim-dense", 2, true},
                     Defaults{"gleventsim-sparse", 10, true},
                     Defaults{"gleventsim-diff", 20, true}));
@@ -283,7 +283,7 @@ TEST(Dvs, CountsTimeInNanoseconds) {
     EXPECT_EQ(G_PARAM_SPEC_UINT64(spec)->maximum, GST_SECOND) << name;
     EXPECT_NE(std::string(g_param_spec_get_blurb(spec)).find("(ns)"), std::string::npos) << name;
   }
-  Harness h("eventsim-dvs pixel-latency=7000000");
+  Harness h("eventsim-dvs preset=ideal pixel-latency=7000000");
   h.caps("video/x-raw, format=GRAY8, width=8, height=8, framerate=25/1");
   h.push(h.flat(0, 20));
   h.push(h.flat(40 * GST_MSECOND, 200));

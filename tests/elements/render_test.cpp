@@ -617,20 +617,6 @@ TEST_F(Render, DrawsIntoBuffersOfDownstreamAsItsPoolWants) {
   gst_object_unref(pool);
 }
 
-TEST_F(Render, IsFreedWhileInUse) {
-  for (int buffers = 0; buffers < 4; ++buffers) {
-    bool freed = false;
-    {
-      Harness other("eventrender");
-      tell_when_freed(other.element(), freed);
-      gst_harness_set_sink_caps_str(other.get(), grey_at("25/1").c_str());
-      gst_harness_set_src_caps_str(other.get(), events_caps.c_str());
-      for (int i = 0; i < buffers; ++i) other.push(buffer_of(i * 40 * ms, column(i), 40 * ms));
-    }
-    EXPECT_TRUE(freed) << buffers;
-  }
-}
-
 TEST(RenderPipeline, SaysWhatToDoIfDownstreamWantsAnotherSize) {
   Pipeline pipeline(
       "videotestsrc num-buffers=3 ! eventsim-diff ! eventrender ! "

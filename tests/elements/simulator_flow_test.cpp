@@ -117,7 +117,7 @@ INSTANTIATE_TEST_SUITE_P(
     , EverySimulator,
     testing::Values(Simulator{"eventsim-dense", 2, FlowMethod::dis_lq},
                     Simulator{"eventsim-dense interpolation=blend", 2, FlowMethod::dis_lq},
-                    Simulator{"eventsim-dvs upsampling=motion", 0, FlowMethod::dis_mq}));
+                    Simulator{"eventsim-dvs preset=ideal upsampling=motion", 0, FlowMethod::dis_mq}));
 
 TEST_P(EverySimulator, UsesTheFlowOfItsFrames) {
   const auto expected = own_events();
@@ -217,7 +217,7 @@ TEST(FlowOfFrames, IsUsedForPictures) {
 }
 
 TEST(FlowOfFrames, IsNotWrittenWhereNoneIsNeeded) {
-  Harness h("eventsim-dvs write-flow=true");
+  Harness h("eventsim-dvs upsampling=linear write-flow=true");
   h.caps(video);
   for (int i = 0; i < 2; ++i) h.push(frame_of(i, Image<Flow>(width, height)));
   EXPECT_EQ(flow_of(h.pull().get()), "");

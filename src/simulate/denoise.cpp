@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/dvs/denoise.hpp"
+#include "src/simulate/denoise.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/dvs/denoise.cpp"
+#define HWY_TARGET_INCLUDE "src/simulate/denoise.cpp"
 #include <hwy/foreach_target.h>
 // Must come after HWY_TARGET_INCLUDE.
 #include <hwy/highway.h>

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "src/core/image.hpp"
+#include "src/core/luma.hpp"
+#include "src/core/thread_pool.hpp"
+
+namespace eventcamera {
+
+/// Settings::denoise: smooth as much as the noise of the frames needs.
+constexpr double automatic_denoise = -1;
+
+/// Standard deviation of the noise of a frame camera, in grey levels (white is 255). Each pair of
+/// frames gives an estimate: the differences within blocks of 8x8 pixels, without their mean, which
+/// is a change of light. The block at the first fifth counts, since many blocks may move. Blocks
+/// near black or white do not count, nor do repeated frames.
+class NoiseLevel {
+ public:
+  /// Forgets all frames.
+  void restart() { *this = {}; }
+
+  /// Compares a frame with the previous one, of the same format.
+  void update(const LumaView& frame);
+
+  /// Median of the last estimates; 0 before the first.
+  double sigma() const;
+
+ private:
+  template <class Pixel>
+  void update(const ImageView<Pixel>& frame, double white);
+
+  std::vector<std::uint16_t> last_;  ///< blocks of the previous frame
+  std::vector<float> variances_;     ///< of the differences in blocks that count
+  std::array<double, 5> estimates_{};
+  std::size_t count_ = 0;  ///< of all estimates
+};
+
+/// Removes the noise of the frame camera, which an event camera would not see.
+class Denoiser {
+ public:
+  explicit Denoiser(const LumaFormat& format) : format_(format) {}
+
+  /// Forgets all frames.
+  void restart();
+
+  /// Largest difference between neighbouring pixels to smooth, in grey levels: `setting`, or what
+  /// the noise of the frames needs, which is unknown for a first frame; that is kept.
+  double amplitude_for(const LumaView& frame, double setting);
+
+  /// The first frame, denoised, once its noise is known; none if it was not kept, or has no noise.
+  std::optional<LumaView> kept_first(double amplitude, ThreadPool& threads);
+
+  /// Smooths differences up to `amplitude` grey levels. Returns a view that is valid until the next
+  /// call: of `frame` itself if there is nothing to do.
+  LumaView denoised(const LumaView& frame, double amplitude, ThreadPool& threads);
+
+ private:
+  void keep(const LumaView& frame);
+
+  LumaFormat format_;
+  NoiseLevel noise_;
+  bool is_first_ = true;
+  std::optional<LumaView> first_;  ///< until its noise is known
+  std::vector<std::byte> kept_;    ///< its pixels
+  Image<std::uint8_t> bytes_;
+  Image<std::uint16_t> words_;
+};
+
+}  // namespace eventcamera

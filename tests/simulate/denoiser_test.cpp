@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// The estimate of the frame camera's noise, and what a simulator makes of it.
+#include "src/simulate/denoiser.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "src/simulate/frame_simulator.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+constexpr int width = 160;
+constexpr int height = 120;
+
+/// Frames of a texture that moves, but for a still part, with noise of `sigma` grey levels.
+template <class Pixel = std::uint8_t>
+class Scene {
+ public:
+  explicit Scene(double sigma, int bits = 8) : sigma_(sigma), bits_(bits) {}
+
+  LumaView frame(int moved, int still_rows = height / 3, double offset = 0) {
+    std::normal_distribution<double> noise(0, 1);
+    const double scale = ((1 << bits_) - 1) / 255.0;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        const int at = y < still_rows ? x : x + moved;
+        const double grey = 120 + 60 * std::sin(at * 0.7) + offset + sigma_ * noise(random_);
+        image_.at(x, y) = static_cast<Pixel>(std::lround(std::clamp(grey, 0.0, 255.0) * scale));
+      }
+    return {{width, height, bits_}, image_.row(0), image_.stride()};
+  }
+
+ private:
+  double sigma_;
+  int bits_;
+  std::mt19937 random_{1};
+  Image<Pixel> image_{width, height};
+};
+
+TEST(NoiseLevel, IsThatOfTheStillPart) {
+  for (const double sigma : {1.0, 2.0, 4.0, 8.0}) {
+    Scene scene(sigma);
+    NoiseLevel level;
+    for (int i = 0; i < 6; ++i) level.update(scene.frame(3 * i));
+    EXPECT_NEAR(level.sigma(), sigma, 0.1 + 0.1 * sigma);
+  }
+}
+
+TEST(NoiseLevel, DoesNotDependOnTheBitDepth) {
+  Scene<std::uint16_t> scene(4, 12);
+  NoiseLevel level;
+  for (int i = 0; i < 6; ++i) level.update(scene.frame(3 * i));
+  EXPECT_NEAR(level.sigma(), 4, 0.5);
+}
+
+TEST(NoiseLevel, IsZeroWithoutNoise) {
+  Scene scene(0);
+  NoiseLevel level;
+  for (int i = 0; i < 6; ++i) level.update(scene.frame(3 * i));
+  EXPECT_EQ(level.sigma(), 0);
+}
+
+TEST(NoiseLevel, IgnoresRepeatedFramesAndChangesOfLight) {
+  Scene scene(4);
+  NoiseLevel level;
+  for (int i = 0; i < 8; ++i) {
+    const auto frame = scene.frame(0, height, i % 2 * 20);
+    for (int repetition = 0; repetition < 3; ++repetition) level.update(frame);
+  }
+  EXPECT_NEAR(level.sigma(), 4, 0.5);
+}
+
+TEST(NoiseLevel, IgnoresBlackAndTinyFrames) {
+  NoiseLevel level;
+  Scene scene(2);
+  for (int i = 0; i < 6; ++i) level.update(scene.frame(0, height, -300));
+  EXPECT_EQ(level.sigma(), 0);
+  Image<std::uint8_t> tiny(7, 3);
+  for (int i = 0; i < 3; ++i) {
+    tiny.at(2, 1) = static_cast<std::uint8_t>(i * 50);
+    level.update({{7, 3, 8}, tiny.row(0), tiny.stride()});
+  }
+  EXPECT_EQ(level.sigma(), 0);
+}
+
+TEST(NoiseLevel, FollowsChanges) {
+  NoiseLevel level;
+  Scene loud(8);
+  for (int i = 0; i < 8; ++i) level.update(loud.frame(0));
+  Scene quiet(1);
+  for (int i = 0; i < 5; ++i) level.update(quiet.frame(0));
+  EXPECT_NEAR(level.sigma(), 1, 0.2);
+}
+
+/// Events of `frames` frames of a still scene.
+std::size_t events_of(double sigma, double denoise, int frames = 6) {
+  Scene scene(sigma);
+  const auto simulator = make_frame_simulator({width, height, 8});
+  std::size_t count = 0;
+  for (int i = 0; i < frames; ++i)
+    if (const auto* events = simulator->push(
+            scene.frame(0, height), (i + 1) * 40'000'000,
+            {.positive_threshold = 10, .negative_threshold = 10, .denoise = denoise}))
+      count += events->size();
+  return count;
+}
+
+TEST(Denoiser, QuietensAStillSceneFromTheFirstIntervalOn) {
+  for (const int frames : {2, 6}) {
+    const auto noisy = events_of(4, 0, frames);
+    EXPECT_GT(noisy, 500U * (frames - 1));
+    EXPECT_LT(events_of(4, automatic_denoise, frames), noisy / 5);
+  }
+}
+
+TEST(Denoiser, ChangesNothingWithoutNoise) {
+  Scene scene(0);
+  const auto off = make_frame_simulator({width, height, 8});
+  const auto automatic = make_frame_simulator({width, height, 8});
+  for (int i = 0; i < 4; ++i) {
+    const auto frame = scene.frame(3 * i);
+    const Nanoseconds time = (i + 1) * 40'000'000;
+    const auto* expected = off->push(frame, time, {});
+    const auto* events = automatic->push(frame, time, {.denoise = automatic_denoise});
+    ASSERT_EQ(events != nullptr, expected != nullptr);
+    if (events != nullptr) {
+      EXPECT_EQ(events->size(), expected->size());
+    }
+  }
+}
+
+}  // namespace
