@@ -199,7 +199,7 @@ def simulate(video, path):
             pipeline.element("file").set_property("location", utf8_path(path))
         for sample in pipeline.samples():
             figures.add(events_of(sample))
-            while array and (tensor := pipeline.element("tensors").try_pull_sample(0)):
+            while array and (tensor := pipeline.element("tensors").emit("try-pull-sample", 0)):
                 array.append(tensor_of(tensor))
         for tensor in pipeline.samples("tensors") if array else ():
             array.append(tensor_of(tensor))

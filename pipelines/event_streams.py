@@ -162,8 +162,8 @@ def samples_of(description, feeds=()):
         pipeline.set_state(Gst.State.PLAYING)
         for name, _, buffers in feeds:
             for buffer in buffers:
-                pipeline.element(name).push_buffer(buffer)
-            pipeline.element(name).end_of_stream()
+                pipeline.element(name).emit("push-buffer", buffer)
+            pipeline.element(name).emit("end-of-stream")
         yield from pipeline.samples()
 
 

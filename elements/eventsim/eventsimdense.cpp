@@ -21,7 +21,7 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 filesrc location=drive.mp4 ! decodebin ! eventsim-dense flow=dis-hq ! videoconvert
- * ! vp8enc deadline=1 ! webmmux ! filesink location=events.webm
+ * ! vp8enc deadline=1 target-bitrate=4000000 ! webmmux ! filesink location=events.webm
  * ]|
  *
  * Since: 0.1

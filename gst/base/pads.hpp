@@ -7,6 +7,18 @@
 
 #include "gst/base/owned.hpp"
 
+/// Name of a custom query that simulators answer: the events come from video.
+inline constexpr char simulated_query[] = "event-simulated";
+
+/// True if the events of a sink pad are simulated, not recorded.
+inline bool is_simulated(GstPad* sink) {
+  GstQuery* const query =
+      gst_query_new_custom(GST_QUERY_CUSTOM, gst_structure_new_empty(simulated_query));
+  const bool is = gst_pad_peer_query(sink, query) != FALSE;
+  gst_query_unref(query);
+  return is;
+}
+
 /// For class_init: adds a pad template. GstAggregator requires pads of GST_TYPE_AGGREGATOR_PAD.
 inline void add_pad_template(GstElementClass* klass, const char* name, GstPadDirection direction,
                              const OwnedCaps& caps, GstPadPresence presence = GST_PAD_ALWAYS,

@@ -215,6 +215,9 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
     }
     case GST_EVENT_SEGMENT:
       if (!plays_forwards(self, event, "write")) return FALSE;
+      priv_of(self).writable.begin_segment(segment_of(event), priv_of(self).file &&
+                                                                  is_file(*priv_of(self).file) &&
+                                                                  is_simulated(pad));
       break;
     case GST_EVENT_EOS:
       end_file(self);

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/writable_events.hpp"
 
+#include <algorithm>
 #include <new>
 #include <stdexcept>
+#include <utility>
 
 #include "src/formats/temporary_file.hpp"
 
@@ -16,6 +18,7 @@ using eventcamera::TemporaryFileError;
 void WritableEvents::begin_file(SensorSize sensor) {
   sensor_ = sensor;
   latest_ = 0;
+  segment_begun_ = false;
   earlier_ = outside_ = {};
   *written_.lock() = {};
 }
@@ -29,6 +32,18 @@ bool WritableEvents::accepts(SensorSize sensor) const {
                     "height where the events are read."},
                "new caps after events were written");
   return false;
+}
+
+void WritableEvents::begin_segment(const GstSegment& segment, bool in_stream_time) {
+  segment_begun_ = true;
+  const bool is_known = segment.format == GST_FORMAT_TIME && segment.start <= G_MAXINT64 &&
+                        segment.time <= G_MAXINT64;
+  offset_ = in_stream_time && is_known ? GST_CLOCK_DIFF(segment.start, segment.time) : 0;
+}
+
+Microseconds WritableEvents::time_of(GstClockTime pts) const {
+  const auto time = static_cast<GstClockTimeDiff>(std::min<GstClockTime>(pts, G_MAXINT64));
+  return std::max<GstClockTimeDiff>(time + std::min(offset_, G_MAXINT64 - time), 0) / 1000;
 }
 
 void WritableEvents::report_buffer(GstBuffer* buffer) const {
@@ -47,6 +62,11 @@ std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> event
                                                     std::span<const Label> labels) {
   picked_.clear();
   picked_labels_.clear();
+  if (!events.empty() && std::exchange(segment_begun_, false) && start + events[0].t < latest_)
+    throw std::invalid_argument("times start over at " + std::to_string(start + events[0].t) +
+                                " us in another segment, and events until " +
+                                std::to_string(latest_) +
+                                " us are written; write each recording to a file of its own");
   std::size_t before_last_dropped = 0;
   for (const auto& event : events) {
     const AbsoluteEvent absolute{start + event.t, event.x, event.y_p};

@@ -55,13 +55,23 @@ class WritableEvents {
     for (std::size_t done = 0; done < mapped.events().size(); done += block) {
       const auto size = std::min(mapped.events().size() - done, block);
       const auto few = mapped.events().subspan(done, size);
-      write_block(pick(few, mapped.start(), labels.empty() ? labels : labels.subspan(done, size)));
+      write_block(pick(few, time_of(GST_BUFFER_PTS(buffer)),
+                       labels.empty() ? labels : labels.subspan(done, size)));
     }
     return true;
   }
 
+  /// Starts a segment of the input. Its events must not be earlier than those written before:
+  /// another recording, such as from concat, is not dropped event by event. With `in_stream_time`,
+  /// a file counts from the time that players of the video call 0.
+  void begin_segment(const GstSegment& segment, bool in_stream_time);
+
+  /// Time in the file of a timestamp of the segment.
+  eventcamera::Microseconds time_of(GstClockTime pts) const;
+
   /// Returns the writable ones of `events`, whose times are relative to `start`. Valid until the
-  /// next call. `labels` has one for each event, or none.
+  /// next call. `labels` has one for each event, or none. Throws std::invalid_argument if times
+  /// start over in a new segment.
   std::span<const eventcamera::AbsoluteEvent> pick(std::span<const eventcamera::Event> events,
                                                    eventcamera::Microseconds start,
                                                    std::span<const eventcamera::Label> labels = {});
@@ -105,6 +115,8 @@ class WritableEvents {
   GstStreamError code_;
   eventcamera::SensorSize sensor_;
   eventcamera::Microseconds latest_ = 0;  ///< latest time written
+  bool segment_begun_ = false;            ///< since the last event
+  GstClockTimeDiff offset_ = 0;           ///< of times in the file, ns
   std::vector<eventcamera::AbsoluteEvent> picked_;
   std::vector<eventcamera::Label> picked_labels_;
   Dropped earlier_;

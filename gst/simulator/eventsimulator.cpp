@@ -248,6 +248,9 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
   const bool is_serialized =
       (gst_query_type_get_flags(GST_QUERY_TYPE(query)) & GST_QUERY_TYPE_SERIALIZED) != 0;
   if (direction == GST_PAD_SINK && is_serialized) simulation_of(transform).finish();
+  if (direction == GST_PAD_SRC && GST_QUERY_TYPE(query) == GST_QUERY_CUSTOM &&
+      gst_structure_has_name(gst_query_get_structure(query), simulated_query))
+    return TRUE;
   if (direction == GST_PAD_SRC && GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
     return answer_latency(GST_CAT_DEFAULT, GST_BASE_TRANSFORM_SINK_PAD(transform), query,
                           simulation_of(transform).latency());

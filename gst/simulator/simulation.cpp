@@ -92,7 +92,23 @@ bool Simulation::set_caps(GstCaps* in, GstCaps* out) {
   draws_ = state_->draws;
   stream_.interval.expect(static_cast<Nanoseconds>(frame_duration(video)));
   update_latency(before);
+  if (!state_->draws) check_sink();
   return true;
+}
+
+/// Warns of a file that gets the events without the times of their buffers.
+void Simulation::check_sink() {
+  const OwnedPad peer(gst_pad_get_peer(GST_BASE_TRANSFORM_SRC_PAD(element_)));
+  const OwnedElement sink(peer ? gst_pad_get_parent_element(peer.get()) : nullptr);
+  const gchar* const klass =
+      sink ? gst_element_get_metadata(sink.get(), GST_ELEMENT_METADATA_KLASS) : nullptr;
+  if (klass == nullptr || !g_str_equal(klass, "Sink/File")) return;
+  stream_.warn_of_bare_file(
+      element_,
+      {GST_STREAM_ERROR_FORMAT,
+       "A file of these buffers cannot be read: event times count from the start of a buffer, "
+       "which is not in it. Insert a writer of event files, such as eventnpzenc, before the file."},
+      std::string("linked to ") + GST_OBJECT_NAME(sink.get()));
 }
 
 /// Ensures that there is a state. Errors drop it while the pads keep their caps; if the application
@@ -552,18 +568,24 @@ void Simulation::hold_last_frame(GstClockTime next) {
 }
 
 /// Holds the last frame until `end` and pushes the events of that time, and GAPs where there are
-/// none. In parts, as a pixel has a maximum number of events in each. May throw.
+/// none. In parts, as a pixel has a maximum number of events in each. Noise ends after a minute:
+/// the source has been away, and hours of noise would fill the disk. May throw.
 void Simulation::hold_until(Nanoseconds end, guint32 seqnum) {
   constexpr auto max_part = Nanoseconds{250 * GST_MSECOND};
+  constexpr auto max_noise = Nanoseconds{60 * GST_SECOND};
   auto& simulator = state_->simulator();
   auto& flow = stream_.flow;
   stream_.motion.reset();  // the interval of the next frame is shorter
   Nanoseconds sent = *simulator.last_time();
-  for (Nanoseconds start = sent; start < end && flow == GST_FLOW_OK;) {
-    const Nanoseconds part_end = std::min(start + max_part, end);
+  const Nanoseconds noise_end = std::min(end, sent + max_noise);
+  bool has_noise = false;
+  for (Nanoseconds start = sent; start < noise_end && flow == GST_FLOW_OK;) {
+    if (GST_PAD_IS_FLUSHING(GST_BASE_TRANSFORM_SRC_PAD(element_))) flow = GST_FLOW_FLUSHING;
+    const Nanoseconds part_end = std::min(start + max_part, noise_end);
     sync_controlled_properties(static_cast<GstClockTime>(part_end));
     const EventBuckets* events = simulator.hold_until(part_end, begin_interval().simulation);
     stream_.pushed_until = part_end;
+    has_noise |= events != nullptr && events->size() > 0;
     if (events != nullptr && events->size() > 0) {
       if (sent < start) flow = push_gap(sent, start, seqnum);
       const OwnedBuffer in(gst_buffer_new());
@@ -576,6 +598,15 @@ void Simulation::hold_until(Nanoseconds end, guint32 seqnum) {
     }
     start = part_end;
   }
+  if (noise_end < end && has_noise)
+    stream_.warn_of_long_gap(
+        element_,
+        {GST_STREAM_ERROR_FORMAT,
+         "The video pauses for more than a minute: the rest of such a pause has no noise."},
+        "a gap of " + std::to_string((end - noise_end + max_noise) / Nanoseconds{GST_SECOND}) +
+            " s");
+  simulator.skip_until(end);
+  stream_.pushed_until = end;
   if (sent < end && flow == GST_FLOW_OK) flow = push_gap(sent, end, seqnum);
 }
 

@@ -141,7 +141,9 @@ class Simulation {
     WarnOnce warn_of_no_pts{event_simulator_debug};
     WarnOnce warn_of_times{event_simulator_debug};
     WarnOnce warn_of_equal_times{event_simulator_debug};
+    WarnOnce warn_of_long_gap{event_simulator_debug};
     WarnOnce warn_of_interlacing{event_simulator_debug};
+    WarnOnce warn_of_bare_file{event_simulator_debug};
     WarnOnce warn_of_orientation{event_simulator_debug};
   };
 
@@ -162,6 +164,7 @@ class Simulation {
   Nanoseconds time_of(GstBuffer* frame);
   const char* fault_of_time(Nanoseconds time) const;
   void check_interlacing(GstBuffer* frame);
+  void check_sink();
   void warn_of_times(const char* what);
   void sync_controlled_properties(GstClockTime time);
   SimulatorSettings begin_interval();

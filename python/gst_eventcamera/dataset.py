@@ -187,12 +187,12 @@ def _feed(pipeline: Pipeline, frames: Iterator[np.ndarray], recipe: Recipe) -> N
     def push(source: Gst.Element, _: int) -> None:
         number, frame = next(numbered, (0, None))
         if frame is None:
-            source.end_of_stream()
+            source.emit("end-of-stream")
             return
         rows = np.pad(frame, ((0, 0), (0, -width % 4)))  # as GStreamer pads them
         buffer = Gst.Buffer.new_wrapped(rows.tobytes())
         buffer.pts, buffer.duration = round(number * duration), round(duration)
-        source.push_buffer(buffer)
+        source.emit("push-buffer", buffer)
 
     source = pipeline.element("window")
     source.set_property("caps", Gst.Caps.from_string(

@@ -16,7 +16,9 @@ class Events(np.ndarray):
     (uint16, from the top left) and p (bool, True = ON).
 
     width, height: of the sensor, in pixels; 0 if not known.
-    start, end: of the time that the events are from, in seconds. A slice keeps those of the whole.
+    start, end: of the time that the events are from, in seconds, as in `t`. A slice keeps those of the whole.
+    stream_start: `start` as players count, in seconds; differs for videos whose timestamps do not begin at 0, such as
+        MP4 with B-frames, and for recordings. Files written from a simulation begin at this time.
     cause, object_class: labels of the events, uint8 and uint16 of the same shape, where an element has
     labelled them (GstEventCameraLabel); else None. They follow an index, a slice, copy() and sort();
     functions of NumPy that move rows by themselves, such as np.random.shuffle(), leave them behind.
@@ -26,12 +28,14 @@ class Events(np.ndarray):
     height: int
     start: float
     end: float
+    stream_start: float
     cause: Optional[np.ndarray]
     object_class: Optional[np.ndarray]
 
     def __new__(cls, count: int, width: int = 0, height: int = 0, start: float = 0, end: float = 0) -> Events:
         events = super().__new__(cls, (count,), EVENT)
         events.width, events.height, events.start, events.end = width, height, start, end
+        events.stream_start = start
         return events
 
     def __array_finalize__(self, source: Any) -> None:
@@ -39,6 +43,7 @@ class Events(np.ndarray):
         self.height = getattr(source, "height", 0)
         self.start = getattr(source, "start", 0.0)
         self.end = getattr(source, "end", 0.0)
+        self.stream_start = getattr(source, "stream_start", 0.0)
         self.cause = self.object_class = None
 
     def __getitem__(self, index: Any) -> Any:
@@ -103,6 +108,7 @@ def join(chunks: Iterable[Events]) -> Events:
         return Events(0)
     width, height = max(part.width for part in parts), max(part.height for part in parts)
     events = Events(sum(map(len, parts)), width, height, parts[0].start, parts[-1].end)
+    events.stream_start = parts[0].stream_start
     np.concatenate(parts, out=events)
     filled = [part for part in parts if len(part) > 0]
     if filled and all(part.cause is not None for part in filled):

@@ -14,11 +14,11 @@ import gi
 import numpy as np
 
 try:
-    for namespace in ("Gst", "GstApp", "GstEventCamera"):
+    for namespace in ("Gst", "GstEventCamera"):
         gi.require_version(namespace, "1.0")
 except ValueError as missing:
     raise ImportError(f"{missing}; on Debian, install: gir1.2-gst-plugins-base-1.0 gir1.2-gsteventcamera-1.0") from None
-from gi.repository import GLib, Gst, GstApp, GstEventCamera  # noqa: E402, F401
+from gi.repository import GLib, Gst, GstEventCamera  # noqa: E402
 
 from .events import EVENT, Events  # noqa: E402
 
@@ -192,8 +192,9 @@ class Pipeline:
         """Plays to the end, and yields the samples of an appsink."""
         source = self.element(sink)
         self.set_state(Gst.State.PLAYING)
-        while not source.is_eos():
-            if sample := source.try_pull_sample(MAX_WAIT):
+        # By properties and signals: the class of an appsink made before GstApp was imported lacks its methods.
+        while not source.get_property("eos"):
+            if sample := source.emit("try-pull-sample", MAX_WAIT):
                 self._handle_messages()
                 yield sample
             else:
@@ -277,6 +278,8 @@ def events_of(sample: Gst.Sample) -> Events:
     events = np.frombuffer(bytearray(unpacked.get_data() or b""), EVENT).view(Events)
     events.width, events.height = sensor_size(sample.get_caps())
     events.start, events.end = start, start + duration
+    stream_time = sample.get_segment().to_stream_time(Gst.Format.TIME, buffer.pts)
+    events.stream_start = start if stream_time == Gst.CLOCK_TIME_NONE else stream_time / 1e9
     if labels := GstEventCamera.buffer_get_event_camera_label_meta(buffer) if len(events) > 0 else None:
         fields = np.frombuffer(labels.get_bytes().get_data(), LABEL)
         events.cause, events.object_class = fields["cause"].copy(), fields["object_class"].copy()

@@ -276,10 +276,10 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
         for buffer in _buffers(events):
             while source.get_property("current-level-bytes") > MAX_QUEUED:
                 pipeline.raise_error(wait=LOOK)
-            if source.push_buffer(buffer) != Gst.FlowReturn.OK:
+            if source.emit("push-buffer", buffer) != Gst.FlowReturn.OK:
                 pipeline.raise_error()
                 raise PipelineError(f"{path} cannot be written")
-        source.end_of_stream()
+        source.emit("end-of-stream")
         pipeline.wait()
 
 

@@ -77,6 +77,9 @@ class IntervalSimulator {
   /// without any change (noise), valid until the next call; nullptr if the simulator has none.
   const EventBuckets* hold_until(Nanoseconds time, const Settings& settings = {});
 
+  /// Continues at `time`, which must not be before the last frame, as if no time had passed.
+  void skip_until(Nanoseconds time) { last_time_ = time; }
+
   /// True if the events of the last interval have labels, which label() writes.
   bool has_labels() const { return labels_; }
 

@@ -613,7 +613,26 @@ TEST(Depayloader, TellsOfLosses) {
   EXPECT_EQ(stat_of(h.element(), "lost-packets"), 2);
   EXPECT_EQ(stat_of(h.element(), "late-packets"), 1);
   EXPECT_EQ(stat_of(h.element(), "packets"), 4);
+  const auto told = h.message(GST_MESSAGE_ELEMENT);
+  ASSERT_TRUE(told);
+  EXPECT_TRUE(gst_message_has_name(told.get(), "event-packets-lost"));
   EXPECT_EQ(h.warning(), "");
+}
+
+TEST(Depayloader, SaysThatItHearsNothing) {
+  for (const char* receiver :
+       {"eventdatagramdepay format=jaer width=64 height=48",
+        "application/x-rtp,media=application,clock-rate=1000000,encoding-name=X-EVENT-CAMERA,"
+        "width=64,height=48 ! rtpeventdepay"}) {
+    Pipeline pipeline(std::string("udpsrc address=127.0.0.1 port=0 ! ") + receiver +
+                      " ! fakesink async=false");
+    pipeline.set(GST_STATE_PLAYING);
+    const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+    const Owned<GstMessage> message(
+        gst_bus_timed_pop_filtered(bus.get(), 60 * GST_SECOND, GST_MESSAGE_WARNING));
+    ASSERT_TRUE(message) << receiver;
+    EXPECT_NE(text_of(message.get()).find("No packets for 3 seconds"), std::string::npos);
+  }
 }
 
 TEST(Depayloader, TellsOfLossesBeforeDatagramsWithoutEvents) {

@@ -63,8 +63,6 @@ TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
     h.write(events, 0);
   };
   push({3000});
-  // Another segment with earlier times.
-  push_segment(h.get());
   for (int times = 0; times < 3; ++times) push({1000, 2000});
   EXPECT_EQ(h.warning(), "");
   push({2000, 4000, 5000});
@@ -77,6 +75,38 @@ TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
   for (const auto& event : events_in(format(), h.end())) written.push_back(event.t);
   EXPECT_TRUE(h.warning().starts_with("Left out 10 events in total earlier"));
   EXPECT_EQ(written, (std::vector<Microseconds>{3000, 4000, 5000, 6000}));
+}
+
+/// As from concat.
+TEST_P(EveryFormat, RefusesARecordingAfterAnother) {
+  Writer h(format());
+  h.write(AbsoluteEvent::at(5, 5, 3000, Polarity::on), 0);
+  push_segment(h.get());
+  h.write(AbsoluteEvent::at(5, 5, 3000, Polarity::on), 0);  // times go on
+  EXPECT_EQ(h.error(), "");
+  push_segment(h.get());
+  EXPECT_EQ(h.push(buffer_of(Events{AbsoluteEvent::at(5, 5, 2000, Polarity::on)}, 0)),
+            GST_FLOW_ERROR);
+  EXPECT_NE(h.error().find("start over at 2000 us"), std::string::npos);
+}
+
+/// As from MP4 with B-frames or an edit list: timestamps begin at 67 ms, players count from 0.
+TEST(Writers, CountSimulatedEventsInStreamTime) {
+  for (const std::string passed : {"", "! eventpolarity "}) {
+    Harness h("eventsim-frame " + passed + "! eventcsvenc");
+    h.caps("video/x-raw, format=GRAY8, width=8, height=4, framerate=25/1", "ANY");
+    GstSegment segment;
+    gst_segment_init(&segment, GST_FORMAT_TIME);
+    segment.start = 66'666'667;
+    gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+    h.push(h.flat(segment.start, 50));
+    h.push(h.flat(segment.start + 40 * GST_MSECOND, 200));
+    gst_harness_push_event(h.get(), gst_event_new_eos());
+    std::string text;
+    h.wait_for_events();
+    while (const auto buffer = h.pull()) text += bytes_of(buffer.get());
+    EXPECT_NE(text.find("\n40000,"), std::string::npos) << text.substr(0, 200);
+  }
 }
 
 TEST_P(EveryFormat, TellsOfEventsLeftOutWhereItIsStopped) {

@@ -273,6 +273,8 @@ TEST_P(EveryFormat, CountsLossDuplicationAndReordering) {
     }
     EXPECT_EQ(stat_of(h.element(), "events"), received.size());
     EXPECT_EQ(stat_of(h.element(), "lost-events"), all.size() - received.size());
+    EXPECT_EQ(h.message(GST_MESSAGE_ELEMENT) != nullptr, stat_of(h.element(), "lost-packets") > 0);
+    EXPECT_FALSE(h.message(GST_MESSAGE_ELEMENT));  // one is enough
     EXPECT_EQ(stat_of(h.element(), "lost-packets"), sent.size() - stat_of(h.element(), "packets"));
     EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 0U);
     EXPECT_GT(output.discontinuities, loss > 1 ? 2 : 0);

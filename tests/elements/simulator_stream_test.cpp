@@ -332,6 +332,15 @@ TEST(Stream, WarnsOnceOfRotatedVideo) {
   EXPECT_EQ(h.warning(), "");
 }
 
+TEST(Stream, WarnsOfAFileWithoutTheTimesOfBuffers) {
+  for (const std::string writer : {"", "evtenc ! "}) {
+    Harness h("eventsim-frame ! " + writer + "filesink location=/dev/null async=false");
+    gst_harness_set_src_caps_str(h.get(), video(61, 43).c_str());
+    h.wait_for_events();
+    EXPECT_EQ(h.warning().find("eventnpzenc") != std::string::npos, writer.empty());
+  }
+}
+
 TEST(Stream, WarnsOfNoVideoThatIsTurnedUpright) {
   for (const char* before : {"videoflip video-direction=auto ! queue",
                              "bin.( bin.( videoflip video-direction=auto ) ! identity )"}) {

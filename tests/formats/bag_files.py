@@ -116,15 +116,29 @@ class Evt3:
         return struct.pack(f"<{len(words)}H", *words)
 
 
+def libcaer_cmp_words(base, events):
+    """Words of 16 bits, some of them vectors."""
+    words = []
+    for number, (t, x, y, p) in enumerate(events):
+        words += [t - base >> 12 & 0xFFF, 0x1000 | t - base & 0xFFF, 0x2000 | x]
+        words += [0x4000 | p << 11 | y - 3, 0x5008] if number % 2 and y >= 3 else [0x3000 | p << 11 | y]
+    return struct.pack(f"<{len(words)}H", *words)
+
+
 def packet_of(fields, events, number, encoding, evt3, restart):
     t = events[0][0]
     fields.header(t if restart else t + (t - START) // DRIFT)
     fields.put("I", HEIGHT, WIDTH)
-    fields.put("Q", number, (t - restart if restart and t >= restart else t - START + SENSOR_START) * 1000)
+    sensor_time = t - restart if restart and t >= restart else t - START + SENSOR_START
+    fields.put("Q", number, (t if encoding.startswith("libcaer") else sensor_time) * 1000)
     fields.text(encoding)
     fields.put("B", 0)
     if encoding == "evt3":
         fields.array(evt3.words(events))
+    elif encoding == "libcaer":
+        fields.array(b"".join(struct.pack("<II", x << 17 | y << 2 | p << 1 | 1, at - t) for at, x, y, p in events))
+    elif encoding == "libcaer_cmp":
+        fields.array(libcaer_cmp_words(t, events))
     else:
         fields.array(b"".join(struct.pack("<Q", p << 63 | y << 48 | x << 32 | (at - t) * 1000 + at % 7)
                               for at, x, y, p in events))
@@ -346,9 +360,13 @@ def main():
         for frame in FRAMES:
             file.write(struct.pack("<qB", *frame))
     for name, kind, encoding, image in [("evt3", "packet", "evt3", "mono8"), ("mono", "packet", "mono", "rgb8"),
+                                        ("libcaer", "packet", "libcaer", "mono8"),
+                                        ("libcaer_cmp", "packet", "libcaer_cmp", "mono8"),
                                         ("array", "array", "", "mono8"), ("prophesee", "prophesee", "", "mono8")]:
         cdr, topics = messages(Cdr, kind, encoding, image), topics_of(kind)
         write_mcap(folder / f"{name}.mcap", cdr, topics)
+        if name.startswith("libcaer"):
+            continue
         if name == "evt3":
             for compression in "lz4", "zstd":
                 write_mcap(folder / f"{name}-{compression}.mcap", cdr, topics, compression)

@@ -20,6 +20,7 @@
 #include <utility>
 
 #include "src/core/byte_order.hpp"
+#include "src/formats/compression/compressed_frames.hpp"
 #include "src/formats/ros/bag_decoder.hpp"
 #include "src/formats/ros/mcap_encoder.hpp"
 #include "tests/formats/pieces.hpp"
@@ -573,8 +574,8 @@ TEST_F(Bags, AreRefusedWithAReason) {
     std::copy_n("evt9", 4, at);
   }
   EXPECT_EQ(refusal(other),
-            "the events of topic /camera/events have the encoding \"evt9\"; evt2, evt21, evt3 and "
-            "mono can be read");
+            "the events of topic /camera/events have the encoding \"evt9\"; evt2, evt21, evt3, "
+            "libcaer, libcaer_cmp and mono can be read");
 }
 
 Bytes encoded(const McapSettings& settings, std::span<const AbsoluteEvent> events,
@@ -591,6 +592,51 @@ Bytes encoded(const McapSettings& settings, std::span<const AbsoluteEvent> event
 }
 
 constexpr SensorSize hd{1280, 720};
+
+TEST(FrameDecompressor, LimitsWhatFewBytesBecome) {
+  constexpr std::size_t size = std::size_t{1} << 26;
+  for (const auto codec : {FrameCodec::lz4, FrameCodec::zstd}) {
+    Bytes frame;
+    FrameCompressor(codec).compress(Bytes(size), frame);
+    FrameDecompressor decompressor;
+    EXPECT_TRUE(decompressor.decompress(codec, frame, size));
+    std::size_t refused = 0;
+    for (int i = 0; i < 20; ++i) refused += decompressor.decompress(codec, frame, size) ? 0 : 1;
+    if (codec == FrameCodec::zstd) EXPECT_GT(refused, 0U);  // LZ4 expands 255 times
+  }
+  ExpansionLimit limit;
+  std::uint64_t total = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const auto content = limit.of(100, size);
+    limit.count(content);
+    total += content;
+  }
+  EXPECT_LT(total, std::uint64_t{1} << 31);
+  EXPECT_EQ(limit.of(1000, 1'000'000), 1'000'000U);
+}
+
+TEST(Mcap, LosesAMessageOfAnUncompressedChunkByAFlippedBit) {
+  const auto events = random_events::make(hd, 40'000, 1, 0, {1000});
+  const auto bytes = encoded({hd, BagEvents::mono, BagCompression::none}, events, 500);
+  // Records of messages, whose size is from 10,000 bytes up, in 8 bytes.
+  std::size_t flipped = 0;
+  for (std::size_t at = 0; at + 31 < bytes.size(); ++at) {
+    const auto size = little_endian<std::uint64_t>(&bytes[at + 1]);
+    if (bytes[at] != 5 || size < 500 || size > 100'000 || at + 9 + size > bytes.size()) continue;
+    for (const std::size_t bit : {0, 10, 20, 40, 63}) {
+      auto corrupt = bytes;
+      corrupt[at + 1 + bit / 8] ^= static_cast<std::uint8_t>(1U << bit % 8);
+      const auto decoder = std::make_unique<BagDecoder>("");
+      const auto contents = decoded(*decoder, corrupt);
+      EXPECT_GE(contents.events.size(), events.size() * 9 / 10) << "bit " << bit << " at " << at;
+      EXPECT_GE(decoder->corruption().places, 1U);
+      ++flipped;
+    }
+    at += 9 + size - 1;
+    if (flipped > 100) break;
+  }
+  EXPECT_GT(flipped, 20U);
+}
 
 TEST(Mcap, ReadsBackWhatItWrites) {
   constexpr Microseconds hour = 3'600'000'000;

@@ -386,6 +386,46 @@ TEST_F(Hdf5, WhatWasCommittedSurvivesTheProcess) {
   }
 }
 
+/// Events that come faster than the time between commits.
+TEST_F(Hdf5, MostEventsSurviveTheProcess) {
+  for (auto settings : all_settings({640, 480})) {
+    settings.commit_interval = std::chrono::hours(1);
+    const auto events = random_events(500'000, settings.size, 21, 1'000'000);
+    const auto left = left_by_a_killed_process(path(), settings, events, 0);
+    EXPECT_GE(left.size(), events.size() * 3 / 4);
+    EXPECT_TRUE(std::ranges::equal(left, std::span(events).first(left.size())));
+  }
+}
+
+TEST_F(Hdf5, APauseOfADayHardlyTakesSpace) {
+  auto events = random_events(1000, {640, 480}, 1, 5);
+  for (std::size_t i = 500; i < events.size(); ++i) events[i].t += 86'400'000'000;
+  for (const auto& settings : all_settings({640, 480})) {
+    const auto file = contents(write(events, settings));
+    EXPECT_LT(file.size(), 5'000'000U);
+    Hdf5Reader reader(in_memory(file));
+    EXPECT_TRUE(read_all(reader) == events);
+  }
+}
+
+TEST_F(Hdf5, WhatIsCompressedTwiceIsRefused) {
+  fuzz::SmallHdf5 file("twice");
+  file.group("events");
+  constexpr hsize_t rows = 1 << 16;
+  const std::vector<std::uint64_t> zeros(rows);
+  for (const auto* const name : {"events/p", "events/x", "events/y"})
+    file.dataset(name, H5T_NATIVE_UINT64, {rows}, zeros.data());
+  file.stored_dataset("events/t", H5T_NATIVE_UINT64, {rows}, rows,
+                      {H5Z_FILTER_DEFLATE, H5Z_FILTER_DEFLATE}, {});
+  try {
+    Hdf5Reader reader(in_memory(file.bytes()));
+    ADD_FAILURE() << "it was read";
+  } catch (const UnsupportedFormat& error) {
+    EXPECT_NE(std::string(error.what()).find("compressed more than once"), std::string::npos)
+        << error.what();
+  }
+}
+
 TEST_F(Hdf5, CommitsDoNotChangeTheFile) {
   const auto events = random_events(200'000, {640, 480}, 22, 1'000'000);
   for (const auto& settings : all_settings({640, 480})) {

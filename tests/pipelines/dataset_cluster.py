@@ -75,8 +75,8 @@ def write_clip(path, buffers):
         encoder.set_state(Gst.State.PLAYING)
         for number, buffer in enumerate(buffers):
             buffer.pts, buffer.dts = number * Gst.SECOND // 25, Gst.CLOCK_TIME_NONE
-            encoder.element("in").push_buffer(buffer)
-        encoder.element("in").end_of_stream()
+            encoder.element("in").emit("push-buffer", buffer)
+        encoder.element("in").emit("end-of-stream")
         encoder.wait()
 
 

@@ -45,11 +45,13 @@ for page in README.md docs/learning.md docs/data-sets.md; do
   timeout 120 /usr/bin/python3 block.py >output 2>&1 || fail "$(cat output)"
 done
 [ $count -ge 60 ] || fail "found only $count lines"
-for file in events.webm ball.npz recording.h5 figures.json map.png maps.png out.raw events.npy received.raw \
+for file in events.webm events.mp4 ball.npz recording.h5 figures.json map.png maps.png out.raw events.npy received.raw \
   webcam.npz "videos/second one.h5" filtered.raw cropped.raw beside.raw quarter.raw turned.raw flat.raw both.raw both.webm rate.png part.raw "arrays/second one.npz" \
   recipe/manifest.json "recipe/data/second one.npy"; do
   [ -s "$file" ] || fail "$file is missing or empty"
 done
+gst-discoverer-1.0 -v events.mp4 | grep -q "profile=(string)main.*chroma-format=(string)4:2:0" ||
+  fail "players cannot play $(gst-discoverer-1.0 -v events.mp4 | grep profile=)"
 event-convert left.raw merged.npz 2>&1 | sed 's/ events.*//' >events
 event-convert merged.raw merged.npz 2>&1 | sed 's/ events.*//' >merged
 [ "$(cat merged)" = "$((2 * $(cat events)))" ] || fail "$(cat merged) events of twice $(cat events) are merged"

@@ -38,3 +38,11 @@ for page in [*source.glob("docs/*.md"), *(source / f"{name}.md" for name in ("RE
 if long:
     sys.exit("\n".join(long))
 PYTHON
+
+# Encoders of pictures, which their defaults would blur or make unplayable in some players.
+pictures=$(grep -rnE 'vp8enc [^!]*!|x264enc' "$SOURCE"/{README.md,docs,elements,pipelines,desktop} --include='*.md' \
+  --include='*.cpp' --include='*.py' --include='*.sh' --include='*.1' --include=demo || true)
+if grep vp8enc <<<"$pictures" | grep -v target-bitrate=4000000; then fail "vp8enc needs a target-bitrate"; fi
+if grep 'x264enc !' <<<"$pictures" | grep -v 'format=I420 ! x264enc ! video/x-h264,profile=main'; then
+  fail "x264enc needs I420 and a profile"
+fi

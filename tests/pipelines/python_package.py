@@ -125,6 +125,15 @@ class VideoFrames(unittest.TestCase):
         self.assertEqual((events.width, events.height), (48, 64))
         self.assertGreater(len(events), 0)
 
+    def test_files_count_from_the_time_that_players_call_0(self):
+        film = self.make_film("mp4", 0, 0)  # its B-frames shift its timestamps
+        first = next(ec.simulate(film, "eventsim-frame"))
+        self.assertGreater(first.start, 0)
+        self.assertEqual(first.stream_start, 0)
+        launch(f"filesrc location={shlex.quote(film)} ! decodebin ! eventsim-frame ! eventnpyenc"
+               f" ! filesink location={shlex.quote(path_of('film.npy'))}")
+        self.assertEqual(int(ec.read(path_of("film.npy"))["t"][0]), round((first.end - first.start) * 1e6 - 0.5))
+
     def test_interlaced_video_is_deinterlaced(self):
         video = self.make("interlaced.mkv", "videotestsrc pattern=ball num-buffers=16"
                           " ! video/x-raw,format=I420,width=64,height=48,framerate=50/1 ! interlace field-pattern=1:1"
@@ -450,6 +459,14 @@ class Simulators(unittest.TestCase):
     def test_an_interval_without_events_is_a_chunk(self):
         chunks = list(ec.live("videotestsrc pattern=black num-buffers=4 ! eventsim-frame"))
         self.assertEqual([len(chunk) for chunk in chunks], [0, 0, 0])
+
+    def test_appsinks_may_be_used_before_the_import(self):
+        program = ("import gi; gi.require_version('Gst', '1.0'); from gi.repository import Gst; Gst.init(None);"
+                   " Gst.parse_launch('appsrc ! appsink'); import gst_eventcamera as ec, numpy as np;"
+                   " events = np.zeros(9, ec.EVENT); ec.write('imported.npy', events, 4, 4);"
+                   " print(len(ec.read('imported.npy')))")
+        output = subprocess.run([sys.executable, "-c", program], cwd=FOLDER.name, check=True, stdout=subprocess.PIPE)
+        self.assertEqual(output.stdout, b"9\n")
 
     def test_leaving_the_loop_stops_the_pipeline(self):
         before = threading.active_count(), len(os.listdir("/proc/self/task"))

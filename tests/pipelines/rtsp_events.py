@@ -2,9 +2,13 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """rtsp-events as its clients see it."""
 import os
+import socket
+import ssl
 import subprocess
 import tempfile
 import time
+import warnings
+from urllib.parse import urlsplit
 
 import gi
 import numpy as np
@@ -152,6 +156,22 @@ def passwords():
             check_events(client.samples(5))
 
 
+def takes_tls(base, version):
+    """Whether a server takes a version of TLS."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    context.set_ciphers("ALL:@SECLEVEL=0")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        context.minimum_version = context.maximum_version = version
+    try:
+        with socket.create_connection((urlsplit(base).hostname, urlsplit(base).port), 30) as connection:
+            with context.wrap_socket(connection):
+                return True
+    except (ssl.SSLError, ConnectionError):
+        return False
+
+
 def encryption():
     with tempfile.TemporaryDirectory() as folder:
         certificate, pair = os.path.join(folder, "certificate.pem"), os.path.join(folder, "pair.pem")
@@ -164,6 +184,9 @@ def encryption():
         trusted = Gio.TlsFileDatabase.new(certificate)
         with Server("--certificate", pair, "--user", "ada", "--password", "secret") as server:
             assert server.base.startswith("rtsps://"), server.base
+            taken = [version.name for version in ssl.TLSVersion if version > ssl.TLSVersion.SSLv3
+                     and takes_tls(server.base, version)]
+            assert taken == ["TLSv1_2", "TLSv1_3"], f"versions of TLS: {taken}"
             refused("Failed to connect", events_of(server.base, user_id="ada", user_pw="secret"))
             refused("Unauthorized", events_of(server.base, tls_database=trusted))
             with events_of(server.base, tls_database=trusted, user_id="ada", user_pw="secret") as client:

@@ -91,7 +91,7 @@ void AedatFile::write_events(GstBuffer* buffer, Bytes& out) {
                         std::to_string(gst_buffer_get_size(buffer)) + " bytes");
   GST_CAT_LOG_OBJECT(category_, element_, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                      mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
-  encoder_->encode(writable_.pick(mapped.events(), mapped.start()), out);
+  encoder_->encode(writable_.pick(mapped.events(), time_of(GST_BUFFER_PTS(buffer))), out);
 }
 
 /// Encodes a frame. May throw.

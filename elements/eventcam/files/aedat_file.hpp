@@ -68,6 +68,14 @@ class AedatFile {
   /// Counts of written items; any thread may ask.
   GstStructure* stats() { return writable_.stats(); }
 
+  /// For a new segment of the events.
+  void begin_segment(const GstSegment& segment, bool in_stream_time) {
+    writable_.begin_segment(segment, in_stream_time);
+  }
+
+  /// Time in the file of a timestamp of the events.
+  Microseconds time_of(GstClockTime pts) const { return writable_.time_of(pts); }
+
  private:
   /// Items that wait for the next buffer. Set once they are announced, so that the header has a
   /// stream for them.

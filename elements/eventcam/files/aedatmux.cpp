@@ -237,15 +237,15 @@ static std::optional<GstSegment> segment_of_events(GstAedatMux* self) {
   return std::nullopt;
 }
 
-/// Time of a frame in the file: the PTS that events have at its running time, or its own if there
-/// are none.
+/// Time of a frame in the file: that of events at its running time, or its own PTS if there are
+/// none.
 static Microseconds frame_time(GstAedatMux* self, GstBuffer* frame, GstClockTime running) {
   GstClockTime time = GST_BUFFER_PTS(frame);
   const auto segment = segment_of_events(self);
   if (segment &&
       gst_segment_position_from_running_time_full(&*segment, GST_FORMAT_TIME, running, &time) < 0)
     time = 0;  // timestamps are not negative
-  return static_cast<Microseconds>(time / GST_USECOND);
+  return self->priv->file.time_of(time);
 }
 
 /// Writes the earliest buffer. May throw.
@@ -263,9 +263,8 @@ static GstFlowReturn write_next(GstAedatMux* self) {
     return GST_FLOW_OK;
   }
   const bool of_events = kind_of(pad.get()) == Kind::events;
-  const Microseconds t = of_events
-                             ? static_cast<Microseconds>(GST_BUFFER_PTS(buffer.get()) / GST_USECOND)
-                             : frame_time(self, buffer.get(), running);
+  const Microseconds t = of_events ? file.time_of(GST_BUFFER_PTS(buffer.get()))
+                                   : frame_time(self, buffer.get(), running);
   if (of_events) self->priv->segment = segment_of(pad.get());
   return push_bytes(self, file.write(buffer.get(), t, of_events));
 }
@@ -398,8 +397,11 @@ static GstFlowReturn write_waiting(GstAedatMux* self) {
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
   auto* self = GST_AEDAT_MUX(aggregator);
   auto& file = self->priv->file;
-  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_forwards(self, event, "write"))
-    return FALSE;
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT) {
+    if (!plays_forwards(self, event, "write")) return FALSE;
+    if (kind_of(pad) == Kind::events)
+      file.begin_segment(segment_of(event), is_simulated(GST_PAD(pad)));
+  }
   if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
     GstCaps* caps = nullptr;
     gst_event_parse_caps(event, &caps);

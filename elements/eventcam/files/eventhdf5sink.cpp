@@ -210,6 +210,8 @@ static gboolean event(GstBaseSink* sink, GstEvent* event) {
   const State& state = self->priv->state;
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_forwards(self, event, "write"))
     return FALSE;
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT)
+    self->priv->writable.begin_segment(segment_of(event), is_simulated(GST_BASE_SINK_PAD(sink)));
   bool done = true;
   if (GST_EVENT_TYPE(event) == GST_EVENT_EOS) done = end_file(self);
   if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && state.info.width > 0)

@@ -7,7 +7,8 @@
  * Passes events through and posts element messages `eventstats`: after every
  * #GstEventStats:interval of stream time with the statistics since the last one, and at EOS, at the
  * end of the segment in a segment seek, or on stop with the cumulative statistics.
- * Intervals end at buffer boundaries; events outside the segment are not counted.
+ * Intervals end at buffer boundaries; events outside the segment are not counted. Invalid events
+ * and buffers are passed on unchanged, but not counted, and a warning says why.
  *
  * - `cumulative` (#gboolean): %TRUE for the statistics of the whole stream or segment;
  * - `start`, `end` (#gint64): the time covered, in stream time (ns);

@@ -46,6 +46,7 @@
 #include <vector>
 
 #include "elements/eventcam/network/datagram_properties.hpp"
+#include "elements/eventcam/network/reception_reports.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
@@ -146,6 +147,7 @@ struct Private {
 
   Guarded<Settings> settings;
   Guarded<DatagramCounts> counts;
+  ReceptionReports reports;
   GstPad* const sink;
   GstPad* const src;
   StreamLocked<Stream> stream{sink};
@@ -268,6 +270,7 @@ static GstFlowReturn receive(GstEventDatagramDepay* self, GstBuffer* datagram,
                              std::span<const std::uint8_t> bytes, GstClockTime arrival) {
   auto& priv = *self->priv;
   auto& state = *priv.stream->state;
+  priv.reports.packet_arrived();
   std::optional<Microseconds> time;
   if (GST_CLOCK_TIME_IS_VALID(arrival)) time = static_cast<Microseconds>(arrival / GST_USECOND);
   const auto reception = state.unpacker->unpack(bytes, time, state.events);
@@ -286,11 +289,13 @@ static GstFlowReturn receive(GstEventDatagramDepay* self, GstBuffer* datagram,
   else
     state.sender.follow(datagram, arrival);
   if (reception.late) log_late(self, arrival);
-  if (reception.lost > 0)
+  if (reception.lost > 0) {
     GST_DEBUG_OBJECT(self,
                      "lost %" G_GUINT64_FORMAT
                      " datagrams before the one of running time %" GST_TIME_FORMAT,
                      guint64{reception.lost}, GST_TIME_ARGS(arrival));
+    priv.reports.packets_lost(GST_ELEMENT(self), reception.lost);
+  }
   // A datagram without events, such as one with jAER's frame samples, may reveal a loss, too.
   state.is_discontinuous |= GST_BUFFER_IS_DISCONT(datagram) || reception.lost > 0;
   return state.events.empty() ? GST_FLOW_OK : push(self, reception, arrival);
@@ -398,6 +403,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
     return GST_STATE_CHANGE_FAILURE;
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_datagram_depay_parent_class)->change_state(element, transition);
+  self->priv->reports.follow(transition, self->priv->sink);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     self->priv->stream.reset();
   }

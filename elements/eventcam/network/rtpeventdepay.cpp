@@ -51,6 +51,7 @@
 #include <string_view>
 #include <utility>
 
+#include "elements/eventcam/network/reception_reports.hpp"
 #include "elements/eventcam/network/rtp_events.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
@@ -116,6 +117,7 @@ struct Private {
 
   StreamLocked<Stream> stream;
   Guarded<RtpStatistics> statistics;
+  ReceptionReports reports;
 };
 
 }  // namespace
@@ -221,9 +223,10 @@ static void update_statistics(GstRtpEventDepay* self, guint number) {
   auto& priv = *self->priv;
   const auto& counted = priv.stream->state->unpacker.statistics();
   const auto before = std::exchange(*priv.statistics.lock(), counted);
-  if (counted.lost_packets > before.lost_packets)
-    GST_DEBUG_OBJECT(self, "lost %" G_GUINT64_FORMAT " packets before number %u",
-                     guint64{counted.lost_packets - before.lost_packets}, number);
+  if (const guint64 lost = counted.lost_packets - before.lost_packets; lost > 0) {
+    GST_DEBUG_OBJECT(self, "lost %" G_GUINT64_FORMAT " packets before number %u", lost, number);
+    priv.reports.packets_lost(GST_ELEMENT(self), lost);
+  }
   if (counted.second_sender_packets > before.second_sender_packets)
     warn_of_second_sender(self, number);
   else if (counted.rejected_packets > before.rejected_packets)
@@ -234,6 +237,7 @@ static void update_statistics(GstRtpEventDepay* self, guint number) {
 static GstBuffer* process_packet(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
   auto* self = GST_RTP_EVENT_DEPAY(depayload);
   const auto packet = packet_of(rtp);
+  self->priv->reports.packet_arrived();
   auto& unpacker = self->priv->stream->state->unpacker;
   catch_exceptions(self, no_memory, [&] {
     unpacker.push(packet, [&](const RtpInterval& interval) { push(self, interval); });
@@ -346,6 +350,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *priv.statistics.lock() = {};
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_rtp_event_depay_parent_class)->change_state(element, transition);
+  priv.reports.follow(transition, GST_RTP_BASE_DEPAYLOAD_SINKPAD(element));
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     priv.stream.reset();
   }

@@ -46,8 +46,11 @@ void CompressionDeleter::operator()(ZSTD_CCtx_s* context) const {
 
 std::optional<FrameDecompressor::Content> FrameDecompressor::decompress(
     FrameCodec codec, std::span<const std::uint8_t> payload, std::size_t limit) {
-  return codec == FrameCodec::lz4 ? decompress_lz4(payload, limit)
-                                  : decompress_zstd(payload, limit);
+  limit = expansion_.of(payload.size(), limit);
+  const auto content =
+      codec == FrameCodec::lz4 ? decompress_lz4(payload, limit) : decompress_zstd(payload, limit);
+  expansion_.count(content ? content->bytes.size() : std::min(limit, content_.size()));
+  return content;
 }
 
 std::optional<FrameDecompressor::Content> FrameDecompressor::decompress_lz4(
@@ -62,8 +65,9 @@ std::optional<FrameDecompressor::Content> FrameDecompressor::decompress_lz4(
   std::size_t used = 0;
   std::size_t filled = 0;
   while (true) {
-    if (filled == content_.size() && !grow(payload.size(), limit)) return std::nullopt;
-    auto to = content_.size() - filled;
+    if (filled == std::min(content_.size(), limit) && !grow(payload.size(), limit))
+      return std::nullopt;
+    auto to = std::min(content_.size(), limit) - filled;
     auto from = payload.size() - used;
     const auto result = LZ4F_decompress(lz4_.get(), content_.data() + filled, &to,
                                         payload.data() + used, &from, nullptr);
@@ -86,8 +90,8 @@ std::optional<FrameDecompressor::Content> FrameDecompressor::decompress_zstd(
   // Decompresses in one call, so that the output serves as window: the streaming decoder would
   // allocate a window of the size stated in the frame. Starts over if the output is too small.
   while (true) {
-    const auto size =
-        ZSTD_decompressDCtx(zstd_.get(), content_.data(), content_.size(), payload.data(), used);
+    const auto size = ZSTD_decompressDCtx(zstd_.get(), content_.data(),
+                                          std::min(content_.size(), limit), payload.data(), used);
     if (ZSTD_isError(size) == 0) {
       if (size > limit) return std::nullopt;
       return Content{{content_.data(), size}, used};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -24,6 +25,24 @@ struct CompressionDeleter {
   void operator()(ZSTD_CCtx_s* context) const;
 };
 
+/// Limits what a file decompresses to: a few kilobytes of zeros would take minutes.
+class ExpansionLimit {
+ public:
+  /// Maximum size of the content of the next `compressed` bytes, at most `limit`.
+  std::size_t of(std::size_t compressed, std::size_t limit) {
+    allowed_ += max_ratio * compressed;
+    return static_cast<std::size_t>(std::min<std::uint64_t>(limit, allowed_));
+  }
+
+  /// Counts bytes that were decompressed.
+  void count(std::size_t bytes) { allowed_ -= std::min<std::uint64_t>(bytes, allowed_); }
+
+ private:
+  /// Black pictures, which compress best, reach 13,000.
+  static constexpr std::uint64_t max_ratio = 16384;
+  std::uint64_t allowed_ = std::uint64_t{1} << 28;
+};
+
 /// Decompresses frames. Memory grows with the actual output, not with sizes stated in the data.
 class FrameDecompressor {
  public:
@@ -33,7 +52,7 @@ class FrameDecompressor {
   };
 
   /// Returns the content of the compressed frame at the front of `payload`; nothing if it is
-  /// corrupt or larger than `limit`.
+  /// corrupt, larger than `limit`, or beyond what so many bytes may expand to.
   std::optional<Content> decompress(FrameCodec codec, std::span<const std::uint8_t> payload,
                                     std::size_t limit);
 
@@ -45,6 +64,7 @@ class FrameDecompressor {
   std::unique_ptr<LZ4F_dctx_s, CompressionDeleter> lz4_;
   std::unique_ptr<ZSTD_DCtx_s, CompressionDeleter> zstd_;
   std::vector<std::uint8_t> content_;
+  ExpansionLimit expansion_;
 };
 
 /// Compresses frames.

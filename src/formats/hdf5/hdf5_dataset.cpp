@@ -85,6 +85,12 @@ void Hdf5Dataset::check_chunks() {
                                       nullptr, 0, nullptr, nullptr));
   }
   own_filters_ = std::ranges::all_of(filters_, is_own_hdf5_filter);
+  // Each compression multiplies the size: 100 kB would become terabytes.
+  const auto compressions = std::ranges::count_if(filters_, [](int filter) {
+    return filter != H5Z_FILTER_SHUFFLE && filter != H5Z_FILTER_FLETCHER32 &&
+           filter != H5Z_FILTER_NBIT && filter != H5Z_FILTER_SCALEOFFSET;
+  });
+  if (compressions > 1) refuse(path_, "is compressed more than once");
 }
 
 /// Determines how many of the rows stated in the file are actually stored.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/formats/hdf5/hdf5_writer.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -21,6 +22,12 @@ struct Hdf5Writer::File {
 };
 
 namespace {
+
+/// Limits of the number of events between two commits, and its share of all events: a crash or a
+/// full disk costs a fifth of them. More commits would cost time, since each waits for the disk.
+constexpr std::size_t min_uncommitted = std::size_t{1} << 15;
+constexpr std::size_t max_uncommitted = std::size_t{1} << 20;
+constexpr std::size_t uncommitted_share = 4;
 
 void check(const Hdf5Writer::Settings& settings) {
   const auto [width, height] = settings.size;
@@ -69,7 +76,11 @@ void Hdf5Writer::append(std::span<const AbsoluteEvent> events) {
   }
   layout_->append(events);
   file_->output.check();
-  if (commit_interval_.count() > 0 && Clock::now() - committed_ >= commit_interval_) commit();
+  uncommitted_ += events.size();
+  const auto many =
+      std::clamp(committed_events_ / uncommitted_share, min_uncommitted, max_uncommitted);
+  const bool is_due = Clock::now() - committed_ >= commit_interval_ || uncommitted_ >= many;
+  if (commit_interval_.count() > 0 && is_due) commit();
 }
 
 std::size_t Hdf5Writer::label(std::span<const Label> labels) {
@@ -93,6 +104,7 @@ void Hdf5Writer::commit() {
   file_->output.commit();
   file_->output.check();
   committed_ = Clock::now();
+  committed_events_ += std::exchange(uncommitted_, 0);
 }
 
 void Hdf5Writer::close() {

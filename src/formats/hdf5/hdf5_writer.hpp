@@ -40,7 +40,7 @@ class Hdf5Writer {
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
 
   /// Events must be sorted by time and within the sensor. Commits, too, if the last commit was
-  /// `commit_interval` ago.
+  /// `commit_interval` or many events ago.
   void append(std::span<const AbsoluteEvent> events);
 
   /// Labels the next events, one for each, before these are appended. The DSEC layout stores the
@@ -64,6 +64,8 @@ class Hdf5Writer {
   std::unique_ptr<Hdf5Layout> layout_;
   Microseconds latest_ = INT64_MIN;
   Clock::time_point committed_{};  ///< time of the last commit
+  std::size_t committed_events_ = 0;
+  std::size_t uncommitted_ = 0;
 };
 
 }  // namespace eventcamera

@@ -135,14 +135,22 @@ void ChunkedBagFile::corrupt(const char* what) {
   scanning_ = true;
 }
 
+/// Goes to the next record in the chunk after bytes that are none. False if there is none.
+bool ChunkedBagFile::find_record_in_chunk() {
+  do chunk_ = chunk_->subspan(1);
+  while (chunk_->size() >= scanned_bytes_ && !begins_record(*chunk_));
+  return chunk_->size() >= scanned_bytes_;
+}
+
 /// The next message in the chunk, which ends if there is none.
 std::optional<BagMessage> ChunkedBagFile::next_in_chunk() {
   const auto position = queue_.position();
   while (!chunk_->empty()) {
     const auto head = head_of(*chunk_);
     if (!head || head->kind == Head::Kind::none || head->size > chunk_->size()) {
-      if (!ended_) corruption_.note(position, "a chunk that ends within a record");
-      break;
+      if (!ended_) corruption_.note(position, "a chunk with bytes that are not a record");
+      if (!find_record_in_chunk()) break;
+      continue;
     }
     const auto record = chunk_->first(static_cast<std::size_t>(head->size));
     chunk_ = chunk_->subspan(record.size());

@@ -78,6 +78,7 @@ class ChunkedBagFile : public BagFile {
   bool next_record();
   bool skip_bytes();
   bool scan();
+  bool find_record_in_chunk();
   std::optional<BagMessage> next_in_chunk();
   void corrupt(const char* what);
 

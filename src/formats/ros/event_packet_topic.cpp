@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <algorithm>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "src/formats/evt/words.hpp"
 #include "src/formats/ros/topics.hpp"
@@ -174,6 +177,111 @@ class MonoPackets {
   std::span<const std::uint8_t> rest_;
 };
 
+/// Events of iniVation's cameras, encodings libcaer and libcaer_cmp. Their times are those of ROS.
+class LibcaerPackets {
+ public:
+  LibcaerPackets(bool is_compressed, SensorSize size, Corruption& corruption)
+      : is_compressed_(is_compressed), size_(size), corruption_(corruption) {}
+
+  void begin(const EventPacket& packet, std::uint64_t position) {
+    rest_ = packet.events;
+    position_ = position;
+    base_ = microseconds(packet.time_base);
+    time_ = {};
+    word_state_ = {};
+    if (rest_.size() % unit() != 0)
+      corruption_.note(position, "an event packet ends within an event");
+  }
+
+  bool next(Decoded& out) {
+    constexpr std::size_t max_units = 4096;
+    const auto count = std::min(rest_.size() / unit(), max_units);
+    for (const auto* from = rest_.data(); from != rest_.data() + unit() * count; from += unit()) {
+      if (is_compressed_)
+        read_word(little_endian<std::uint16_t>(from), out.events);
+      else
+        read_event(little_endian<std::uint64_t>(from), out.events);
+    }
+    if (size_ != SensorSize{}) corruption_.outside += std::erase_if(out.events, is_outside(size_));
+    rest_ = rest_.subspan(unit() * count);
+    return count > 0;
+  }
+
+ private:
+  std::size_t unit() const { return is_compressed_ ? 2 : 8; }
+
+  /// Polarity events of libcaer: validity in bit 0, polarity in 1, y in 2 to 16, x in 17 to 31, and
+  /// microseconds in 32 to 62, which wrap.
+  void read_event(std::uint64_t word, std::vector<AbsoluteEvent>& events) {
+    constexpr Microseconds range = Microseconds{1} << 31;
+    const auto low = static_cast<Microseconds>(word >> 32 & 0x7fffffff);
+    if (low < time_ % range - range / 2) time_ += range;
+    time_ = time_ / range * range + low;
+    const auto polarity = static_cast<std::uint16_t>((word & 2) << 14);
+    events.push_back({time(time_), static_cast<std::uint16_t>(word >> 17 & 0x7fff),
+                      static_cast<std::uint16_t>((word >> 2 & 0x7fff) | polarity)});
+  }
+
+  /// Words of 16 bits, with their type in bits 12 to 15.
+  void read_word(std::uint32_t word, std::vector<AbsoluteEvent>& events) {
+    enum Type : std::uint32_t { time_high, time_low, addr_x, addr_y, vect_base_y, vect_8 };
+    const auto value = word & 0x7ff;
+    const auto polarity = (word & 0x800) << 4;
+    auto& [high, low, x, base] = word_state_;
+    const auto event_at = [&](std::uint32_t y_p) {
+      events.push_back({time(static_cast<Microseconds>(high | low)), static_cast<std::uint16_t>(x),
+                        static_cast<std::uint16_t>(y_p)});
+    };
+    switch (word >> 12) {
+      case time_high:
+        high = (word & 0xfff) << 12;
+        break;
+      case time_low:
+        low = word & 0xfff;
+        break;
+      case addr_x:
+        x = value;
+        break;
+      case addr_y:
+        event_at(value | polarity);
+        break;
+      case vect_base_y:
+        base = value | polarity;
+        break;
+      case vect_8:
+        for (std::uint32_t i = 0; i < 8; ++i)
+          if ((word >> i & 1) != 0) event_at(base + i);
+        if ((base & 0x7fff) < max_evt_side) base += 8;
+        break;
+      default:
+        corruption_.note(position_, "a libcaer_cmp word of unknown type");
+    }
+  }
+
+  /// Overflow is well-defined for any file.
+  Microseconds time(Microseconds since_base) const {
+    return static_cast<Microseconds>(static_cast<std::uint64_t>(base_) +
+                                     static_cast<std::uint64_t>(since_base));
+  }
+
+  /// Words set the time, the column and the first row of vectors, with the polarity in bit 15.
+  struct WordState {
+    std::uint32_t high = 0;
+    std::uint32_t low = 0;
+    std::uint32_t x = 0;
+    std::uint32_t base = 0;
+  };
+
+  bool is_compressed_;
+  SensorSize size_;
+  Corruption& corruption_;
+  std::span<const std::uint8_t> rest_;
+  std::uint64_t position_ = 0;
+  Microseconds base_ = 0;
+  Microseconds time_ = 0;  ///< of the last event of libcaer, since the base
+  WordState word_state_;   ///< of libcaer_cmp
+};
+
 class EventPacketDecoder final : public TopicDecoder {
  public:
   EventPacketDecoder(BagTopic topic, Corruption& corruption)
@@ -208,6 +316,8 @@ class EventPacketDecoder final : public TopicDecoder {
     is_decoding_ = true;
     if (evt_)
       evt_->begin(packet, message.position, continues, resumes);
+    else if (libcaer_)
+      libcaer_->begin(packet, message.position);
     else
       mono_->begin(packet, message.position, resumes);
   }
@@ -216,6 +326,7 @@ class EventPacketDecoder final : public TopicDecoder {
     decoded_.events.clear();
     decoded_.triggers.clear();
     if (!is_decoding_) return false;
+    if (libcaer_) return libcaer_->next(decoded_);
     return evt_ ? evt_->next(decoded_, offset_) : mono_->next(decoded_, offset_);
   }
 
@@ -244,12 +355,15 @@ class EventPacketDecoder final : public TopicDecoder {
       evt_.emplace(found->format, Microseconds{1} << found->clock_bits, size_, corruption_);
     } else if (packet.encoding == "mono" && !packet.is_big_endian) {
       mono_.emplace(size_, corruption_);
+    } else if ((packet.encoding == "libcaer" || packet.encoding == "libcaer_cmp") &&
+               !packet.is_big_endian) {
+      libcaer_.emplace(packet.encoding == "libcaer_cmp", size_, corruption_);
     } else {
       constexpr std::size_t max_name = 32;
       throw UnsupportedFormat("the events of topic " + topic_.name + " have the encoding \"" +
                               std::string(packet.encoding.substr(0, max_name)) +
                               (packet.is_big_endian ? "\", big-endian" : "\"") +
-                              "; evt2, evt21, evt3 and mono can be read");
+                              "; evt2, evt21, evt3, libcaer, libcaer_cmp and mono can be read");
     }
     encoding_ = packet.encoding;
   }
@@ -258,6 +372,7 @@ class EventPacketDecoder final : public TopicDecoder {
   std::string encoding_;  ///< of the first packet
   std::optional<EvtPackets> evt_;
   std::optional<MonoPackets> mono_;
+  std::optional<LibcaerPackets> libcaer_;
   std::optional<std::uint64_t> offset_;
   std::optional<std::uint64_t> sequence_;  ///< of the last packet
   bool is_decoding_ = false;

@@ -218,21 +218,22 @@ std::optional<ChunkedBagFile::Bytes> RosbagFile::decompressed_bz2(Bytes content)
   // libbz2 does not change its input.
   stream.next_in = const_cast<char*>(reinterpret_cast<const char*>(content.data()));  // NOLINT
   stream.avail_in = static_cast<unsigned>(content.size());
+  const auto limit = expansion_.of(content.size(), max_record);
   std::size_t filled = 0;
   int result = BZ_OK;
   while (result == BZ_OK) {
-    if (filled == content_.size()) {
-      if (filled == max_record) break;
-      content_.resize(std::min(max_record, std::max(first_content, 2 * filled)));
-    }
-    const auto room = content_.size() - filled;
+    if (filled >= limit) break;
+    if (filled == content_.size())
+      content_.resize(std::min(limit, std::max(first_content, 2 * filled)));
+    const auto room = std::min(content_.size(), limit) - filled;
     stream.next_out = reinterpret_cast<char*>(content_.data() + filled);
     stream.avail_out = static_cast<unsigned>(room);
     result = BZ2_bzDecompress(&stream);
-    filled = content_.size() - stream.avail_out;
+    filled += room - stream.avail_out;
     if (result == BZ_OK && stream.avail_in == 0 && stream.avail_out == room) break;  // it is cut
   }
   BZ2_bzDecompressEnd(&stream);
+  expansion_.count(filled);
   if (result != BZ_STREAM_END) return std::nullopt;
   return Bytes(content_).first(filled);
 }

@@ -30,6 +30,7 @@ class RosbagFile final : public ChunkedBagFile {
   std::map<std::uint32_t, std::optional<std::size_t>> connections_;  ///< topics by connection
   FrameDecompressor decompressor_;
   std::vector<std::uint8_t> content_;  ///< of a chunk compressed with bzip2
+  ExpansionLimit expansion_;           ///< of these chunks
 };
 
 }  // namespace eventcamera
