@@ -29,7 +29,7 @@ class TableSample {
 
   /// Number of rows sufficient for detection.
   static constexpr std::size_t max_rows = 256;
-  static constexpr std::size_t max_binary_rows = 4096;  ///< that are cheap to read
+  static constexpr std::size_t max_binary_rows = 4096;  ///< of files with random access
 
   void add(Row row) { rows_.push_back(std::move(row)); }
   bool empty() const { return rows_.empty(); }

@@ -185,7 +185,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventatisdec, "eventatisdec", GST_RANK_PRIMARY, even
  *
  * Reads text with one event per line. Columns, separators and time unit are detected from the first
  * lines, unless #GstEventCsvDec:column-order and #GstEventCsvDec:time-unit are set. A file whose
- * times may be microseconds or nanoseconds is rejected unless the unit is set. If the file does not
+ * time unit is in doubt is rejected unless the unit is set, and so is one in which more than one
+ * line in a hundred is not an event; the error names the first of them. If the file does not
  * contain the sensor size, it is that of #GstEventCsvDec:width and #GstEventCsvDec:height, or else
  * that of downstream's caps, or else that of the smallest known sensor that contains the events; if
  * later events lie outside it, the caps change. Writers cannot change the size within a file: set
@@ -214,10 +215,10 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_
  * @title: eventnpydec
  * @short_description: reads NumPy files of events
  *
- * Reads structured NumPy arrays with the fields t, x, y and p, and arrays of the shape (N, 4),
- * whose columns are detected from the first rows, unless #GstEventNpyDec:column-order is set.
- * Integer times are microseconds and fractional ones seconds, unless #GstEventNpyDec:time-unit or a
- * name such as t_ns says otherwise. Arrays do not contain the sensor size: it is that of
+ * Reads structured NumPy arrays with the fields t, x, y and p, and arrays of the shape (N, 4) or
+ * (4, N), whose columns are detected from the first rows, unless #GstEventNpyDec:column-order is
+ * set. Integer times are microseconds and fractional ones seconds, unless #GstEventNpyDec:time-unit
+ * or a name such as t_ns says otherwise. Arrays do not contain the sensor size: it is that of
  * #GstEventNpyDec:width and #GstEventNpyDec:height, or else that of downstream's caps, or else that
  * of the smallest known sensor that contains the events; if later events lie outside it, the caps
  * change. Writers cannot change the size within a file: set it for them.
@@ -279,9 +280,11 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
  * @title: eventhdf5dec
  * @short_description: reads HDF5 files of events
  *
- * Reads the events of HDF5 files from DSEC, TUM-VIE, MVSEC (of its left camera), Metavision
- * (compressed with ECF) and v2e, and of those with columns in `/raw_events`. They are output in
- * buffers of #GstEventReader:buffer-duration, with triggers for writers that store them.
+ * Reads the events of HDF5 files from Metavision (compressed with ECF), and of all others in which
+ * one search finds datasets of a group that are named t, x, y and p, or the like, or a dataset
+ * named events with such members or four columns: DSEC, TUM-VIE, M3ED, MVSEC, v2e, E2VID and
+ * others. Of several cameras, the first by name is read. Events are output in buffers of
+ * #GstEventReader:buffer-duration, with triggers for writers that store them.
  *
  * HDF5 files need random access, so upstream should support pull mode, as filesrc does. In push
  * mode the file is collected in memory, up to 256 MiB, and read at its end.
@@ -366,9 +369,9 @@ GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_re
  * @short_description: reads MCAP files, which are ROS 2 bags
  *
  * Reads events and images from MCAP files of ROS 2 and ROS 1, without ROS: messages
- * event_camera_msgs/EventPacket (with encodings evt3, evt2, evt21 and mono), dvs_msgs/EventArray
- * and prophesee_event_msgs/EventArray as events, sensor_msgs/Image as video. Chunks may be
- * compressed with LZ4 or Zstandard.
+ * event_camera_msgs/EventPacket (with encodings evt3, evt2, evt21, libcaer, libcaer_cmp and mono),
+ * dvs_msgs/EventArray and prophesee_event_msgs/EventArray as events, sensor_msgs/Image as video.
+ * Chunks may be compressed with LZ4 or Zstandard.
  *
  * The first topic of events in the file is read, and all of images; a message names the others,
  * which #GstEventMcapDemux:topics selects.

@@ -87,13 +87,14 @@ class DsecTable final : public NumberTable {
   }
 
  private:
-  /// Returns the first rows; none if they are corrupt.
+  /// Returns the first rows, up to the end of a chunk; none if they are corrupt.
   TableSample read_sample() {
     TableSample sample;
     std::array<std::vector<TableSample::Row>, event_columns> columns;
+    const auto rows = std::min(sample_rows(), chunk_end(0));
     for (std::size_t i = 0; i < event_columns; ++i)
-      if (!columns_[i].sample(sample_rows(), columns[i])) return sample;
-    for (std::size_t row = 0; row < sample_rows(); ++row)
+      if (!columns_[i].sample(rows, columns[i])) return sample;
+    for (std::size_t row = 0; row < rows; ++row)
       sample.add({columns[0][row][0], columns[1][row][0], columns[2][row][0], columns[3][row][0]});
     return sample;
   }

@@ -36,6 +36,10 @@ class Hdf5Dataset {
     return is_integers() && numbers_[0].bytes == 4 && !numbers_[0].is_signed;
   }
 
+  bool is_doubles() const {
+    return is_numbers() && numbers_[0].is_floating && numbers_[0].bytes == sizeof(double);
+  }
+
   /// Names of the members of a compound type; none for another type.
   std::vector<std::string> members() const;
 

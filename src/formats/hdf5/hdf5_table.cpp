@@ -98,12 +98,16 @@ std::unique_ptr<Hdf5Table> open_rows(hid_t file, const std::string& path) {
   // MVSEC (A. Z. Zhu et al., "The Multi Vehicle Stereo Event Camera Dataset", 2018) has rows of x,
   // y, t and p, of a DAVIS 346B.
   const bool is_mvsec = path.starts_with("davis/");
+  // Floats of 32 bits would be too coarse for its dates.
+  if (is_mvsec && !events.is_doubles())
+    throw UnsupportedFormat("HDF5 dataset /" + path +
+                            " must hold rows of four fractional numbers x, y, t and p");
   if (size == SensorSize{} && is_mvsec) size = {346, 260};
   std::optional<ColumnOrder> order;
   if (is_mvsec) order = ColumnOrder{2, 0, 1, 3};
   if (events.is_integers()) order = ColumnOrder{0, 1, 2, 3};  // v2e
   std::optional<TimeUnit> unit;
-  if (is_mvsec && !events.is_integers()) unit = TimeUnit::seconds;
+  if (is_mvsec) unit = TimeUnit::seconds;
   return make_row_table(is_mvsec ? Hdf5Format::mvsec : Hdf5Format::v2e, std::move(events), path,
                         size, order, unit);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/formats/hdf5/row_table.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "src/formats/hdf5/number_table.hpp"
@@ -21,7 +22,7 @@ class RowTable final : public NumberTable {
     claimed_rows_ = events_.claimed_rows();
     TableSample sample;
     std::vector<TableSample::Row> rows;
-    if (events_.sample(sample_rows(), rows))
+    if (events_.sample(std::min(sample_rows(), events_.chunk_end(0)), rows))
       for (auto& row : rows) sample.add(std::move(row));
     Columns columns(event_columns);
     if (order) {

@@ -131,7 +131,7 @@ void NpyDecoder::begin(NpyHeader header) {
   left_ = header.count;
   position_ = preamble_.size();
   const auto rows =
-      std::clamp<std::uint64_t>(max_sample / header.element_bytes, 1, TableSample::max_binary_rows);
+      std::clamp<std::uint64_t>(max_sample / header.element_bytes, 1, TableSample::max_rows);
   sample_bytes_ = static_cast<std::size_t>(std::min(rows, left_) * header.element_bytes);
   header_ = std::move(header);
 }
