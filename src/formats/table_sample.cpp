@@ -67,9 +67,9 @@ bool are_frame_numbers(const std::vector<TableNumber>& times) {
   return times.back().value > times.front().value;
 }
 
-/// False if events were further apart in this unit than event cameras and simulators have them, or
-/// if integer microseconds began weeks ago without being a date.
-bool is_plausible(const std::vector<TableNumber>& times, TimeUnit unit) {
+/// False if events were further apart in this unit than event cameras and simulators have them,
+/// unless the table is our own, or if integer microseconds began weeks ago without being a date.
+bool is_plausible(const std::vector<TableNumber>& times, TimeUnit unit, bool is_own) {
   constexpr std::size_t min_rows = 4;
   constexpr std::size_t many_rows = 64;
   constexpr double max_uptime = 1e12;
@@ -79,6 +79,7 @@ bool is_plausible(const std::vector<TableNumber>& times, TimeUnit unit) {
   if (is_whole_microsecond && are_frame_numbers(times)) return false;
   if (is_whole_microsecond && times.front().value >= max_uptime && times.front().value < min_date)
     return false;
+  if (is_own) return true;
   std::vector<double> gaps;
   for (std::size_t i = 1; i < times.size(); ++i)
     gaps.push_back(std::abs(times[i].value - times[i - 1].value));
@@ -156,10 +157,17 @@ std::optional<Columns> TableSample::find_columns(bool is_xypt) const {
   return std::nullopt;
 }
 
-std::optional<TimeUnit> TableSample::find_unit(const Columns& columns, bool is_either) const {
+std::optional<TimeUnit> TableSample::find_unit(const Columns& columns, bool is_either,
+                                               bool may_be_own) const {
   const auto times = times_of(columns);
   const auto unit = guessed_unit(columns, is_either, times);
-  return unit && is_plausible(times, *unit) ? unit : std::nullopt;
+  const auto p = static_cast<std::size_t>(
+      std::ranges::find(columns, std::optional(EventColumn::p)) - columns.begin());
+  const bool is_own = may_be_own && unit == TimeUnit::microseconds &&
+                      std::ranges::all_of(rows_, [&](const Row& row) {
+                        return row.size() != columns.size() || is_within(row[p].value, 0, 2);
+                      });
+  return unit && is_plausible(times, *unit, is_own) ? unit : std::nullopt;
 }
 
 PolarityCode TableSample::find_polarities(const Columns& columns) const {

@@ -53,8 +53,10 @@ class TableSample {
   /// Detects the time unit: seconds if a time has a fraction; otherwise microseconds, or
   /// nanoseconds if only these give a plausible date. If `is_either`, the gaps between times decide
   /// between the two. Nothing if they are ambiguous, if events were too far apart in this unit, or
-  /// if the times seem to be numbers of frames.
-  std::optional<TimeUnit> find_unit(const Columns& columns, bool is_either) const;
+  /// if the times seem to be numbers of frames. `may_be_own`: it has the names or types of a
+  /// table that this project writes, whose events may be far apart if their polarity is 0 or 1.
+  std::optional<TimeUnit> find_unit(const Columns& columns, bool is_either,
+                                    bool may_be_own = false) const;
 
   /// Detects the meaning of the polarities. Throws UnsupportedFormat if they do not tell.
   PolarityCode find_polarities(const Columns& columns) const;

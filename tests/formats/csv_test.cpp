@@ -346,7 +346,7 @@ TEST(Csv, PolaritiesOfAnyTool) {
 TEST(Csv, ImplausibleTimesAreRefused) {
   const auto table = [](const auto& time) {
     std::string text = "t,x,y,p\n";
-    for (int i = 0; i < 1000; ++i) text += time(i) + ",3,4,1\n";
+    for (int i = 0; i < 1000; ++i) text += time(i) + ",3,4," + (i % 2 == 0 ? "1\n" : "-1\n");
     return text;
   };
   // Nanoseconds, microseconds with fractions, frame numbers, nanoseconds since boot, milliseconds

@@ -169,7 +169,16 @@ void NpyDecoder::find_layout(std::span<const std::uint8_t> elements) {
         header_->fields[static_cast<std::size_t>(*column)] = header_->columns[i];
 
   auto unit = settings_.unit ? settings_.unit : header_->unit;
-  if (!unit) unit = sample.find_unit(*columns, false);
+  const auto is_written_as = [&](EventColumn column, NpyField::Kind kind, std::uint32_t bytes) {
+    const auto& field = header_->fields[static_cast<std::size_t>(column)];
+    return field.kind == kind && field.bytes == bytes;
+  };
+  using enum NpyField::Kind;
+  const bool may_be_own = has_names && is_written_as(EventColumn::t, signed_integer, 8) &&
+                          is_written_as(EventColumn::x, unsigned_integer, 2) &&
+                          is_written_as(EventColumn::y, unsigned_integer, 2) &&
+                          is_written_as(EventColumn::p, unsigned_integer, 1);
+  if (!unit) unit = sample.find_unit(*columns, false, may_be_own);
   if (!unit)
     throw UnsupportedFormat(
         "the time unit of the NumPy array is ambiguous; set time-unit, or name the times t_s, t_us "

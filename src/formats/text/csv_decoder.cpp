@@ -305,6 +305,9 @@ bool CsvDecoder::read_header_line(std::string_view line) {
   unit_.reset();
   const auto names = std::span(fields).first(count);
   columns_ = columns_named(names);
+  const auto txyp = *columns_of("txyp");
+  is_named_txyp_ = names[0] == "t" && count >= event_columns &&
+                   std::ranges::equal(std::span(columns_).first(event_columns), txyp);
   SensorSize size;
   for (std::size_t i = 0; i < count; ++i) {
     const auto at = names[i].find('@');
@@ -420,7 +423,7 @@ void CsvDecoder::find_columns(const TableSample& sample) {
 void CsvDecoder::find_unit(const TableSample& sample) {
   const bool is_either = !has_names_ && (separator_ == ' ' || separator_ == '\t');
   auto unit = settings_.unit ? settings_.unit : unit_;
-  if (!unit) unit = sample.find_unit(columns_, is_either);
+  if (!unit) unit = sample.find_unit(columns_, is_either, is_named_txyp_);
   if (!unit)
     throw UnsupportedFormat(
         "the time unit is ambiguous in the first lines; set time-unit, or name the column t_s, "

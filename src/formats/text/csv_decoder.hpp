@@ -88,6 +88,7 @@ class CsvDecoder final : public EventDecoder {
 
   Columns columns_;
   bool has_names_ = false;                 ///< the header has column names
+  bool is_named_txyp_ = false;             ///< as in the tables that this project writes
   bool has_geometry_ = false;              ///< the header is OpenEB's for x,y,p,t
   std::optional<TimeUnit> unit_;           ///< time unit in the names
   char separator_ = ',';                   ///< separator in the first line
