@@ -62,7 +62,8 @@ std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> event
                                                     std::span<const Label> labels) {
   picked_.clear();
   picked_labels_.clear();
-  if (!events.empty() && std::exchange(segment_begun_, false) && start + events[0].t < latest_)
+  if (!events.empty() && std::exchange(segment_begun_, false) && written_.lock()->events > 0 &&
+      start + events[0].t < latest_)
     throw std::invalid_argument("times start over at " + std::to_string(start + events[0].t) +
                                 " us in another segment, and events until " +
                                 std::to_string(latest_) +
