@@ -508,7 +508,7 @@ class Recipes(unittest.TestCase):
         for value in "1e9", "-1e9", '"1e9"', '"0.2"', "true", "{choice: [0.2, 1e9]}", '{choice: [0.2, "0.3"]}':
             with self.assertRaisesRegex(ec.RecipeError, "parameters: positive-threshold: .*0.001 to 10"):
                 self.parameter(value)
-        with self.assertRaisesRegex(ec.PipelineError, 'denoise="1e9": it must be from 0 to 255'):
+        with self.assertRaisesRegex(ec.PipelineError, 'denoise="1e9": it must be from -1 to 255'):
             ec.simulate("/nowhere", 'eventsim-dvs denoise="1e9"')
 
 
@@ -596,7 +596,7 @@ class Failures(unittest.TestCase):
         self.expect(ec.PipelineError, "No such file or directory", lambda: ec.write("/nowhere/out.raw", random_events(9, 9)))
         self.expect(ec.PipelineError, "2048x2048 pixels",
                     lambda: ec.write(path_of("wide.raw"), random_events(9, 9, pixels=(3000, 9))))
-        self.expect(ec.PipelineError, "eventsim-dvs denoise=-3: it must be from 0 to 255",
+        self.expect(ec.PipelineError, "eventsim-dvs denoise=-3: it must be from -1 to 255",
                     lambda: ec.simulate("/nowhere", "identity ! eventsim-dvs denoise=-3"))
 
     def test_of_writing_many_events_are_exceptions(self):
