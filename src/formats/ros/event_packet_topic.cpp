@@ -227,31 +227,31 @@ class LibcaerPackets {
     enum Type : std::uint32_t { time_high, time_low, addr_x, addr_y, vect_base_y, vect_8 };
     const auto value = word & 0x7ff;
     const auto polarity = (word & 0x800) << 4;
-    auto& [high, low, x, base] = word_state_;
+    auto& state = word_state_;
     const auto event_at = [&](std::uint32_t y_p) {
-      events.push_back({time(static_cast<Microseconds>(high | low)), static_cast<std::uint16_t>(x),
-                        static_cast<std::uint16_t>(y_p)});
+      events.push_back({time(static_cast<Microseconds>(state.high | state.low)),
+                        static_cast<std::uint16_t>(state.x), static_cast<std::uint16_t>(y_p)});
     };
     switch (word >> 12) {
       case time_high:
-        high = (word & 0xfff) << 12;
+        state.high = (word & 0xfff) << 12;
         break;
       case time_low:
-        low = word & 0xfff;
+        state.low = word & 0xfff;
         break;
       case addr_x:
-        x = value;
+        state.x = value;
         break;
       case addr_y:
         event_at(value | polarity);
         break;
       case vect_base_y:
-        base = value | polarity;
+        state.base = value | polarity;
         break;
       case vect_8:
         for (std::uint32_t i = 0; i < 8; ++i)
-          if ((word >> i & 1) != 0) event_at(base + i);
-        if ((base & 0x7fff) < max_evt_side) base += 8;
+          if ((word >> i & 1) != 0) event_at(state.base + i);
+        if ((state.base & 0x7fff) < max_evt_side) state.base += 8;
         break;
       default:
         corruption_.note(position_, "a libcaer_cmp word of unknown type");
