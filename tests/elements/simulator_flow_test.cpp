@@ -113,11 +113,12 @@ class EverySimulator : public testing::TestWithParam<Simulator> {
   eventcamera::ThreadPool threads;
   eventcamera::RegionOfInterestFlow finder{GetParam().method, width, height};
 };
-INSTANTIATE_TEST_SUITE_P(
-    , EverySimulator,
-    testing::Values(Simulator{"eventsim-dense", 2, FlowMethod::dis_lq},
-                    Simulator{"eventsim-dense interpolation=blend", 2, FlowMethod::dis_lq},
-                    Simulator{"eventsim-dvs preset=ideal upsampling=motion", 0, FlowMethod::dis_mq}));
+INSTANTIATE_TEST_SUITE_P(, EverySimulator,
+                         testing::Values(Simulator{"eventsim-dense", 2, FlowMethod::dis_lq},
+                                         Simulator{"eventsim-dense interpolation=blend", 2,
+                                                   FlowMethod::dis_lq},
+                                         Simulator{"eventsim-dvs preset=ideal upsampling=motion", 0,
+                                                   FlowMethod::dis_mq}));
 
 TEST_P(EverySimulator, UsesTheFlowOfItsFrames) {
   const auto expected = own_events();

@@ -143,7 +143,9 @@ TEST_P(EveryRgbFormat, HasEachColourWeighed) {
 TEST(Negotiation, TakesTheRangeOfLumaFromTheColorimetry) {
   // The first number of a colorimetry is 1 if white is 255, and 2 if it is 235.
   for (const auto& [colorimetry, light] : {std::pair("1:4:7:1", 1), std::pair("2:4:7:1", 4)}) {
-    Harness h("eventsim-dvs preset=ideal response=log log-eps=1e-6 overexposed-light=4 positive-threshold=0.1");
+    Harness h(
+        "eventsim-dvs preset=ideal response=log log-eps=1e-6 overexposed-light=4 "
+        "positive-threshold=0.1");
     h.caps("video/x-raw, framerate=25/1, width=7, height=5, format=GRAY8, colorimetry=" +
            std::string(colorimetry));
     h.push(h.flat(0, 60));
