@@ -80,6 +80,10 @@ struct Private {
   std::atomic<bool> has_header = false;  ///< no pads can be added
   AedatFile file;
   std::optional<GstSegment> segment;  ///< of the events written last
+  /// Pads whose caps were handled last. A pad stores its caps later, in the thread that pushed
+  /// them.
+  const GstAggregatorPad* events_pad = nullptr;
+  const GstAggregatorPad* video_pad = nullptr;
 };
 
 }  // namespace
@@ -358,8 +362,9 @@ static GstClockTime get_next_time(GstAggregator* aggregator) {
 static bool handle_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* caps) {
   auto& file = self->priv->file;
   const Kind kind = kind_of(caps);
+  auto& latest = kind == Kind::events ? self->priv->events_pad : self->priv->video_pad;
   for (const Pad& other : sink_pads(self)) {
-    if (other.get() == pad || kind_of(other.get()) != kind) continue;
+    if (other.get() == pad || (other.get() != latest && kind_of(other.get()) != kind)) continue;
     GST_ELEMENT_ERROR(
         self, STREAM, MUX,
         ("Cannot write two streams of %s into one file; link one stream of events and "
@@ -368,6 +373,9 @@ static bool handle_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps*
         ("pads %s and %s", GST_PAD_NAME(other.get()), GST_PAD_NAME(pad)));
     return false;
   }
+  for (auto* const of_kind : {&self->priv->events_pad, &self->priv->video_pad})
+    if (*of_kind == pad) *of_kind = nullptr;
+  latest = pad;
   if (kind == Kind::video) {
     GstVideoInfo video;
     if (!gst_video_info_from_caps(&video, caps)) return false;
@@ -476,6 +484,8 @@ static gboolean stop(GstAggregator* aggregator) {
   auto* priv = GST_AEDAT_MUX(aggregator)->priv;
   priv->file.reset();
   priv->segment.reset();
+  priv->events_pad = nullptr;
+  priv->video_pad = nullptr;
   priv->has_header = false;
   pop_segment_ends(GST_AEDAT_MUX(aggregator));
   return TRUE;
