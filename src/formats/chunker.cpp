@@ -56,11 +56,10 @@ void Chunker::place(const AbsoluteEvent& event) {
   const bool goes_on =
       latest_ != never && event.t <= latest_ + settled && event.t >= latest_ - settled;
   if (goes_on && !unsettled_.is_near(event.t)) unsettled_.drop();
-  if (!unsettled_.empty())
-    keep_all(unsettled_.push(event, !first_));
-  else if (first_ && event.t < *first_)
+  const bool is_far = latest_ == never || event.t > latest_ + settled;
+  if (unsettled_.empty() && first_ && event.t < *first_)
     drop_early(event);
-  else if (latest_ == never || event.t > latest_ + settled)
+  else if (!unsettled_.empty() || is_far)
     keep_all(unsettled_.push(event, !first_));
   else
     keep(event);
