@@ -36,6 +36,12 @@ bool fits(double value, EventColumn column) {
   return false;
 }
 
+/// Number of a column that exists.
+std::size_t index_of(EventColumn column, const Columns& columns) {
+  return static_cast<std::size_t>(std::ranges::find(columns, std::optional(column)) -
+                                  columns.begin());
+}
+
 /// Distinguishes microseconds from nanoseconds by the gaps between integer times. Multiples of 1000
 /// throughout are nanoseconds converted from microseconds; frequent gaps below 10 are too short for
 /// nanoseconds.
@@ -113,8 +119,7 @@ std::vector<TableNumber> TableSample::times_of(const Columns& columns) const {
     for (std::size_t i = 0; i < row.size(); ++i)
       is_event = is_event && (!columns[i] || fits(row[i].value, *columns[i]));
     if (!is_event) continue;
-    const auto at = std::ranges::find(columns, std::optional(EventColumn::t)) - columns.begin();
-    times.push_back(row[static_cast<std::size_t>(at)]);
+    times.push_back(row[index_of(EventColumn::t, columns)]);
   }
   return times;
 }
@@ -144,10 +149,9 @@ std::optional<Columns> TableSample::find_columns(bool is_xypt) const {
     if (rows_.empty()) return columns;
     const auto times = times_of(columns);
     if (times.size() * 2 < rows_.size()) continue;
-    const auto p = std::ranges::find(columns, std::optional(EventColumn::p)) - columns.begin();
+    const auto p = index_of(EventColumn::p, columns);
     const auto polarities = std::ranges::count_if(rows_, [&](const Row& row) {
-      return row.size() == columns.size() &&
-             is_within(row[static_cast<std::size_t>(p)].value, -1, 3);
+      return row.size() == columns.size() && is_within(row[p].value, -1, 3);
     });
     if (static_cast<std::size_t>(polarities) * 2 < rows_.size()) continue;
     const bool is_it = time ? columns[*time] == EventColumn::t
@@ -161,8 +165,7 @@ std::optional<TimeUnit> TableSample::find_unit(const Columns& columns, bool is_e
                                                bool may_be_own) const {
   const auto times = times_of(columns);
   const auto unit = guessed_unit(columns, is_either, times);
-  const auto p = static_cast<std::size_t>(
-      std::ranges::find(columns, std::optional(EventColumn::p)) - columns.begin());
+  const auto p = index_of(EventColumn::p, columns);
   const bool is_own = may_be_own && unit == TimeUnit::microseconds &&
                       std::ranges::all_of(rows_, [&](const Row& row) {
                         return row.size() != columns.size() || is_within(row[p].value, 0, 2);
@@ -172,8 +175,7 @@ std::optional<TimeUnit> TableSample::find_unit(const Columns& columns, bool is_e
 
 PolarityCode TableSample::find_polarities(const Columns& columns) const {
   PolarityCode code;
-  const auto p = static_cast<std::size_t>(
-      std::ranges::find(columns, std::optional(EventColumn::p)) - columns.begin());
+  const auto p = index_of(EventColumn::p, columns);
   for (const auto& row : rows_)
     if (row.size() == columns.size()) code.count(row[p].value);
   code.choose();

@@ -36,13 +36,12 @@ const EventBuckets* Simulator::push(const LumaView& frame, Nanoseconds time,
   assert(frame.format == format());
   const auto steps = steps_to(time, settings);
   flow_ = steps ? known_flow : std::nullopt;
+  if (!steps) denoiser_.restart();
+  const double amplitude = denoiser_.amplitude_for(frame, denoise_setting(settings));
   if (steps) {
-    const double amplitude = denoiser_.amplitude_for(frame, denoise_setting(settings));
     if (const auto first = denoiser_.kept_first(amplitude, threads())) start(*first);
     simulate(denoiser_.denoised(frame, amplitude, threads()), *steps, settings, events_);
   } else {
-    denoiser_.restart();
-    const double amplitude = denoiser_.amplitude_for(frame, denoise_setting(settings));
     start(denoiser_.denoised(frame, amplitude, threads()));
   }
   last_time_ = time;
