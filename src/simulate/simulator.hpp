@@ -19,9 +19,9 @@ struct Settings {
   double positive_threshold = 20;  ///< C+, 8-bit grey levels; a rise must exceed it
   double negative_threshold = 20;  ///< C-, 8-bit grey levels, a magnitude; a fall must exceed it
   int interpolated_frames = 10;    ///< n, between two frames; 0 or more
-  double denoise = 0;   ///< largest noise in the frames, grey levels, or automatic_denoise
-  int threads = 0;      ///< thread limit for one frame; 0 = one per processor
-  bool labels = false;  ///< label the events, if the simulator can
+  int threads = 0;                 ///< thread limit for one frame; 0 = one per processor
+  bool labels = false;             ///< label the events, if the simulator can
+  double denoise = 0;  ///< largest noise in the frames, grey levels, or automatic_denoise
 };
 
 /// C+ and C- in the grey levels of a frame, integers like its pixel differences.
