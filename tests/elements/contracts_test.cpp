@@ -270,7 +270,8 @@ TEST_P(EveryConsumer, StartsOverAfterAFlush) {
   Consumer fresh(GetParam());
   it.push_segment();
   // An input holds one interval while another has none.
-  for (guint i = 0; i < (it.inputs() > 1 ? 1U : 3U); ++i) it.push_interval(3 + i);
+  const guint before = it.inputs() > 1 ? 1 : 3;
+  for (guint i = 0; i < before; ++i) it.push_interval(i);
   it.play();
   // A sequence number in common tells aggregators that all inputs are flushed together.
   const auto seqnum = gst_util_seqnum_next();
@@ -284,7 +285,7 @@ TEST_P(EveryConsumer, StartsOverAfterAFlush) {
   }
   for (auto* consumer : {&it, &fresh}) {
     consumer->push_segment(1 * GST_SECOND);
-    for (guint i = 0; i < 3; ++i) consumer->push_interval(i);
+    for (guint i = 0; i < 3; ++i) consumer->push_interval(before + i);
     consumer->end();
     consumer->expect_segments();
   }
