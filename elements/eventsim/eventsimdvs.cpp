@@ -111,7 +111,7 @@ static GType preset_type() {
        "davis240c"},
       {static_cast<int>(DvsPreset::davis346), "iniVation DAVIS346, fitted to a recording",
        "davis346"},
-      {static_cast<int>(DvsPreset::gen4), "Prophesee Gen4, IMX636", "gen4"},
+      {static_cast<int>(DvsPreset::gen4), "Prophesee Gen4, IMX636; thresholds are a guess", "gen4"},
       {static_cast<int>(DvsPreset::hs_ergb),
        "Event camera of TimeLens' HS-ERGB, fitted to a recording", "hs-ergb"},
       {0, nullptr, nullptr},
