@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // eventhdf5dec and eventhdf5sink: round trips of every layout, in pull and push mode, with seeks,
 // corrupt files and unwritable locations.
+#include <sys/resource.h>
+
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <random>
@@ -313,6 +316,20 @@ TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
     GST_BUFFER_PTS(buffer) = 0;
     EXPECT_EQ(sink.Harness::push(buffer), GST_FLOW_ERROR);
     EXPECT_NE(sink.error().find("partial event"), std::string::npos);
+  }
+  {
+    // As on a full disk.
+    rlimit before = {};
+    getrlimit(RLIMIT_FSIZE, &before);
+    const rlimit limit = {100'000, before.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    Sink sink("eventhdf5sink compression=none location=" + in_quotes(folder / "out.h5"));
+    sink.caps(events_caps);
+    while (sink.push(some_events(), 2'000'000) == GST_FLOW_OK) continue;
+    setrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, handler);
+    EXPECT_TRUE(sink.error().starts_with("The disk is full"));
   }
   const Owned<GstElement> nowhere(gst_element_factory_make("eventhdf5sink", nullptr));
   EXPECT_EQ(gst_element_set_state(nowhere.get(), GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <system_error>
 #include <thread>
 
 #include "src/formats/byte_source.hpp"
@@ -386,14 +387,43 @@ TEST_F(Hdf5, WhatWasCommittedSurvivesTheProcess) {
   }
 }
 
+/// A crash or a full disk costs a fifth of the events, or two chunks.
+std::size_t min_kept(std::size_t events) {
+  return events - std::min(events, std::max<std::size_t>(events / 5, 2 * 16384));
+}
+
 /// Events that come faster than the time between commits.
 TEST_F(Hdf5, MostEventsSurviveTheProcess) {
   for (auto settings : all_settings({640, 480})) {
     settings.commit_interval = std::chrono::hours(1);
-    const auto events = random_events(500'000, settings.size, 21, 1'000'000);
-    const auto left = left_by_a_killed_process(path(), settings, events, 0);
-    EXPECT_GE(left.size(), events.size() * 3 / 4);
-    EXPECT_TRUE(std::ranges::equal(left, std::span(events).first(left.size())));
+    for (const std::size_t count : {60'000, 500'000}) {
+      const auto events = random_events(count, settings.size, 21, 1'000'000);
+      const auto left = left_by_a_killed_process(path(), settings, events, 0);
+      EXPECT_GE(left.size(), min_kept(count));
+      EXPECT_TRUE(std::ranges::equal(left, std::span(events).first(left.size())));
+    }
+  }
+}
+
+TEST_F(Hdf5, MostEventsSurviveAFullDisk) {
+  const auto events = random_events(400'000, {640, 480}, 21, 1'000'000);
+  for (auto settings : all_settings({640, 480})) {
+    settings.commit_interval = std::chrono::hours(1);
+    for (const rlim_t most : {300'000, 1'000'000}) {
+      std::size_t written = 0;
+      {
+        const FileSizeLimit limit(most);
+        Hdf5Writer writer(path(), settings);
+        EXPECT_THROW(for (; written < events.size(); written += 1000)
+                         writer.append(std::span(events).subspan(written, 1000)),
+                     std::system_error);
+      }
+      Hdf5Reader reader(in_memory(contents(path())));
+      const auto left = read_all(reader);
+      EXPECT_EQ(reader.corruption().places, 0U);
+      EXPECT_GE(left.size(), min_kept(written));
+      EXPECT_TRUE(std::ranges::equal(left, std::span(events).first(left.size())));
+    }
   }
 }
 

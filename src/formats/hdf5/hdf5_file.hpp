@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <future>
 #include <span>
 #include <vector>
 
@@ -16,14 +17,14 @@ namespace eventcamera {
 Hdf5Handle open_hdf5(ByteSource& source);
 
 /// Output file for the HDF5 library, which survives the end of the process: new bytes are written
-/// at the end of the file, and bytes that replace committed ones are held until the next commit().
+/// at the end of the file, and bytes that replace committed ones are held until the next commit.
 ///
 /// The library does not survive a failed write, as on a full disk: it crashes when it closes the
 /// file or when the process ends. So every write succeeds for the library; callers must call
 /// check() and stop writing after an error.
 class Hdf5Output {
  public:
-  /// Overwrites an existing file. Throws std::runtime_error.
+  /// Overwrites an existing file. Throws std::system_error.
   explicit Hdf5Output(const std::filesystem::path& path);
   ~Hdf5Output();
   Hdf5Output(const Hdf5Output&) = delete;
@@ -33,10 +34,16 @@ class Hdf5Output {
   /// failure.
   Hdf5Handle create();
 
-  /// Makes the file what the library has flushed or closed.
-  void commit();
+  /// Starts to make the file what the library has flushed: the new bytes reach the disk in the
+  /// background, and then those that replace committed ones. Waits for an earlier commit.
+  void start_commit();
+  bool is_committing() const;
+  void finish_commit();
 
-  /// Throws std::runtime_error if a write failed.
+  /// Completes the file after the library has closed it.
+  void finish();
+
+  /// Throws std::system_error if a write failed.
   void check() const;
 
   // Called by the library.
@@ -51,8 +58,7 @@ class Hdf5Output {
     std::vector<std::uint8_t> bytes;
   };
 
-  std::span<const std::uint8_t> write_to_file(std::uint64_t position,
-                                              std::span<const std::uint8_t> bytes);
+  int write_committing() const;
   void hold(std::uint64_t position, std::span<const std::uint8_t> bytes);
   [[noreturn]] void fail(int error) const;
 
@@ -60,9 +66,12 @@ class Hdf5Output {
   int fd_ = -1;
   int error_ = 0;                ///< first error, as in errno
   std::uint64_t size_ = 0;       ///< as seen by the library
-  std::uint64_t committed_ = 0;  ///< size at the last commit
+  std::uint64_t written_ = 0;    ///< size of the file
+  std::uint64_t committed_ = 0;  ///< size at the start of the last commit
   /// Writes below that size, and failed ones, which the library may read again.
   std::vector<Piece> held_;
+  std::vector<Piece> committing_;  ///< held until the last commit, which writes them
+  std::future<int> commit_;        ///< error of the last commit, while it runs
 };
 
 }  // namespace eventcamera

@@ -13,6 +13,10 @@
 
 namespace eventcamera {
 
+/// Rows per chunk: of events, and of the index, which each commit writes to its last row.
+constexpr hsize_t hdf5_chunk = 16384;
+constexpr hsize_t hdf5_index_chunk = 4096;
+
 /// Writes the datasets of one layout.
 class Hdf5Layout {
  public:
@@ -21,8 +25,9 @@ class Hdf5Layout {
   virtual bool append(std::span<const Trigger> triggers) = 0;
   virtual std::size_t label(std::span<const Label> /*labels*/) { return 0; }
 
-  /// Hands all rows to the library.
-  virtual void flush() = 0;
+  /// Hands the rows to the library: all, or only those of complete chunks, because the library
+  /// compresses and writes a partial chunk again when it has more rows.
+  virtual void flush(bool with_partial_chunks) = 0;
   virtual void close() = 0;
 };
 

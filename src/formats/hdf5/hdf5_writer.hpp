@@ -55,6 +55,8 @@ class Hdf5Writer {
   void close();
 
  private:
+  void start_commit(bool with_partial_chunks);
+
   using Clock = std::chrono::steady_clock;
   struct File;
 
@@ -63,9 +65,9 @@ class Hdf5Writer {
   std::unique_ptr<File> file_;
   std::unique_ptr<Hdf5Layout> layout_;
   Microseconds latest_ = INT64_MIN;
-  Clock::time_point committed_{};  ///< time of the last commit
+  Clock::time_point committed_{};  ///< time of the last commit of all events
+  std::size_t events_ = 0;
   std::size_t committed_events_ = 0;
-  std::size_t uncommitted_ = 0;
 };
 
 }  // namespace eventcamera
