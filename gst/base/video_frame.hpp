@@ -76,8 +76,11 @@ class VideoFrame {
            meta.n_planes >= GST_VIDEO_INFO_N_PLANES(&info);
   }
 
-  /// Checks the planes that are accessed: the first, or all planes of RGB.
+  /// Checks the planes that are accessed: the first, alpha, or all planes of RGB.
   bool rows_fit(const GstVideoInfo& info) const {
+    if (GST_VIDEO_INFO_HAS_ALPHA(&info) &&
+        !rows_fit(info, GST_VIDEO_INFO_COMP_PLANE(&info, GST_VIDEO_COMP_A)))
+      return false;
     const guint planes = GST_VIDEO_INFO_IS_RGB(&info) ? GST_VIDEO_INFO_N_PLANES(&info) : 1;
     for (guint plane = 0; plane < planes; ++plane)
       if (!rows_fit(info, plane)) return false;

@@ -92,12 +92,17 @@ bool run_in(GstGLContext* context, const Work& work) {
   return call.has_run;
 }
 
-/// Weights of the channels of the first texture in luma.
-void find_weights(const GstVideoInfo& video, int (&weights)[4]) {
+/// Describes the channels of the first texture of `video`.
+void describe_channels(const GstVideoInfo& video, eventcamera::gl::TextureFrame& frame) {
   const auto channel = [&](guint component) -> int& {
-    return weights[GST_VIDEO_INFO_COMP_POFFSET(&video, component)];
+    return frame.weights[GST_VIDEO_INFO_COMP_POFFSET(&video, component)];
   };
-  std::fill(std::begin(weights), std::end(weights), 0);
+  const bool is_narrow =
+      !GST_VIDEO_INFO_IS_RGB(&video) && video.colorimetry.range == GST_VIDEO_COLOR_RANGE_16_235;
+  frame.black = is_narrow ? 16 : 0;
+  frame.alpha =
+      GST_VIDEO_INFO_HAS_ALPHA(&video) ? GST_VIDEO_INFO_COMP_POFFSET(&video, GST_VIDEO_COMP_A) : -1;
+  std::fill(std::begin(frame.weights), std::end(frame.weights), 0);
   if (GST_VIDEO_INFO_IS_RGB(&video)) {
     const auto luma = luma_weights_of(video);
     channel(GST_VIDEO_COMP_R) = luma.red;
@@ -142,7 +147,7 @@ class TextureVideoSimulator final : public VideoSimulator {
 
   void set_video(const GstVideoInfo& video) override {
     video_ = video;
-    find_weights(video, frame_.weights);
+    describe_channels(video, frame_);
     gst_clear_object(&upload_);
   }
 

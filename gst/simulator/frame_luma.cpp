@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/simulator/frame_luma.hpp"
 
+using eventcamera::AlphaView;
 using eventcamera::ColourView;
 using eventcamera::Image;
 using eventcamera::LumaFormat;
@@ -66,11 +67,12 @@ FrameLuma::Layout FrameLuma::layout_of(const GstVideoInfo& video) {
 FrameLuma::FrameLuma(const GstVideoInfo& video)
     : video_(video),
       layout_(layout_of(video)),
+      has_alpha_(GST_VIDEO_INFO_HAS_ALPHA(&video)),
       format_(format_of(video)),
       is_narrow_(!GST_VIDEO_INFO_IS_RGB(&video) &&
                  video.colorimetry.range == GST_VIDEO_COLOR_RANGE_16_235),
       weights_(luma_weights_of(video)) {
-  if (layout_ == Layout::plane) return;
+  if (layout_ == Layout::plane && !has_alpha_) return;
   if (format_.bits == 8)
     bytes_ = Image<guint8>(format_.width, format_.height);
   else
@@ -96,7 +98,25 @@ RgbWordsView FrameLuma::rgb_words_of(const VideoFrame& frame) const {
           format == GST_VIDEO_FORMAT_BGR16 || format == GST_VIDEO_FORMAT_BGR15};
 }
 
+AlphaView FrameLuma::alpha_of(const VideoFrame& frame) const {
+  const int sample = format_.bits == 8 ? 1 : 2;
+  return {GST_VIDEO_FRAME_COMP_DATA(frame.get(), GST_VIDEO_COMP_A),
+          GST_VIDEO_FRAME_COMP_STRIDE(frame.get(), GST_VIDEO_COMP_A),
+          GST_VIDEO_INFO_COMP_PSTRIDE(&video_, GST_VIDEO_COMP_A) / sample};
+}
+
 LumaView FrameLuma::of(const VideoFrame& frame, ThreadPool& threads) {
+  const LumaView opaque = opaque_luma_of(frame, threads);
+  if (!has_alpha_) return opaque;
+  if (format_.bits == 8) {
+    composite_on_black(opaque, alpha_of(frame), threads, bytes_);
+    return view_of(bytes_, format_, is_narrow_);
+  }
+  composite_on_black(opaque, alpha_of(frame), threads, words_);
+  return view_of(words_, format_, is_narrow_);
+}
+
+LumaView FrameLuma::opaque_luma_of(const VideoFrame& frame, ThreadPool& threads) {
   switch (layout_) {
     case Layout::plane:
       break;

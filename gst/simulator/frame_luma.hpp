@@ -4,6 +4,7 @@
 #include <gst/video/video.h>
 
 #include "gst/base/video_frame.hpp"
+#include "src/core/alpha.hpp"
 #include "src/core/luma.hpp"
 #include "src/core/rgb_luma.hpp"
 #include "src/core/thread_pool.hpp"
@@ -13,7 +14,8 @@
 eventcamera::LumaWeights luma_weights_of(const GstVideoInfo& video);
 
 /// Luma of video of EVENT_SIMULATOR_INPUT_FORMATS: read in place if it is a plane, copied if it is
-/// interleaved with chroma or byte-swapped, or computed from RGB.
+/// interleaved with chroma or byte-swapped, or computed from RGB. Transparent video is composited
+/// on black.
 class FrameLuma {
  public:
   /// Allocates the buffer for copied luma, if any. May throw.
@@ -28,11 +30,14 @@ class FrameLuma {
   enum class Layout { plane, interleaved, swapped, rgb, rgb_words };
 
   static Layout layout_of(const GstVideoInfo& video);
+  eventcamera::LumaView opaque_luma_of(const VideoFrame& frame, eventcamera::ThreadPool& threads);
+  eventcamera::AlphaView alpha_of(const VideoFrame& frame) const;
   eventcamera::RgbView rgb_of(const VideoFrame& frame) const;
   eventcamera::RgbWordsView rgb_words_of(const VideoFrame& frame) const;
 
   GstVideoInfo video_;
   Layout layout_;
+  bool has_alpha_;
   eventcamera::LumaFormat format_;
   bool is_narrow_;
   eventcamera::LumaWeights weights_;

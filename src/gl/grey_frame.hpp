@@ -14,6 +14,8 @@ struct TextureFrame {
   /// Weights of the four channels in luma, in units of 1/LumaWeights::one. Their sum is
   /// LumaWeights::one.
   int weights[4];
+  int alpha = -1;  ///< channel of alpha; -1: opaque
+  int black = 0;   ///< luma of black, on which the frame is composited
 };
 
 inline std::size_t pixel_count(const LumaFormat& format) {
@@ -35,7 +37,7 @@ class GreyFrame {
   Buffer buffer_;
 };
 
-/// Computes the luma of textures, exactly as luma_of_rgb() does.
+/// Computes the luma of textures, exactly as luma_of_rgb() and composite_on_black() do.
 class LumaKernel {
  public:
   explicit LumaKernel(const Context& gl);

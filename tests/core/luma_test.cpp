@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "src/core/alpha.hpp"
 #include "src/core/rgb_luma.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/reference/luma.hpp"
@@ -160,6 +161,48 @@ TEST(Luma, IsGatheredFromPackedPictures) {
             gather_luma(static_cast<const std::uint8_t*>(all.data), all.stride, step, out);
           },
           [&, by = step](int x, int y) { return rows.at(x * by, y); });
+    }
+  }
+}
+
+template <class Sample>
+void expect_composited(int width, int height, int step, int bits, bool is_narrow) {
+  const int white = (1 << bits) - 1;
+  const int black = is_narrow ? 16 << (bits - 8) : 0;
+  const Rows<Sample> luma(width, height, 3, white, 17);
+  const Rows<Sample> alpha(width * step, height, 5, white, 19);
+  const ColourView lumas = luma.colour(0);
+  const ColourView alphas = alpha.colour(0);
+  const auto expected = [&](int x, int y) {
+    return reference::on_black(luma.at(x, y), alpha.at(x * step, y), white, black);
+  };
+  const AlphaView view{alphas.data, alphas.stride, step};
+  expect_luma<Sample>(
+      width, height,
+      [&](ThreadPool& threads, Image<Sample>& out) {
+        composite_on_black({{width, height, bits}, lumas.data, lumas.stride, is_narrow}, view,
+                           threads, out);
+      },
+      expected);
+  expect_luma<Sample>(
+      width, height,
+      [&](ThreadPool& threads, Image<Sample>& out) {
+        for (int y = 0; y < height; ++y)
+          for (int x = 0; x < width; ++x) out.at(x, y) = static_cast<Sample>(luma.at(x, y));
+        composite_on_black({{width, height, bits}, out.view().data, out.stride(), is_narrow}, view,
+                           threads, out);
+      },
+      expected);
+}
+
+TEST(Luma, IsCompositedOnBlack) {
+  for (const auto& [width, height] : sizes) {
+    for (const int step : {1, 4}) {
+      for (const bool is_narrow : {false, true}) {
+        expect_composited<std::uint8_t>(width, height, step, 8, is_narrow);
+        for (const int bits : {10, 12, 16})
+          expect_composited<std::uint16_t>(width, height, step, bits, is_narrow);
+      }
     }
   }
 }

@@ -160,8 +160,8 @@ class Harness {
 
   /// A frame with luma `grey(x, y)` in the negotiated format. Each row is followed by `padding`
   /// bytes, described by a GstVideoMeta.
-  GstBuffer* frame(GstClockTime pts, const std::function<int(int x, int y)>& grey,
-                   int padding = 0) const {
+  GstBuffer* frame(GstClockTime pts, const std::function<int(int x, int y)>& grey, int padding = 0,
+                   int alpha = 255) const {
     gsize size = GST_VIDEO_INFO_SIZE(&info_);
     gsize offsets[GST_VIDEO_MAX_PLANES] = {};
     gint strides[GST_VIDEO_MAX_PLANES] = {};
@@ -183,6 +183,7 @@ class Harness {
                                      GST_VIDEO_INFO_N_PLANES(&info_), offsets, strides);
     const int components = GST_VIDEO_INFO_IS_RGB(&info_) ? 3 : 1;
     for (int component = 0; component < components; ++component) draw(buffer, component, grey);
+    draw_alpha(buffer, alpha);
     GST_BUFFER_PTS(buffer) = pts;
     return buffer;
   }
@@ -193,6 +194,7 @@ class Harness {
     gst_buffer_memset(buffer, 0, 0, GST_VIDEO_INFO_SIZE(&info_));
     for (int component = 0; component < 3; ++component)
       draw(buffer, component, [&](int, int) { return rgb[static_cast<std::size_t>(component)]; });
+    draw_alpha(buffer, 255);
     GST_BUFFER_PTS(buffer) = pts;
     return buffer;
   }
@@ -240,6 +242,11 @@ class Harness {
 
  private:
   std::string text_of_next(GstMessageType type) { return text_of(message(type).get()); }
+
+  void draw_alpha(GstBuffer* buffer, int alpha) const {
+    if (GST_VIDEO_INFO_HAS_ALPHA(&info_))
+      draw(buffer, GST_VIDEO_COMP_A, [alpha](int, int) { return alpha; });
+  }
 
   /// Draws one component; others in the same words stay.
   void draw(GstBuffer* buffer, int component, const std::function<int(int x, int y)>& value) const {

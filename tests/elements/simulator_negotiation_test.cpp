@@ -118,15 +118,45 @@ std::size_t fired_by(const std::string& format, const std::string& colorimetry, 
   return buffer ? events_of(buffer.get()).size() : 0;
 }
 
+/// Input formats whose GstVideoFormatInfo has this flag.
+std::vector<std::string> input_formats(GstVideoFormatFlags flag) {
+  std::vector<std::string> names;
+  for (const auto& name : formats("sink"))
+    if (const auto* info = gst_video_format_get_info(gst_video_format_from_string(name.c_str()));
+        (GST_VIDEO_FORMAT_INFO_FLAGS(info) & flag) != 0)
+      names.push_back(name);
+  return names;
+}
+
+class EveryFormatWithAlpha : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(, EveryFormatWithAlpha,
+                         testing::ValuesIn(input_formats(GST_VIDEO_FORMAT_FLAG_ALPHA)),
+                         [](const auto& test) { return test.param; });
+
+/// A grey of 200 with half alpha is as bright as 100; black of YUV is 16.
+TEST_P(EveryFormatWithAlpha, IsCompositedOnBlack) {
+  const auto* info = gst_video_format_get_info(gst_video_format_from_string(GetParam().c_str()));
+  const double rise = (GST_VIDEO_FORMAT_INFO_IS_YUV(info) ? 200 - 16 : 200) * 128 / 255.0;
+  for (const int padding : {0, 24}) {
+    for (const auto& [threshold, fired] : {std::pair(rise - 2, 31 * 23U), {rise + 2, 0U}}) {
+      Harness h("eventsim-frame positive-threshold=" + std::to_string(threshold));
+      h.caps("video/x-raw, framerate=25/1, width=31, height=23, format=" + GetParam());
+      GstClockTime time = 0;
+      for (const auto& [grey, alpha] : {std::pair(60, 0), {255, 0}, {200, 128}}) {
+        ASSERT_FALSE(h.pull()) << "transparent pixels fired";
+        h.push(h.frame(
+            time, [grey = grey](int, int) { return grey; }, padding, alpha));
+        time += 40 * GST_MSECOND;
+      }
+      const auto buffer = h.pull();
+      EXPECT_EQ(buffer ? events_of(buffer.get()).size() : 0, fired) << threshold;
+    }
+  }
+}
+
 class EveryRgbFormat : public testing::TestWithParam<std::string> {};
-INSTANTIATE_TEST_SUITE_P(, EveryRgbFormat, testing::ValuesIn([] {
-                           std::vector<std::string> rgb;
-                           for (const auto& name : formats("sink"))
-                             if (GST_VIDEO_FORMAT_INFO_IS_RGB(gst_video_format_get_info(
-                                     gst_video_format_from_string(name.c_str()))))
-                               rgb.push_back(name);
-                           return rgb;
-                         }()),
+INSTANTIATE_TEST_SUITE_P(, EveryRgbFormat,
+                         testing::ValuesIn(input_formats(GST_VIDEO_FORMAT_FLAG_RGB)),
                          [](const auto& test) { return test.param; });
 
 /// Luma changes by 0.2126, 0.7152 and 0.0722 of what red, green and blue do.

@@ -92,8 +92,9 @@ class Texture {
     return bytes;
   }
 
-  eventcamera::gl::TextureFrame frame(const int (&weights)[4]) const {
-    return {format_, name_, {weights[0], weights[1], weights[2], weights[3]}};
+  eventcamera::gl::TextureFrame frame(const int (&weights)[4], int alpha = -1,
+                                      int black = 0) const {
+    return {format_, name_, {weights[0], weights[1], weights[2], weights[3]}, alpha, black};
   }
 
  private:

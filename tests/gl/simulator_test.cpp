@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "src/core/alpha.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/simulator.hpp"
@@ -86,7 +87,7 @@ TEST_P(EveryApi, ComputesTheLumaOfColoursBitForBit) {
   settings.negative_threshold = 0;
   Texture texture(width, height, 4);
   ThreadPool threads;
-  for (int i = 0; i < 3; ++i) {
+  for (int i = 0; i < 5; ++i) {
     std::vector<std::uint8_t> bgra(width * height * 4);
     for (auto& byte : bgra) byte = static_cast<std::uint8_t>(random() >> 8);
     Image<std::uint8_t> luma(width, height);
@@ -95,9 +96,16 @@ TEST_P(EveryApi, ComputesTheLumaOfColoursBitForBit) {
                         {bgra.data(), width * 4, 1},
                         {bgra.data(), width * 4, 0}},
                 weights, threads, luma);
+    const bool is_narrow = i == 3;
+    const bool is_opaque = i < 2;
+    if (!is_opaque)
+      composite_on_black({format, luma.view().data, luma.stride(), is_narrow},
+                         {&bgra[3], width * 4, 4}, threads, luma);
     texture.upload(bgra);
     const auto* made =
-        gl_test::events_until(*ours, texture.frame({weights.blue, weights.green, weights.red, 0}),
+        gl_test::events_until(*ours,
+                              texture.frame({weights.blue, weights.green, weights.red, 0},
+                                            is_opaque ? -1 : 3, is_narrow ? 16 : 0),
                               i * scene::frame_time, settings);
     const auto* expected = reference->push(scene::luma(luma), i * scene::frame_time, settings);
     if (i == 0) continue;

@@ -15,6 +15,13 @@ inline int luma(const LumaWeights& weights, std::int64_t red, std::int64_t green
   return static_cast<int>((sum + LumaWeights::one / 2) / LumaWeights::one);
 }
 
+/// The nearest integer to `value` behind `alpha` of `white`, on `black`.
+inline int on_black(std::int64_t value, std::int64_t alpha, std::int64_t white,
+                    std::int64_t black) {
+  const std::int64_t sum = value * alpha + black * (white - alpha);
+  return static_cast<int>((2 * sum + white) / (2 * white));
+}
+
 /// A colour of 5 or 6 bits in 8: black stays black, and white white.
 inline int in_8_bits(int value, int bits) {
   return bits == 5 ? value * 8 + value / 4 : value * 4 + value / 16;
