@@ -336,6 +336,27 @@ TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
   gst_element_set_state(nowhere.get(), GST_STATE_NULL);
 }
 
+TEST(Hdf5Dec, HasAPathAndAUnit) {
+  const Folder folder;
+  const auto path = folder / "events.h5";
+  {
+    Hdf5Writer writer(path, {Hdf5Format::dsec, Hdf5Writer::Compression::gzip, {width, height}});
+    writer.append(Events{AbsoluteEvent::at(5, 6, 0, Polarity::on),
+                         AbsoluteEvent::at(7, 8, 3007, Polarity::off)});
+    writer.close();
+  }
+  const auto reader = "filesrc location=" + in_quotes(path) + " ! eventhdf5dec ";
+  Player player(reader + "events-path=/events time-unit=nanoseconds");
+  ASSERT_TRUE(player.play()) << player.error;
+  ASSERT_EQ(player.events.size(), 2U);
+  EXPECT_EQ(player.events[1].t, 3);
+  Player other(reader + "events-path=right");
+  EXPECT_FALSE(other.play());
+  EXPECT_NE(other.error.find("no events at events-path /right; it has some at /events"),
+            std::string::npos)
+      << other.error;
+}
+
 TEST(Hdf5Dec, SaysWhatCannotBeRead) {
   const Folder folder;
   EXPECT_FALSE(

@@ -106,6 +106,9 @@ void Hdf5Dataset::check_storage(hid_t file) {
       const Hdf5Handle space(H5Dget_space(dataset_.get()), H5Sclose);
       if (claimed > 0 && H5Dget_num_chunks(dataset_.get(), space.get(), &chunks) < 0)
         refuse(path_, "has a corrupt index of its chunks");
+      // An index may name one chunk again and again: a small file would be read without end.
+      if (H5Dget_storage_size(dataset_.get()) > file_bytes_)
+        refuse(path_, "has chunks that overlap");
       // Limits holes: they are read, unless they make up most of the file.
       const auto max_chunks = 2 * std::min<std::uint64_t>(chunks, UINT32_MAX) + max_holes;
       const auto max_rows = std::min<std::uint64_t>(max_chunks, UINT64_MAX / chunk_[0]) * chunk_[0];

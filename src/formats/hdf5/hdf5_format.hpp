@@ -2,6 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+
+#include "src/formats/event_table.hpp"
 
 namespace eventcamera {
 
@@ -11,6 +14,12 @@ enum class Hdf5Format : std::uint8_t {
   v2e,         ///< /events, rows of t, x, y, p
   metavision,  ///< /CD/events and /EXT_TRIGGER/events, compressed with ECF
   mvsec,       ///< /davis/left/events, rows of x, y, t in seconds, p
+};
+
+/// Which events of a file to read, and how.
+struct Hdf5Selection {
+  std::string path = {};     ///< of a dataset or a group; empty: the first events
+  TableSettings table = {};  ///< columns are for rows without names
 };
 
 /// Compression of the layouts that leave it open.

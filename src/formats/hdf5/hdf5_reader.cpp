@@ -48,25 +48,30 @@ Hdf5Handle open_source(ByteSource& bytes) {
 
 }  // namespace
 
-Hdf5Reader::Hdf5Reader(std::unique_ptr<ByteSource> bytes)
-    : Hdf5Reader([&] {
-        File file;
-        file.handle = open_source(*bytes);
-        file.bytes = std::move(bytes);
-        return file;
-      }()) {}
+Hdf5Reader::Hdf5Reader(std::unique_ptr<ByteSource> bytes, const Hdf5Selection& selection)
+    : Hdf5Reader(
+          [&] {
+            File file;
+            file.handle = open_source(*bytes);
+            file.bytes = std::move(bytes);
+            return file;
+          }(),
+          selection) {}
 
-Hdf5Reader::Hdf5Reader(ByteSource& bytes)
-    : Hdf5Reader([&] {
-        File file;
-        file.handle = open_source(bytes);
-        return file;
-      }()) {}
+Hdf5Reader::Hdf5Reader(ByteSource& bytes, const Hdf5Selection& selection)
+    : Hdf5Reader(
+          [&] {
+            File file;
+            file.handle = open_source(bytes);
+            return file;
+          }(),
+          selection) {}
 
-Hdf5Reader::Hdf5Reader(File file) : file_(std::make_unique<File>(std::move(file))) {
+Hdf5Reader::Hdf5Reader(File file, const Hdf5Selection& selection)
+    : file_(std::make_unique<File>(std::move(file))) {
   const Hdf5Session session;
   const auto id = file_->handle.get();
-  table_ = Hdf5Table::open(id);
+  table_ = Hdf5Table::open(id, selection);
   size_ = table_->size();
   has_labels_ = table_->has_labels();
   if (table_->format() == Hdf5Format::metavision) triggers_ = Hdf5Triggers::open(id);
@@ -80,6 +85,10 @@ Hdf5Reader::~Hdf5Reader() {
   triggers_.reset();
   table_.reset();
   file_.reset();
+}
+
+std::string Hdf5Reader::others() const {
+  return table_->others();
 }
 
 std::optional<Hdf5Reader::TimeRange> Hdf5Reader::time_range() const {

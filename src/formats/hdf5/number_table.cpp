@@ -49,8 +49,7 @@ TimeUnit NumberTable::detect(const TableSample& sample, const Columns& columns,
   unit = sample.find_unit(columns, false);
   if (!unit)
     throw UnsupportedFormat("the time unit of the HDF5 dataset " + path +
-                            " is ambiguous; rename the times to t_s, t_us or t_ns, or convert them "
-                            "to text or NumPy, whose readers have time-unit");
+                            " is ambiguous; set time-unit, or name the times t_s, t_us or t_ns");
   return *unit;
 }
 
