@@ -26,6 +26,8 @@ MAX_TIME = 1 << 52
 # Longest pause whose windows are returned, in seconds and in windows.
 MAX_PAUSE = 60
 MAX_EMPTY = 10_000
+# Largest len() of a stream: 51 days of 33 ms.
+MAX_LEN = 1 << 27
 # Microseconds of the buffers that are written.
 BUFFER = 10_000
 # Bytes that may wait to be written, and nanoseconds between two looks at them.
@@ -56,9 +58,10 @@ class Stream:
         past the end is empty.
 
     Iterating yields an Events array a window, empty where nothing happened; only one is in memory. Windows of pauses
-    of more than a minute or 10,000 windows are skipped, with a PipelineWarning; start and end of each array say
-    where it lies. The window that the recording ends in is the last one. Indexing and slices seek in the file. The duration, len(),
-    and indices from the end look for the end of the recording, once: a file without an index is read to its end.
+    of more than a minute or 10,000 windows are skipped, with a PipelineWarning; start and end of each array are its
+    times. len() and indices count these windows, too. The window that the recording ends in is the last one. Indexing
+    and slices seek in the file. The duration, len(), and indices from the end look for the end of the recording, once:
+    a file without an index is read to its end.
     Raises PipelineError if the file cannot be read, and ValueError for other lengths and parts."""
 
     path: str
@@ -107,8 +110,17 @@ class Stream:
         """The number of windows that begin within so many seconds."""
         return -(-round(seconds * 1e6) // round(self.window * 1e6))
 
-    def __len__(self) -> int:
+    @property
+    def _count(self) -> int:
         return self._windows(self.duration)
+
+    def __len__(self) -> int:
+        count = self._count
+        if count > MAX_LEN:
+            # list() reserves memory for len() items, but not after a TypeError.
+            raise TypeError(f"{self.path} has {count} windows, most of them in pauses: iterate, which skips these, or use"
+                            " duration")
+        return count
 
     @overload
     def __getitem__(self, index: int) -> Events: ...
@@ -119,12 +131,12 @@ class Stream:
     def __getitem__(self, index: int | slice) -> Events | Stream:
         if isinstance(index, slice):
             is_from_end = min(index.start or 0, index.stop or 0) < 0
-            first, last, step = index.indices(len(self) if is_from_end else sys.maxsize)
+            first, last, step = index.indices(self._count if is_from_end else sys.maxsize)
             if step != 1:
                 raise ValueError("a slice of a stream has no step")
             return self.between(first * self.window, None if index.stop is None else max(first, last) * self.window)
         index = operator.index(index)
-        first = index + len(self) if index < 0 else index
+        first = index + self._count if index < 0 else index
         if first >= 0:
             for events in self.between(first * self.window, (first + 1) * self.window):
                 return events
