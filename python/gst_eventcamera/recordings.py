@@ -93,7 +93,7 @@ class Stream:
         return self._length(self._whole)
 
     def _length(self, whole: float) -> float:
-        """Start and end of the part in a recording of this many seconds."""
+        """Length of the part, in a recording of `whole` seconds."""
         return max(0.0, min(whole, math.inf if self.end is None else self.end) - self.start)
 
     def between(self, start: float, end: Optional[float] = None) -> Stream:
@@ -107,7 +107,7 @@ class Stream:
         return part
 
     def _windows(self, seconds: float) -> int:
-        """The number of windows that begin within so many seconds."""
+        """The number of windows that begin within `seconds`."""
         return -(-round(seconds * 1e6) // round(self.window * 1e6))
 
     @property
@@ -118,8 +118,7 @@ class Stream:
         count = self._count
         if count > MAX_LEN:
             # list() reserves memory for len() items, but not after a TypeError.
-            raise TypeError(f"{self.path} has {count} windows, most of them in pauses: iterate, which skips these, or use"
-                            " duration")
+            raise TypeError(f"{self.path} has {count} windows, most of them in pauses; iterating skips these")
         return count
 
     @overload
@@ -248,7 +247,7 @@ def stream(path: str | os.PathLike[str], window: float = 0.033) -> Stream:
 def read(path: str | os.PathLike[str], start: float = 0, end: Optional[float] = None) -> Events:
     """All events of a recording, or those with start <= time < end, in seconds from its first event.
 
-    Shape (events,), 16 bytes each; times are those of the file. A part past the end is empty. Raises PipelineError
+    Shape (events,), 16 bytes each, with the times of the file. A part past the end is empty. Raises PipelineError
     if the file cannot be read or has no events to read, and ValueError unless 0 <= start <= end."""
     part = Stream(os.fsdecode(path), window=1, start=start, end=end)
     with part._open() as pipeline:
@@ -297,8 +296,8 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
 
 @contextlib.contextmanager
 def _replacing(path: str) -> Iterator[str]:
-    """A path to write to, whose file then replaces that of `path`, or is removed on failure. Devices and pipes are
-    written to as they are."""
+    """Yields a temporary path, whose file replaces `path` at the end, or is removed on failure; for devices and pipes,
+    the path itself."""
     target = os.path.realpath(path)
     if os.path.exists(target) and not os.path.isfile(target):
         yield target
@@ -350,8 +349,7 @@ def _buffers(events: np.ndarray) -> Iterator[Gst.Buffer]:
 
 
 def buffer_of(events: np.ndarray, start: int, duration: int) -> Gst.Buffer:
-    """A buffer of a stream that covers so many microseconds from `start` on, with the events of this time and
-    their labels."""
+    """A buffer of a stream that covers `duration` microseconds from `start` on, with its events and labels."""
     packed = np.empty(len(events), XYTP)
     packed["t"] = events["t"] - start
     packed["x"] = events["x"]

@@ -21,7 +21,7 @@ class DsecLayout final : public Hdf5Layout {
         x_(group_.get(), "x", H5T_STD_U16LE, H5T_NATIVE_UINT16, hdf5_chunk, compression_),
         y_(group_.get(), "y", H5T_STD_U16LE, H5T_NATIVE_UINT16, hdf5_chunk, compression_),
         t_(group_.get(), "t", H5T_STD_U32LE, H5T_NATIVE_UINT64, hdf5_chunk, compression_),
-        // Compressed, because it grows in pauses, too: 691 MB a day.
+        // Compressed, because a pause of a day takes 691 MB.
         index_(file, "ms_to_idx", H5T_STD_U64LE, H5T_NATIVE_UINT64, hdf5_index_chunk,
                Hdf5Compression::gzip) {
     write_number(file, "width", size.width);
@@ -87,8 +87,8 @@ class DsecLayout final : public Hdf5Layout {
     has_offset_ = true;
   }
 
-  /// DSEC stores times with 32 bits (71 minutes). Longer recordings get 64 bits, which readers
-  /// accept.
+  /// Continues with times of 64 bits, which readers accept. DSEC has 32 bits, which last 71
+  /// minutes.
   void widen() {
     t_.flush();
     wide_ = true;
@@ -116,7 +116,7 @@ class DsecLayout final : public Hdf5Layout {
       object_class.put(label.object_class);
     }
 
-    /// Adds empty labels for events without.
+    /// Adds empty labels for unlabelled events, up to this number of events.
     void complete(hsize_t events) {
       while (cause.count() < events) put({});
     }

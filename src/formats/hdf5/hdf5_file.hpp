@@ -16,12 +16,12 @@ namespace eventcamera {
 /// on failure.
 Hdf5Handle open_hdf5(ByteSource& source);
 
-/// Output file for the HDF5 library, which survives the end of the process: new bytes are written
-/// at the end of the file, and bytes that replace committed ones are held until the next commit.
+/// Output file of the HDF5 library that stays readable if the process is killed: new bytes are
+/// appended to the file, and bytes that overwrite committed ones are held until the next commit.
 ///
-/// The library does not survive a failed write, as on a full disk: it crashes when it closes the
-/// file or when the process ends. So every write succeeds for the library; callers must call
-/// check() and stop writing after an error.
+/// After a failed write, as on a full disk, the library crashes when it closes the file or when the
+/// process ends. So every write reports success to the library; callers must call check() and stop
+/// writing after an error.
 class Hdf5Output {
  public:
   /// Overwrites an existing file. Throws std::system_error.
@@ -34,8 +34,8 @@ class Hdf5Output {
   /// failure.
   Hdf5Handle create();
 
-  /// Starts to make the file what the library has flushed: the new bytes reach the disk in the
-  /// background, and then those that replace committed ones. Waits for an earlier commit.
+  /// Commits what the library has flushed, in the background: syncs the new bytes, then writes the
+  /// held ones. Waits for an earlier commit.
   void start_commit();
   bool is_committing() const;
   void finish_commit();
@@ -68,9 +68,9 @@ class Hdf5Output {
   std::uint64_t size_ = 0;       ///< as seen by the library
   std::uint64_t written_ = 0;    ///< size of the file
   std::uint64_t committed_ = 0;  ///< size at the start of the last commit
-  /// Writes below that size, and failed ones, which the library may read again.
+  /// Writes below committed_, and failed ones, which the library may read again.
   std::vector<Piece> held_;
-  std::vector<Piece> committing_;  ///< held until the last commit, which writes them
+  std::vector<Piece> committing_;  ///< held pieces that the last commit writes
   std::future<int> commit_;        ///< error of the last commit, while it runs
 };
 

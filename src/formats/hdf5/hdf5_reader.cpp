@@ -102,14 +102,14 @@ std::optional<Hdf5Reader::TimeRange> Hdf5Reader::time_range() const {
 
 /// Reads until there are events to return, or to the end.
 void Hdf5Reader::fill() {
-  while (taken_ == events_.size() && row_ < table_->rows()) {
+  while (returned_ == events_.size() && row_ < table_->rows()) {
     events_.clear();
-    taken_ = 0;
+    returned_ = 0;
     row_ = table_->read(row_, validator_, events_, corruption_);
     if (!not_before_) continue;
     const auto found = std::ranges::find_if(
         events_, [&](const AbsoluteEvent& event) { return event.t >= *not_before_; });
-    taken_ = static_cast<std::size_t>(found - events_.begin());
+    returned_ = static_cast<std::size_t>(found - events_.begin());
     if (found != events_.end()) not_before_.reset();
   }
 }
@@ -119,11 +119,11 @@ std::size_t Hdf5Reader::read(std::size_t count, std::vector<AbsoluteEvent>& out)
   std::size_t read = 0;
   while (read < count) {
     fill();
-    const auto part = std::min(count - read, events_.size() - taken_);
+    const auto part = std::min(count - read, events_.size() - returned_);
     if (part == 0) break;
-    const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(taken_);
+    const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(returned_);
     out.insert(out.end(), begin, begin + static_cast<std::ptrdiff_t>(part));
-    taken_ += part;
+    returned_ += part;
     read += part;
   }
   return read;
@@ -140,7 +140,7 @@ std::size_t Hdf5Reader::read_triggers(std::size_t count, std::vector<Trigger>& o
 void Hdf5Reader::seek(Microseconds t) {
   const Hdf5Session session;
   events_.clear();
-  taken_ = 0;
+  returned_ = 0;
   row_ = table_->row_before(t);
   not_before_ = t;
   if (triggers_) triggers_->seek(t);

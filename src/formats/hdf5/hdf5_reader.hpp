@@ -72,9 +72,9 @@ class Hdf5Reader {
   Corruption corruption_;
 
   std::uint64_t row_ = 0;              ///< next row to read
-  std::vector<AbsoluteEvent> events_;  ///< events read; the first taken_ were returned
-  std::size_t taken_ = 0;
-  std::optional<Microseconds> not_before_;  ///< set until an event was found
+  std::vector<AbsoluteEvent> events_;  ///< read; the first returned_ were returned
+  std::size_t returned_ = 0;
+  std::optional<Microseconds> not_before_;  ///< time of a seek, until its first event is found
 };
 
 }  // namespace eventcamera

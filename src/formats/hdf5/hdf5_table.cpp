@@ -58,7 +58,7 @@ std::unique_ptr<Hdf5Table> open_metavision(hid_t file) {
                         ColumnOrder{0, 1, 2, 3}, TimeUnit::microseconds);
 }
 
-/// Names that belong to t, x, y and p.
+/// Names of the datasets or members with t, x, y and p.
 struct NamedColumns {
   std::array<std::string, event_columns> names;
   std::optional<TimeUnit> unit;
@@ -149,8 +149,7 @@ class EventSearch {
   /// there are none.
   std::unique_ptr<Hdf5Table> table() { return std::move(table_); }
 
-  /// Describes what was wrong with the first dataset that may be one of events; empty if there was
-  /// none.
+  /// Error of the first dataset with events in its name; empty if there is none.
   const std::string& cause() const { return cause_; }
 
   /// Paths of the first events, and of the others.
@@ -176,7 +175,7 @@ class EventSearch {
       else if (column_named(name) && Hdf5Dataset::exists(file_, path, H5O_TYPE_DATASET))
         columns.add(name);
     }
-    // Events of a right camera are after those of a left one, in the order of names.
+    // Names are sorted, so a left camera comes before a right one.
     if (columns.are_complete()) {
       if (!table_)
         table_ = make_dsec_table(file_, {group, columns.names, columns.unit, settings_.unit});
@@ -254,7 +253,7 @@ SensorSize size_of_attributes(hid_t object) {
   const auto height = read_number_attribute(object, "height");
   if (width && height && is_side(*width) && is_side(*height))
     return {static_cast<int>(*width), static_cast<int>(*height)};
-  // Some tools state the height first; no sensor is upright.
+  // Some tools state the height first; sensors are wider than high.
   for (const char* const name :
        {"sensor_resolution", "sensor_size", "sensor_shape", "resolution"}) {
     const auto pair = read_pair_attribute(object, name);

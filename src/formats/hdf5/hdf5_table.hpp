@@ -40,7 +40,7 @@ class Hdf5Table {
   virtual std::uint64_t read(std::uint64_t row, RowValidator& validator,
                              std::vector<AbsoluteEvent>& out, Corruption& corruption) = 0;
 
-  /// Returns a row close to `t`, without events at `t` or later before it.
+  /// Returns a row close to `t`; all rows before it are earlier than `t`.
   virtual std::uint64_t row_before(Microseconds t) = 0;
 
   virtual std::optional<Microseconds> time_at(std::uint64_t row) = 0;

@@ -23,8 +23,8 @@ struct Hdf5Writer::File {
 
 namespace {
 
-/// Limits of the events between two commits, the first as a share of those before. A crash or a
-/// full disk costs those of two commits at most, as the last may not be complete.
+/// A commit follows a tenth more events, or this many. A crash or a full disk loses at most the
+/// events of two commits, since the last one may be incomplete.
 constexpr std::size_t new_share = 10;
 constexpr std::size_t max_uncommitted = std::size_t{1} << 20;
 

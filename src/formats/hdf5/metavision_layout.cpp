@@ -25,8 +25,8 @@ Hdf5Handle make_compound(std::size_t size, std::initializer_list<Member> members
   return type;
 }
 
-/// Index of the first event to read for each 2 ms since the first event. Compressed, because it
-/// grows in pauses, too: 691 MB a day.
+/// Index of the first event to read for each 2 ms since the first event. Compressed, because a
+/// pause of a day takes 691 MB.
 class MetavisionIndex {
  public:
   explicit MetavisionIndex(hid_t group)
