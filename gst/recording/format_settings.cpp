@@ -44,6 +44,14 @@ void add_topics(FormatProperties& properties) {
                           "", mutable_ready_flags));
 }
 
+void add_events_path(FormatProperties& properties) {
+  properties.add(&FormatSettings::events_path,
+                 g_param_spec_string("events-path", "Events path",
+                                     "Path of the events in the file: of a dataset or a group, "
+                                     "such as prophesee/right; empty = the first events",
+                                     "", mutable_ready_flags));
+}
+
 static GType time_unit_type() {
   static const GEnumValue units[] = {
       {0, "As stated in the file, or detected from its first rows", "auto"},

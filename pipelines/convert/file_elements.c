@@ -125,8 +125,8 @@ typedef struct {
 static const Target targets[OPTION_COUNT] = {
     [OPTION_FORMAT] = {"format", NULL},
     [OPTION_COMPRESSION] = {"compression", NULL},
-    [OPTION_TIME_UNIT] = {"time-unit", "text or NumPy files"},
-    [OPTION_COLUMN_ORDER] = {"column-order", "text or NumPy files"},
+    [OPTION_TIME_UNIT] = {"time-unit", "text, NumPy or HDF5 files"},
+    [OPTION_COLUMN_ORDER] = {"column-order", "text, NumPy or HDF5 files"},
     [OPTION_WIDTH] = {"width", "files that may lack a sensor size"},
     [OPTION_HEIGHT] = {"height", "files that may lack a sensor size"},
 };

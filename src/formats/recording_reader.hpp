@@ -162,7 +162,7 @@ class RecordingReader {
 
   std::string format_name() const { return input_.decoder().format_name(); }
 
-  std::string unread_topics() const { return input_.decoder().unread_topics(); }
+  UnreadStreams unread_streams() const { return input_.decoder().unread_streams(); }
 
   /// True if no events and frames were found before the Start.
   bool is_empty() const { return !earliest(); }

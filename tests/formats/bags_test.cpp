@@ -150,7 +150,7 @@ TEST_F(Bags, HaveTheirEventsAndFrames) {
       for (const auto& stream : decoder->streams())
         EXPECT_EQ(stream.size, stream.kind == StreamKind::events ? (SensorSize{346, 260})
                                                                  : (SensorSize{86, 65}));
-      EXPECT_EQ(decoder->unread_topics(), "topics /second/events");
+      EXPECT_EQ(decoder->unread_streams().names, "topics /second/events");
     }
   }
 }

@@ -372,7 +372,7 @@ refused "does not apply to .dat" ball.raw ball.dat --format=rpg
 refused "can only be read" ball.raw ball.aedat
 refused "choose one of auto seconds" --time-unit=hours ball.csv other.raw
 refused "must have each of t, x, y and p once" --column-order=xy ball.csv other.raw
-refused "only to reading text or NumPy" --time-unit=seconds ball.raw other.raw
+refused "only to reading text, NumPy or HDF5" --time-unit=seconds ball.raw other.raw
 refused "only to reading files that may lack a sensor size" --width=320 ball.es other.raw
 refused "--height: " --height=tall ball.csv other.raw
 printf '1000 2 3 1\n2000 4 5 0\n3000 6 7 1\n' >unclear.txt

@@ -23,10 +23,12 @@
  */
 #include <gst/base/gstbasesink.h>
 
+#include <cerrno>
 #include <chrono>
 #include <memory>
 #include <span>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "gst/base/authors.hpp"
@@ -107,6 +109,12 @@ static GType compression_type() {
 
 /* the file */
 
+static bool is_full(const std::exception& error) {
+  const auto* const failed = dynamic_cast<const std::system_error*>(&error);
+  const int code = failed != nullptr ? failed->code().value() : 0;
+  return code == ENOSPC || code == EDQUOT || code == EFBIG;
+}
+
 /// Runs `work`; reports any exception and ends the file, because it cannot be repaired.
 template <class Work>
 static bool reported(GstEventHdf5Sink* self, const Work& work) {
@@ -116,9 +124,14 @@ static bool reported(GstEventHdf5Sink* self, const Work& work) {
         auto* priv = self->priv;
         priv->state.writer.reset();
         priv->state.ended = true;
+        const std::string location = priv->settings.copy().location;
+        if (is_full(error))
+          return Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+                        "The disk is full, or limits the size of files. " + location +
+                            " can be read up to its last commit."};
         return WritableEvents::failure(
             error, {GST_RESOURCE_ERROR_WRITE,
-                    "Cannot write " + priv->settings.copy().location +
+                    "Cannot write " + location +
                         ". Set location to a writable folder on a disk with enough space."});
       },
       work);

@@ -283,8 +283,12 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
  * Reads the events of HDF5 files from Metavision (compressed with ECF), and of all others in which
  * one search finds datasets of a group that are named t, x, y and p, or the like, or a dataset
  * named events with such members or four columns: DSEC, TUM-VIE, M3ED, MVSEC, v2e, E2VID and
- * others. Of several cameras, the first by name is read. Events are output in buffers of
+ * others. Of several cameras, the first by name is read, unless #GstEventHdf5Dec:events-path
+ * selects another; a message names them. Events are output in buffers of
  * #GstEventReader:buffer-duration, with triggers for writers that store them.
+ *
+ * The time unit is detected by the name and the numbers of the times, unless
+ * #GstEventHdf5Dec:time-unit is set; a file whose time unit is in doubt is rejected.
  *
  * HDF5 files need random access, so upstream should support pull mode, as filesrc does. In push
  * mode the file is collected in memory, up to 256 MiB, and read at its end.
@@ -306,9 +310,15 @@ static const EventReaderFormat hdf5 = {
     .description = "Reads HDF5 files of events: DSEC, TUM-VIE, MVSEC, Metavision, v2e",
     .caps = "application/x-hdf5",
     .has_triggers = true,
-    .add_properties = add_sensor_size,
-    .make_decoder = [](const GstCaps*,
-                       const FormatSettings&) { return eventcamera::make_hdf5_decoder(); },
+    .add_properties =
+        [](FormatProperties& properties) {
+          add_table_properties(properties);
+          add_events_path(properties);
+        },
+    .make_decoder =
+        [](const GstCaps*, const FormatSettings& settings) {
+          return eventcamera::make_hdf5_decoder({settings.events_path, settings.table()});
+        },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, event_reader_type(hdf5))
 #endif

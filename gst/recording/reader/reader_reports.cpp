@@ -21,7 +21,7 @@ void ReaderReports::reset() {
   restart();
   warn_of_corruption_.reset();
   dropped_level_.reset();
-  posted_topics_.clear();
+  posted_streams_.clear();
 }
 
 void ReaderReports::restart() {
@@ -74,14 +74,15 @@ GstStructure* ReaderReports::stats() const {
   return stats;
 }
 
-void ReaderReports::post_unread_topics(const RecordingReader& recording) {
-  const auto topics = recording.unread_topics();
-  if (topics.empty() || topics == posted_topics_) return;
-  posted_topics_ = topics;
-  post_message(element_, GST_MESSAGE_INFO,
-               {GST_STREAM_ERROR_DEMUX,
-                "The file also has " + topics + ", which are not read. Set topics to read them."},
-               recording.format_name());
+void ReaderReports::post_unread_streams(const RecordingReader& recording) {
+  const auto [names, property] = recording.unread_streams();
+  if (names.empty() || names == posted_streams_) return;
+  posted_streams_ = names;
+  post_message(
+      element_, GST_MESSAGE_INFO,
+      {GST_STREAM_ERROR_DEMUX,
+       "The file also has " + names + ", which are not read. Set " + property + " to read them."},
+      recording.format_name());
 }
 
 void ReaderReports::post_end(const RecordingReader& recording, bool is_timed) {

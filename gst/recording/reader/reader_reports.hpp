@@ -30,8 +30,8 @@ class ReaderReports {
   /// The property `stats`. May be called from any thread.
   GstStructure* stats() const;
 
-  /// Posts an info message listing the topics that are not read.
-  void post_unread_topics(const eventcamera::RecordingReader& recording);
+  /// Posts an info message listing the streams that are not read.
+  void post_unread_streams(const eventcamera::RecordingReader& recording);
 
   /// At the end of a file: posts warnings if there were no events, or if items were dropped.
   void post_end(const eventcamera::RecordingReader& recording, bool is_timed);
@@ -45,5 +45,5 @@ class ReaderReports {
   bool has_new_corruption_ = false;
   WarnOnce warn_of_corruption_;
   RepeatLevel dropped_level_;
-  std::string posted_topics_;  ///< in the last message
+  std::string posted_streams_;  ///< in the last message
 };

@@ -254,9 +254,9 @@ std::optional<Microseconds> BagDecoder::decoded_last_time() {
   return last;
 }
 
-std::string BagDecoder::unread_topics() const {
+UnreadStreams BagDecoder::unread_streams() const {
   if (unread_.empty()) return {};
-  return "topics " + listed(unread_);
+  return {.names = "topics " + listed(unread_), .property = "topics"};
 }
 
 /// Throws UnsupportedFormat if the file ended without a topic to read.
