@@ -187,6 +187,9 @@ class Decoder {
   /// "topics /a, /b"; empty if there are none.
   virtual std::string unread_topics() const { return {}; }
 
+  /// True for tables, whose rows may be in any order; cameras write events in the order of time.
+  virtual bool is_table() const { return false; }
+
   /// Name of the format for users; empty if it adds nothing to the media type.
   virtual std::string format_name() const { return {}; }
 

@@ -170,6 +170,7 @@ GstFlowReturn EventReader::step() {
                      ", duration %" GST_TIME_FORMAT,
                      recording_->streams().size(), GST_TIME_ARGS(nanoseconds(recording_->origin())),
                      GST_TIME_ARGS(timeline_.duration()));
+    reports_.post_sorted(*recording_);
     reports_.post_unread_topics(*recording_);
   }
   return std::visit([this](const auto& item) { return output_.push(item); }, *output);

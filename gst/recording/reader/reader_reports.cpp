@@ -74,6 +74,15 @@ GstStructure* ReaderReports::stats() const {
   return stats;
 }
 
+void ReaderReports::post_sorted(const RecordingReader& recording) {
+  if (!recording.is_sorted()) return;
+  post_message(element_, GST_MESSAGE_WARNING,
+               {data_error_,
+                "The file is not sorted by time. Its events were read into memory and "
+                "sorted."},
+               "more than one event in a hundred is over 10 ms out of order");
+}
+
 void ReaderReports::post_unread_topics(const RecordingReader& recording) {
   const auto topics = recording.unread_topics();
   if (topics.empty() || topics == posted_topics_) return;

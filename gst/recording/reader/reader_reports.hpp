@@ -30,6 +30,9 @@ class ReaderReports {
   /// The property `stats`. May be called from any thread.
   GstStructure* stats() const;
 
+  /// Posts a warning if the events of a table had to be sorted.
+  void post_sorted(const eventcamera::RecordingReader& recording);
+
   /// Posts an info message listing the topics that are not read.
   void post_unread_topics(const eventcamera::RecordingReader& recording);
 
