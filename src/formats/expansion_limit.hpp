@@ -23,9 +23,9 @@ class ExpansionLimit {
   void count(std::size_t bytes) { allowed_ -= std::min<std::uint64_t>(bytes, allowed_); }
 
  private:
-  /// Black pictures of VGA size reach 3,000. Larger ones, which reach 13,000, use up the first
-  /// allowance slowly.
-  static constexpr std::uint64_t of_pictures = 4096;
+  /// Pictures of cameras reach a hundred. Black ones reach 13,000, and use up the 256 MiB in some
+  /// hundred pictures.
+  static constexpr std::uint64_t of_pictures = 2048;
 
   std::uint64_t max_ratio_;
   std::uint64_t allowed_ = std::uint64_t{1} << 28;
