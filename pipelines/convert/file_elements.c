@@ -68,7 +68,7 @@ static gboolean can_read_twice(const char* path) {
 
 const FileElement* find_reader(const char* path) {
   static const char matlab[] = "MATLAB 5.0 MAT-file";
-  static guint8 start[1 << 14];
+  static guint8 start[1 << 17];  // typefinders see into compressed files, too
   const FileElement* reader = NULL;
   if (!can_read_twice(path)) return NULL;
   FILE* file = fopen(path, "rb");

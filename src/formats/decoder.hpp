@@ -191,6 +191,9 @@ class Decoder {
 
   virtual UnreadStreams unread_streams() const { return {}; }
 
+  /// True for tables, whose rows may be in any order; cameras write events in the order of time.
+  virtual bool is_table() const { return false; }
+
   /// Name of the format for users; empty if it adds nothing to the media type.
   virtual std::string format_name() const { return {}; }
 

@@ -44,6 +44,9 @@ for ending in "${written[@]}"; do
   cp "ball.$ending" "content of $ending.bin"
   convert "content of $ending.bin" back.csv
   cmp ball.csv back.csv || fail "ball.$ending has other events"
+  gzip -c "ball.$ending" >"compressed $ending.bin"
+  convert "compressed $ending.bin" back.csv
+  cmp ball.csv back.csv || fail "ball.$ending, compressed, has other events"
 done
 cp ball.npy misnamed.dat
 convert misnamed.dat misnamed.csv

@@ -74,6 +74,24 @@ GstStructure* ReaderReports::stats() const {
   return stats;
 }
 
+void ReaderReports::post_cut(const std::optional<std::uint64_t>& corrupt_at) {
+  if (!corrupt_at) return;
+  const auto at = std::to_string(*corrupt_at);
+  warn_of_corruption_(element_,
+                      {data_error_, "The compressed file is corrupt or cut short at byte " + at +
+                                        "; reading only what is before."},
+                      "cannot be decompressed from byte " + at + " on");
+}
+
+void ReaderReports::post_sorted(const RecordingReader& recording) {
+  if (!recording.is_sorted()) return;
+  post_message(element_, GST_MESSAGE_WARNING,
+               {data_error_,
+                "The file is not sorted by time. Its events were read into memory and "
+                "sorted."},
+               "more than one event in a hundred is over 10 ms out of order");
+}
+
 void ReaderReports::post_unread_streams(const RecordingReader& recording) {
   const auto [names, property] = recording.unread_streams();
   if (names.empty() || names == posted_streams_) return;

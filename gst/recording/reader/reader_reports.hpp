@@ -3,6 +3,8 @@
 
 #include <gst/gst.h>
 
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "gst/base/errors.hpp"
@@ -29,6 +31,12 @@ class ReaderReports {
 
   /// The property `stats`. May be called from any thread.
   GstStructure* stats() const;
+
+  /// Posts a warning, once a file, if a compressed file cannot be read from a byte on.
+  void post_cut(const std::optional<std::uint64_t>& corrupt_at);
+
+  /// Posts a warning if the events of a table had to be sorted.
+  void post_sorted(const eventcamera::RecordingReader& recording);
 
   /// Posts an info message listing the streams that are not read.
   void post_unread_streams(const eventcamera::RecordingReader& recording);

@@ -31,6 +31,8 @@ class Hdf5Decoder final : public Decoder {
     return true;
   }
 
+  bool is_table() const override { return true; }
+
   /// Returns events after the triggers up to their time.
   std::optional<Item> next() override {
     if (!reader_) return std::nullopt;

@@ -329,6 +329,8 @@ class NpzDecoder final : public Decoder {
     return archive_ ? archive_->corruption() : none;
   }
 
+  bool is_table() const override { return true; }
+
   /// Arrays can only be decompressed from their start.
   std::optional<SeekPoint> seek_point_before(Microseconds /*t*/) const override {
     return std::nullopt;
