@@ -20,7 +20,8 @@ inline constexpr auto mutable_playing_flags = static_cast<GParamFlags>(
 
 // Types of properties besides strings: numbers, enums and booleans.
 #define FOR_EACH_PROPERTY_TYPE(X) \
-  X(BOOLEAN, boolean) X(ENUM, enum) X(UINT, uint) X(UINT64, uint64) X(DOUBLE, double)
+  X(BOOLEAN, boolean)             \
+  X(ENUM, enum) X(UINT, uint) X(INT64, int64) X(UINT64, uint64) X(DOUBLE, double)
 
 /// Copies a property's value into a field.
 template <class Field>

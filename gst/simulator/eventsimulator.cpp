@@ -147,7 +147,7 @@ static GstFlowReturn submit_input_buffer(GstBaseTransform* transform, gboolean i
                                          GstBuffer* frame) {
   auto& simulation = simulation_of(transform);
   const GstClockTime pts = GST_BUFFER_PTS(frame);
-  if (GST_BUFFER_IS_DISCONT(frame)) simulation.interrupt();
+  if (GST_BUFFER_IS_DISCONT(frame)) simulation.interrupt(pts);
   const GstFlowReturn result =
       PARENT_TRANSFORM_CLASS->submit_input_buffer(transform, is_discont, frame);
   if (result == GST_BASE_TRANSFORM_FLOW_DROPPED) simulation.skip_frame(pts);
@@ -196,6 +196,9 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
       simulation.check_orientation(event);
       break;
     case GST_EVENT_STREAM_START:
+      simulation.end();
+      simulation.start_timeline();
+      break;
     case GST_EVENT_FLUSH_STOP:
       simulation.start_timeline();
       break;
@@ -357,6 +360,20 @@ static void install_settings(GObjectClass* klass) {
                            FALSE, mutable_playing_flags));
 }
 
+static void install_rolling_shutter(GObjectClass* klass) {
+  constexpr auto max_time = gint64{GST_SECOND};
+  Properties<settings_of>(klass).add(
+      [](SimulatorSettings& settings) -> eventcamera::Nanoseconds& {
+        return settings.simulation.rolling_shutter;
+      },
+      g_param_spec_int64("rolling-shutter", "Rolling shutter",
+                         "Time that the camera needs to read a frame, from its first row to its "
+                         "last one, which is later by that time (ns; negative if it reads the "
+                         "bottom row first; 0 = all rows at once). The PTS of a frame is the time "
+                         "of the row read first. Events drawn as video have the rows of the frames",
+                         -max_time, max_time, 0, mutable_playing_flags));
+}
+
 static void install_write_flow(GObjectClass* klass) {
   Properties<settings_of>(klass).add(
       &SimulatorSettings::write_flow,
@@ -400,6 +417,7 @@ static void install_qos_properties(GObjectClass* klass) {
 
 static void install_base_properties(GObjectClass* klass) {
   install_settings(klass);
+  install_rolling_shutter(klass);
   install_qos_properties(klass);
 }
 

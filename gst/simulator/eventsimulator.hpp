@@ -19,10 +19,11 @@
 /// as reference for the next one. An interval has the PTS of its first frame and is pushed when its
 /// last frame arrives, so the latency is one frame plus the processing time. A GPU may still work
 /// on the last interval of a stream that is not live; then it is pushed with the next frame, or
-/// before any serialized event or query is handled. In an event stream, an interval without events
-/// is a GAP. In drawn video, an interval is a picture that replaces its last frame, with that
-/// frame's timestamps and its metas that remain valid, so the latency is the processing
-/// time. A first frame gives an empty picture.
+/// before any serialized event or query is handled. With a rolling shutter, late rows of a last
+/// frame give another interval. In an event stream, an interval without events is a GAP. In drawn
+/// video, an interval is a picture that replaces its last frame, with that frame's timestamps and
+/// its metas that remain valid, so the latency is the processing time. A first frame gives an empty
+/// picture.
 struct EventSimulatorMethod {
   const char* type_name;
   const char* long_name;

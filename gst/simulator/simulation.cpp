@@ -71,6 +71,8 @@ bool Simulation::set_caps(GstCaps* in, GstCaps* out) {
                      "Cannot simulate this video.");
   };
   const bool made = catch_exceptions(element_, failure, [&] {
+    const bool draws = event_simulator_draws(out);
+    if (draws || (state_ && FrameLuma::format_of(state_->video) != luma)) push_late_events();
     if (!state_ || FrameLuma::format_of(state_->video) != luma) {
       if (state_ && state_->simulator().last_time()) stream_.discontinuous = true;
       state_.reset();  // before allocating the next: frames can be large
@@ -82,8 +84,8 @@ bool Simulation::set_caps(GstCaps* in, GstCaps* out) {
     }
     stream_.repeated.reset();  // the last frame may have another format
     stream_.picture.reset();
-    state_->draws = event_simulator_draws(out);
-    if (state_->draws) state_->frames->set_drawn_video(drawn);
+    state_->draws = draws;
+    if (draws) state_->frames->set_drawn_video(drawn);
   });
   if (!made) return false;
   GST_DEBUG_OBJECT(element_, "%s of %" GST_PTR_FORMAT, state_->draws ? "event frames" : "events",
@@ -327,13 +329,14 @@ void Simulation::check_orientation(GstEvent* tags) {
 
 /* discontinuities */
 
-/// Makes the next frame a first frame. May throw.
-void Simulation::forget_frames() {
+/// Makes the next frame, at `next` if that is known, a first frame. May throw.
+void Simulation::forget_frames(GstClockTime next) {
   stream_.gap.reset();
   stream_.motion.reset();
   stream_.repeated.reset();
   if (!state_) return;
   push_interval(state_->frames->finish());
+  push_late_events(next);
   if (!state_->simulator().last_time()) return;
   GST_DEBUG_OBJECT(element_, "the next frame begins an interval; the last was at %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(static_cast<GstClockTime>(*state_->simulator().last_time())));
@@ -342,21 +345,24 @@ void Simulation::forget_frames() {
 }
 
 /// Restarts at a first frame, for a new timeline. May throw.
-void Simulation::start_over() {
-  forget_frames();
+void Simulation::start_over(GstClockTime next) {
+  forget_frames(next);
   stream_.pushed_until.reset();
 }
 
 void Simulation::start_timeline() {
-  if (state_) state_->frames->drop();
+  if (state_) {
+    state_->frames->drop();
+    state_->simulator().drop_late_events();
+  }
   stream_.flow = GST_FLOW_OK;
   reported([&] { start_over(); });
   stream_.next_time.reset();
   stream_.last_pts.reset();
 }
 
-void Simulation::interrupt() {
-  reported([&] { start_over(); });
+void Simulation::interrupt(GstClockTime pts) {
+  reported([&] { start_over(pts); });
   stream_.last_pts.reset();
   stream_.discontinuous = true;
 }
@@ -384,7 +390,10 @@ void Simulation::sync_controlled_properties(GstClockTime time) {
 SimulatorSettings Simulation::begin_interval() {
   if (const auto configure = method().configure) configure(state_->simulator(), G_OBJECT(element_));
   SimulatorSettings current = settings.copy();
-  if (state_->draws) current.simulation.labels = false;
+  if (state_->draws) {
+    current.simulation.labels = false;
+    current.simulation.rolling_shutter = 0;  // a picture has the rows of its frame
+  }
   return current;
 }
 
@@ -624,6 +633,7 @@ void Simulation::end() {
     const auto repeated = stream_.repeated.last_time();
     if (!state_->draws && last && repeated && *last < *repeated)
       hold_until(*repeated, GST_SEQNUM_INVALID);
+    push_late_events();
   });
 }
 
@@ -648,6 +658,21 @@ void Simulation::push_interval(std::optional<Interval> interval) {
   if (flow == GST_FLOW_OK)
     flow = push_buffer(std::move(out), static_cast<GstClockTime>(start),
                        static_cast<GstClockTime>(end - start));
+}
+
+/// Pushes the events in rows that the camera read after the last interval, until the next frame if
+/// that follows soon: no interval of the last frame will have them. May throw.
+void Simulation::push_late_events(GstClockTime next) {
+  if (!state_) return;
+  auto& simulator = state_->simulator();
+  const auto start = simulator.last_time();
+  auto end = simulator.late_until();
+  if (!start || !end) return;
+  const bool is_soon =
+      next > static_cast<GstClockTime>(*start) && next < static_cast<GstClockTime>(*end);
+  if (is_soon) end = static_cast<Nanoseconds>(next);
+  stream_.pushed_until = *end;
+  push_interval(Interval{OwnedBuffer(gst_buffer_new()), *start, *end, simulator.late_events(*end)});
 }
 
 /// Writes the events of an interval, at least one, with their labels and their flow to a new

@@ -75,8 +75,8 @@ class Simulation {
   GstFlowReturn push_frame(OwnedBuffer frame);
   /// The next interval is longer, because the frame at `pts` was skipped.
   void skip_frame(GstClockTime pts);
-  /// The next frame does not continue from the last one.
-  void interrupt();
+  /// The next frame, at `pts`, does not continue from the last one.
+  void interrupt(GstClockTime pts);
   /// Handles a GAP of the video: the last frame is held through it once a frame follows that is not
   /// earlier than its end, because a GAP can overtake frames that a decoder still holds. Returns
   /// false if the event must be forwarded instead: for drawn video, and before a first frame.
@@ -85,7 +85,7 @@ class Simulation {
   void check_orientation(GstEvent* tags);
   /// Finishes and pushes the pending interval.
   void finish();
-  /// Finishes, with the events of the last gap: no frames follow.
+  /// Finishes, with the events of the last gap and of late rows: no frames follow.
   void end();
 
   /// Starts a new timeline, discontinuous with the previous one.
@@ -171,8 +171,8 @@ class Simulation {
   KnownFlow known_flow();
   void keep_flow(GstBuffer* frame);
 
-  void forget_frames();
-  void start_over();
+  void forget_frames(GstClockTime next = GST_CLOCK_TIME_NONE);
+  void start_over(GstClockTime next = GST_CLOCK_TIME_NONE);
   void simulate(OwnedBuffer frame);
   void draw_frame(const SimulatorSettings& current, const KnownFlow& flow, OwnedBuffer frame);
   void repeat(GstBuffer* frame, Nanoseconds time);
@@ -180,6 +180,7 @@ class Simulation {
   void hold_until(Nanoseconds end, guint32 seqnum);
 
   void push_interval(std::optional<Interval> interval);
+  void push_late_events(GstClockTime next = GST_CLOCK_TIME_NONE);
   GstFlowReturn write_events(const eventcamera::EventBuckets& events, GstBuffer* frame,
                              OwnedBuffer& out);
   GstFlowReturn push_gap(Nanoseconds start, Nanoseconds end, guint32 seqnum);

@@ -58,7 +58,7 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   void simulate(const LumaView& frame, const StepTimes& interval, const Settings&,
-                StepBuckets& events) override {
+                StepBuckets& /*events*/) override {
     see(frame, now_);
     change_settings();
     const double gain = response_.compensate(last_.view(), now_.view(), threads());
@@ -72,20 +72,24 @@ class PixelSimulator final : public DvsSimulator {
       advance_along_motion();
     else
       advance_straight();
-    end(events);
+    timeline_.end();
     std::swap(last_, now_);
   }
 
-  bool hold(const StepTimes& interval, const Settings&, StepBuckets& events) override {
+  bool hold(const StepTimes& interval, const Settings&, StepBuckets& /*events*/) override {
     now_.assign(last_.view());
     change_settings();
     begin(interval, false);
     advance_straight();
-    end(events);
+    timeline_.end();
     return true;
   }
 
-  const EventBuckets& events() const override { return *made_; }
+  const EventBuckets& fired() const override { return fired_.fired(); }
+
+  const EventBuckets& read_out(const EventBuckets& fired, Nanoseconds duration) override {
+    return fired_.read_out(fired, static_cast<double>(duration) / 1000, events_, threads());
+  }
 
   void label(const LabelledEvents& events) override { separate_causes(events); }
 
@@ -116,11 +120,6 @@ class PixelSimulator final : public DvsSimulator {
     timeline_.begin(settings_, response_.gain(), *last_time_, interval.duration(), is_exposed);
     fired_.begin(timeline_.duration(), settings_.max_rate);
     scratch_.resize(static_cast<std::size_t>(threads().threads()));
-  }
-
-  void end(StepBuckets& read) {
-    timeline_.end();
-    made_ = &fired_.end(read, threads());
   }
 
   /// Advances all pixels with linear interpolation.
@@ -236,7 +235,6 @@ class PixelSimulator final : public DvsSimulator {
   PixelArray pixels_{format().width, format().height};
   Timeline timeline_;
   IntervalEvents fired_{format().width, format().height};
-  const EventBuckets* made_ = nullptr;  ///< by the last interval
   FrameFlow frame_flow_;
   MotionTiles tiles_;
   std::vector<Scratch> scratch_;  ///< by thread

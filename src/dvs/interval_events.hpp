@@ -36,13 +36,17 @@ class IntervalEvents {
     fired_.reset(static_cast<std::uint32_t>(duration), band_count(height_));
   }
 
-  /// Ends the interval, after the last event. Returns its events, with_cause(): its own slices, or
-  /// in `read` those that were read out.
-  const EventBuckets& end(StepBuckets& read, ThreadPool& threads) {
-    if (!readout_) return fired_;
-    sorted_.resize(fired_.size());
-    fired_.write_to(sorted_.data(), threads);
-    readout_->read(sorted_, duration_, max_rate_ > 0 ? max_rate_ : unlimited, read);
+  /// Events of the interval, after the last one was added; with_cause().
+  const EventBuckets& fired() const { return fired_; }
+
+  /// Reads out events within `duration` microseconds, in `read`; returns `events` themselves if the
+  /// rate has no limit.
+  const EventBuckets& read_out(const EventBuckets& events, double duration, StepBuckets& read,
+                               ThreadPool& threads) {
+    if (!readout_) return events;
+    sorted_.resize(events.size());
+    events.write_to(sorted_.data(), threads);
+    readout_->read(sorted_, duration, max_rate_ > 0 ? max_rate_ : unlimited, read);
     if (max_rate_ == 0) readout_.reset();  // no events are waiting any more
     return read;
   }

@@ -5,8 +5,8 @@
 
 namespace eventcamera::gl {
 
-bool Simulator::process(const TextureFrame& frame, Nanoseconds time, const Settings& settings,
-                        EventList& list) {
+std::optional<StepTimes> Simulator::process(const TextureFrame& frame, Nanoseconds time,
+                                            const Settings& settings, EventList& list) {
   assert(frame.format == format());
   const auto steps = steps_to(time, settings);
   if (steps)
@@ -14,25 +14,30 @@ bool Simulator::process(const TextureFrame& frame, Nanoseconds time, const Setti
   else
     start(frame);
   last_time_ = time;
-  return steps.has_value();
+  return steps;
 }
 
 void Simulator::queue(const TextureFrame& frame, Nanoseconds time, const Settings& settings) {
-  auto& [list, is_sorted, done] = next();
-  is_sorted = process(frame, time, settings, list);
-  if (is_sorted) list.sort();
-  done.set();
+  auto& queued = next();
+  const auto steps = process(frame, time, settings, queued.list);
+  queued.is_sorted = steps.has_value();
+  if (steps) {
+    queued.duration = steps->duration();
+    queued.rolling_shutter = settings.rolling_shutter;
+    queued.list.sort();
+  }
+  queued.done.set();
   gl_.check();
 }
 
 void Simulator::draw(const TextureFrame& frame, Nanoseconds time, const Settings& settings,
                      const Picture& picture) {
-  auto& [list, is_sorted, done] = next();
-  is_sorted = false;
-  list.clear();
-  process(frame, time, settings, list);
-  draw_.run(list, picture);
-  done.set();
+  auto& queued = next();
+  queued.is_sorted = false;
+  queued.list.clear();
+  process(frame, time, settings, queued.list);
+  draw_.run(queued.list, picture);
+  queued.done.set();
   gl_.check();
 }
 
@@ -43,13 +48,13 @@ Simulator::Queued& Simulator::next() {
 
 const EventBuckets* Simulator::read() {
   assert(queued_ > 0);
-  auto& [list, is_sorted, done] = queue_[first_];
+  auto& queued = queue_[first_];
   first_ = (first_ + 1) % max_queued;
   --queued_;
-  done.wait();
-  if (!is_sorted) return nullptr;
-  list.read(events_);
-  return &events_;
+  queued.done.wait();
+  if (!queued.is_sorted) return nullptr;
+  queued.list.read(events_);
+  return &finished(queued.duration, queued.rolling_shutter);
 }
 
 }  // namespace eventcamera::gl

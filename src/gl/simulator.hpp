@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "src/gl/event_list.hpp"
 #include "src/gl/grey_frame.hpp"
@@ -50,8 +51,7 @@ class Simulator : public IntervalSimulator {
       : IntervalSimulator(format),
         gl_(gl),
         kernels_(gl),
-        queue_{{{gl, format, kernels_}, false, Fence(gl)},
-               {{gl, format, kernels_}, false, Fence(gl)}},
+        queue_{{{gl, format, kernels_}, Fence(gl)}, {{gl, format, kernels_}, Fence(gl)}},
         draw_(gl, format) {}
 
   /// Stores the first frame.
@@ -64,13 +64,16 @@ class Simulator : public IntervalSimulator {
  private:
   struct Queued {
     EventList list;
-    bool is_sorted;  ///< to be read
     Fence done;
+    bool is_sorted = false;  ///< to be read
+    Nanoseconds duration = 0;
+    Nanoseconds rolling_shutter = 0;
   };
 
-  /// Queues all work on a frame except sorting. Returns true if the frame ends an interval.
-  bool process(const TextureFrame& frame, Nanoseconds time, const Settings& settings,
-               EventList& list);
+  /// Queues all work on a frame except sorting. Returns the steps of the interval that the frame
+  /// ends, if any.
+  std::optional<StepTimes> process(const TextureFrame& frame, Nanoseconds time,
+                                   const Settings& settings, EventList& list);
 
   /// Adds a frame to the queue.
   Queued& next();

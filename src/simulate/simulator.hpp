@@ -11,6 +11,7 @@
 #include "src/core/thread_pool.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "src/simulate/denoiser.hpp"
+#include "src/simulate/rolling_shutter.hpp"
 
 namespace eventcamera {
 
@@ -22,6 +23,9 @@ struct Settings {
   int threads = 0;                 ///< thread limit for one frame; 0 = one per processor
   bool labels = false;             ///< label the events, if the simulator can
   double denoise = 0;  ///< largest noise in the frames, grey levels, or automatic_denoise
+  /// Time from the first row of a frame to the last, which the camera read later; negative if it
+  /// read the last one first. A frame has the time of the row read first.
+  Nanoseconds rolling_shutter = 0;
 };
 
 /// C+ and C- in the grey levels of a frame, integers like its pixel differences.
@@ -74,11 +78,22 @@ class IntervalSimulator {
 
   /// Holds the last frame, if any, until `time`, which must not be before it: the next interval
   /// starts at `time`. Returns the sorted events of (time of the last frame, time] that fire
-  /// without any change (noise), valid until the next call; nullptr if the simulator has none.
+  /// without any change (noise) or in late rows of the last frame, valid until the next call;
+  /// nullptr if there are none.
   const EventBuckets* hold_until(Nanoseconds time, const Settings& settings = {});
 
   /// Continues at `time`, which must not be before the last frame, as if no time had passed.
   void skip_until(Nanoseconds time) { last_time_ = time; }
+
+  /// Time of the last event in the rows that a rolling shutter read after the last interval, if
+  /// any.
+  std::optional<Nanoseconds> late_until() const;
+
+  /// Like hold_until(), without noise: returns the events of late rows until `time`.
+  const EventBuckets* late_events(Nanoseconds time);
+
+  /// Drops the events of late rows, which reset() keeps.
+  void drop_late_events() { shutter_.restart(); }
 
   /// True if the events of the last interval have labels, which label() writes.
   bool has_labels() const { return labels_; }
@@ -100,7 +115,7 @@ class IntervalSimulator {
   ThreadPool& threads() { return threads_; }
 
  protected:
-  explicit IntervalSimulator(LumaFormat format) : format_(format) {}
+  explicit IntervalSimulator(LumaFormat format) : format_(format), shutter_(format.height) {}
 
   const LumaFormat& format() const { return format_; }
 
@@ -111,16 +126,28 @@ class IntervalSimulator {
   /// Fills `events` with noise events of an unchanged frame; false if the simulator has no noise.
   virtual bool hold(const StepTimes&, const Settings&, StepBuckets&) { return false; }
 
-  /// Events of the last interval.
-  virtual const EventBuckets& events() const { return events_; }
+  /// Returns the events of the interval that was simulated last, of `duration`, as they leave the
+  /// sensor; with those of late rows.
+  const EventBuckets& finished(Nanoseconds duration, Nanoseconds rolling_shutter);
+
+  /// Events of the last interval, all rows at the same time.
+  virtual const EventBuckets& fired() const { return events_; }
+
+  /// Reads the events of an interval out of the sensor, which takes time.
+  virtual const EventBuckets& read_out(const EventBuckets& fired, Nanoseconds /*duration*/) {
+    return fired;
+  }
 
   std::optional<Nanoseconds> last_time_;  ///< of the last frame, where an interval begins
   std::optional<ImageView<Flow>> flow_;   ///< of the interval
   StepBuckets events_;
 
  private:
+  void set_labels(bool labels);
+
   LumaFormat format_;
   ThreadPool threads_;
+  RollingShutter shutter_;
   bool labels_ = false;
 };
 

@@ -2,6 +2,9 @@
 // Times and order of intervals, and discontinuities between frames.
 #include <algorithm>
 #include <span>
+#include <string>
+#include <tuple>
+#include <vector>
 
 #include "tests/elements/harness.hpp"
 
@@ -480,6 +483,137 @@ TEST_P(EverySimulator, SendsEosAfterTheLastInterval) {
   expect_interval(0, 40 * GST_MSECOND);
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
   EXPECT_FALSE(h.pull());
+}
+
+/// A bright square that moves down by a pixel a frame.
+void push_square(Harness& h, int frame, GstClockTime pts, guint flags = 0) {
+  GstBuffer* buffer = h.frame(pts, [frame](int x, int y) {
+    return x >= 6 && x < 20 && y >= frame && y < frame + 16 ? 210 : 40;
+  });
+  GST_BUFFER_FLAG_SET(buffer, flags);
+  EXPECT_EQ(h.push(buffer), GST_FLOW_OK);
+}
+
+/// A video, and what happens to it.
+struct Script {
+  const char* name;
+  void (*run)(Harness& h);
+};
+
+const Script scripts[] = {
+    {"even frames",
+     [](Harness& h) {
+       for (int i = 0; i < 6; ++i) push_square(h, i, i * 40 * GST_MSECOND);
+     }},
+    {"short intervals",
+     [](Harness& h) {
+       for (int i = 0; i < 8; ++i) push_square(h, i, i * 5 * GST_MSECOND);
+     }},
+    {"a gap",
+     [](Harness& h) {
+       for (int i = 0; i < 3; ++i) push_square(h, i, i * 40 * GST_MSECOND);
+       gst_harness_push_event(h.get(), gst_event_new_gap(120 * GST_MSECOND, 900 * GST_MSECOND));
+       for (int i = 3; i < 5; ++i) push_square(h, i, (900 + i * 40) * GST_MSECOND);
+     }},
+    {"a discontinuity",
+     [](Harness& h) {
+       for (int i = 0; i < 3; ++i) push_square(h, i, i * 40 * GST_MSECOND);
+       for (int i = 3; i < 5; ++i)
+         push_square(h, i, (i * 40 + 300) * GST_MSECOND, i == 3 ? GST_BUFFER_FLAG_DISCONT : 0);
+     }},
+    {"a discontinuity before the last row",
+     [](Harness& h) {
+       for (int i = 0; i < 3; ++i) push_square(h, i, i * 40 * GST_MSECOND);
+       for (int i = 3; i < 5; ++i)
+         push_square(h, i, (i * 40 - 25) * GST_MSECOND, i == 3 ? GST_BUFFER_FLAG_DISCONT : 0);
+     }},
+    {"another size",
+     [](Harness& h) {
+       for (int i = 0; i < 3; ++i) push_square(h, i, i * 40 * GST_MSECOND);
+       h.caps("video/x-raw, format=GRAY8, width=40, height=24, framerate=25/1");
+       for (int i = 3; i < 5; ++i) push_square(h, i, i * 40 * GST_MSECOND);
+     }},
+    {"another stream",
+     [](Harness& h) {
+       for (int i = 0; i < 3; ++i) push_square(h, i, i * 40 * GST_MSECOND);
+       gst_harness_push_event(h.get(), gst_event_new_stream_start("another"));
+       GstSegment segment;
+       gst_segment_init(&segment, GST_FORMAT_TIME);
+       gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+       for (int i = 3; i < 5; ++i) push_square(h, i, (i * 40 + 100) * GST_MSECOND);
+     }},
+};
+
+TEST_P(EverySimulatorAlone, DelaysTheRowsOfARollingShutter) {
+  using Event = std::tuple<GstClockTime, guint, guint16, guint16>;  // time, row, column, polarity
+  const auto events_with = [](gint64 shutter, const Script& script) {
+    Harness simulator(gst_harness_new_parse(GetParam()), GetParam());
+    g_object_set(simulator.element(), "rolling-shutter", shutter, nullptr);
+    simulator.caps(video);
+    script.run(simulator);
+    gst_harness_push_event(simulator.get(), gst_event_new_eos());
+    EXPECT_TRUE(simulator.pull_event(GST_EVENT_EOS));
+    std::vector<Event> events;
+    GstClockTime end = 0;
+    while (const auto buffer = simulator.pull()) {
+      const GstClockTime start = GST_BUFFER_PTS(buffer.get());
+      EXPECT_GE(start, end) << script.name;
+      end = start + GST_BUFFER_DURATION(buffer.get());
+      for (const auto& event : events_of(buffer.get())) {
+        EXPECT_LE(event.t, (end - start) / 1000) << script.name;
+        events.emplace_back(start / 1000 + event.t, gst_event_camera_event_get_y(&event), event.x,
+                            event.y_p);
+      }
+    }
+    return events;
+  };
+  constexpr gint64 shutter = 23 * GST_MSECOND;  // of 24 rows
+  for (const auto& script : scripts) {
+    const auto global = events_with(0, script);
+    ASSERT_FALSE(global.empty());
+    for (const bool is_from_top : {true, false}) {
+      auto expected = global;
+      for (auto& [t, y, x, y_p] : expected) t += (is_from_top ? y : 23 - y) * 1000;
+      std::ranges::sort(expected);
+      EXPECT_EQ(events_with(is_from_top ? shutter : -shutter, script), expected) << script.name;
+    }
+  }
+}
+
+TEST_P(EverySimulator, DropsLateRowsInAFlush) {
+  g_object_set(h.element(), "rolling-shutter", gint64{23 * GST_MSECOND}, nullptr);
+  h.caps(video);
+  for (int i = 0; i < 3; ++i) push_square(h, i, i * 40 * GST_MSECOND);
+  while (h.pull()) continue;
+  flush({h.get()});
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  for (int i = 0; i < 2; ++i) h.push(h.flat(i * 40 * GST_MSECOND, 60));
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  EXPECT_FALSE(h.pull());
+}
+
+TEST_P(EverySimulator, DrawsTheRowsOfItsFramesWhateverTheShutter) {
+  const auto pictures_with = [](gint64 shutter) {
+    Harness simulator(GetParam());
+    g_object_set(simulator.element(), "rolling-shutter", shutter, nullptr);
+    simulator.caps(video, pictures_of(GetParam()));
+    std::vector<std::string> pictures;
+    for (int i = 0; i < 4; ++i) {
+      push_square(simulator, i, i * 40 * GST_MSECOND);
+      pictures.push_back(bytes_of(simulator.pull().get()));
+    }
+    return pictures;
+  };
+  EXPECT_EQ(pictures_with(23 * GST_MSECOND), pictures_with(0));
+}
+
+TEST_P(EverySimulator, IsNotLaterWithARollingShutter) {
+  g_object_set(h.element(), "rolling-shutter", gint64{23 * GST_MSECOND}, nullptr);
+  h.caps(video);
+  gst_harness_set_upstream_latency(h.get(), 5 * GST_MSECOND);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 45 * GST_MSECOND);
 }
 
 TEST_P(EverySimulator, IsOneFrameLate) {

@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Rolling shutters of every simulator.
+#include "src/simulate/rolling_shutter.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "src/dvs/dvs_simulator.hpp"
+#include "src/measure/event_matcher.hpp"
+#include "src/simulate/dense_simulator.hpp"
+#include "src/simulate/diff_simulator.hpp"
+#include "src/simulate/frame_simulator.hpp"
+#include "src/simulate/sparse_simulator.hpp"
+#include "tests/dvs/playback.hpp"
+#include "tests/simulate/scene.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+struct Method {
+  const char* name;
+  std::function<std::unique_ptr<Simulator>(const LumaFormat&)> make;
+};
+
+std::unique_ptr<Simulator> make_dvs(const LumaFormat& format, const DvsSettings& settings) {
+  auto simulator = make_dvs_simulator(format);
+  simulator->set(settings);
+  return simulator;
+}
+
+const Method methods[] = {
+    {"frame", make_frame_simulator},
+    {"dense", make_dense_simulator},
+    {"sparse", make_sparse_simulator},
+    {"diff", make_diff_simulator},
+    {"dvs", [](const LumaFormat& format) { return make_dvs(format, {}); }},
+    {"dvs_with_noise",
+     [](const LumaFormat& format) {
+       auto settings = everything();
+       settings.max_rate = 0;  // rows that come later wait less
+       return make_dvs(format, settings);
+     }},
+};
+
+void PrintTo(const Method& method, std::ostream* out) {
+  *out << method.name;
+}
+
+/// Delay of a row, microseconds.
+Microseconds delay_of(int y, int height, Nanoseconds readout) {
+  const int rows_before = readout < 0 ? height - 1 - y : y;
+  return std::abs(readout) * rows_before / (height - 1) / 1000;
+}
+
+bool is_earlier(const AbsoluteEvent& a, const AbsoluteEvent& b) {
+  return std::tuple(a.t, a.y(), a.x, a.y_p) < std::tuple(b.t, b.y(), b.x, b.y_p);
+}
+
+/// Collects the events of a simulator, with absolute times, until those of its late rows.
+class Recording {
+ public:
+  explicit Recording(std::unique_ptr<Simulator> simulator) : simulator_(std::move(simulator)) {}
+
+  void push(const LumaView& frame, Nanoseconds time, const Settings& settings) {
+    const auto last = simulator_->last_time();
+    const auto* made = simulator_->push(frame, time, settings);
+    if (made != nullptr) add(*made, *last, time);
+  }
+
+  void hold_until(Nanoseconds time, const Settings& settings) {
+    const Nanoseconds last = *simulator_->last_time();
+    const auto* made = simulator_->hold_until(time, settings);
+    if (made != nullptr) add(*made, last, time);
+  }
+
+  void finish() {
+    const auto end = simulator_->late_until();
+    if (!end) return;
+    const Nanoseconds last = *simulator_->last_time();
+    const auto* late = simulator_->late_events(*end);
+    ASSERT_TRUE(late);
+    add(*late, last, *end);
+    EXPECT_EQ(simulator_->late_until(), std::nullopt);
+  }
+
+  std::vector<AbsoluteEvent> events;
+
+ private:
+  void add(const EventBuckets& interval, Nanoseconds start, Nanoseconds end) {
+    auto found = scene::copy(interval);
+    std::vector<Label> labels(found.size());
+    if (simulator_->has_labels()) simulator_->label({found, labels});
+    EXPECT_TRUE(scene::sorted(found));
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      EXPECT_LE(found[i].t, (end - start) / 1000);
+      events.emplace_back(start / 1000 + found[i].t, found[i].x, found[i].y_p);
+      set_label(events.back(), labels[i]);
+    }
+  }
+
+  std::unique_ptr<Simulator> simulator_;
+};
+
+class EveryMethod : public testing::TestWithParam<Method> {
+ protected:
+  static constexpr int width = 90;
+  static constexpr int height = 70;
+
+  /// Events of a moving texture, in intervals of different durations, and of a pause.
+  std::vector<AbsoluteEvent> events_with(Nanoseconds readout, Nanoseconds fraction,
+                                         bool labels = false) {
+    Recording recording(GetParam().make({width, height, 8}));
+    const Settings settings{.threads = 2, .labels = labels, .rolling_shutter = readout};
+    Nanoseconds time = 7'000'000;
+    for (int i = 0; i < 6; ++i) {
+      const auto frame = scene::texture<std::uint8_t>(width, height, 8, 3.0 * i, 2.0 * i);
+      recording.push(scene::luma(frame), time, settings);
+      time += (i % 2 == 0 ? 33'000'000 : 20'000'000) + fraction;
+      if (i == 3) recording.hold_until(time, settings);
+      if (i == 3) time += 25'000'000;
+    }
+    recording.finish();
+    return recording.events;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(, EveryMethod, testing::ValuesIn(methods),
+                         [](const auto& test) { return test.param.name; });
+
+TEST_P(EveryMethod, DelaysTheEventsOfEachRow) {
+  for (const Nanoseconds readout : {20'000'000, -20'000'000, 900, 130'000'000}) {
+    auto expected = events_with(0, 0, true);
+    for (auto& event : expected) event.t += delay_of(event.y(), height, readout);
+    std::ranges::sort(expected, is_earlier);
+    const auto found = events_with(readout, 0, true);
+    ASSERT_GT(found.size(), 500U);
+    ASSERT_EQ(found, expected) << readout;
+    for (std::size_t i = 0; i < found.size(); ++i)
+      ASSERT_EQ(found[i].cause, expected[i].cause) << readout;
+  }
+}
+
+TEST_P(EveryMethod, DelaysTheEventsOfIntervalsThatAreNotWholeMicroseconds) {
+  constexpr Nanoseconds readout = 50'000'000;
+  const auto by_pixel = [](const AbsoluteEvent& a, const AbsoluteEvent& b) {
+    return std::tuple(a.y(), a.x, a.t) < std::tuple(b.y(), b.x, b.t);
+  };
+  auto expected = events_with(0, 333);
+  auto found = events_with(readout, 333);
+  std::ranges::sort(expected, by_pixel);
+  std::ranges::sort(found, by_pixel);
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    ASSERT_EQ(found[i].y_p, expected[i].y_p);
+    ASSERT_EQ(found[i].x, expected[i].x);
+    // A microsecond is lost in each interval that it waits.
+    ASSERT_NEAR(static_cast<double>(found[i].t - delay_of(found[i].y(), height, readout)),
+                static_cast<double>(expected[i].t), 4);
+  }
+}
+
+TEST(RollingShutter, MayChangeBetweenFrames) {
+  Recording recording(make_frame_simulator({4, 3, 8}));
+  const auto push = [&](int grey, Nanoseconds time, Nanoseconds readout) {
+    recording.push(scene::luma(scene::flat<std::uint8_t>(4, 3, grey)), time,
+                   {.rolling_shutter = readout});
+  };
+  push(50, 0, 0);
+  push(200, 10'000'000, 4'000'000);
+  push(50, 20'000'000, 0);
+  recording.finish();
+  std::vector<AbsoluteEvent> expected;
+  for (int y = 0; y < 3; ++y)
+    for (int x = 0; x < 4; ++x) {
+      expected.push_back(AbsoluteEvent::at(x, y, 10'000 + y * 2'000, Polarity::on));
+      expected.push_back(AbsoluteEvent::at(x, y, 20'000, Polarity::off));
+    }
+  std::ranges::sort(expected, is_earlier);
+  EXPECT_EQ(recording.events, expected);
+}
+
+TEST(RollingShutter, DelaysNothingInASingleRow) {
+  Recording recording(make_frame_simulator({4, 1, 8}));
+  for (const int grey : {50, 200})
+    recording.push(scene::luma(scene::flat<std::uint8_t>(4, 1, grey)), grey * 100'000,
+                   {.rolling_shutter = 30'000'000});
+  EXPECT_EQ(recording.events.size(), 4U);
+}
+
+TEST(RollingShutter, DropsTheCausesOfLateEventsOnceThereAreNoLabels) {
+  Recording recording(make_dvs({8, 8, 8}, {}));
+  for (int i = 0; i < 3; ++i)
+    recording.push(scene::luma(scene::flat<std::uint8_t>(8, 8, i * 100)), i * 10'000'000,
+                   {.labels = i < 2, .rolling_shutter = 9'000'000});
+  recording.finish();
+  for (const auto& event : recording.events) {
+    ASSERT_LT(event.x, 8);
+    ASSERT_LT(event.y(), 8);
+  }
+}
+
+TEST(RollingShutter, SpreadsTheLoadOfTheReadout) {
+  const auto count_with = [](Nanoseconds readout) {
+    Recording recording(make_dvs({64, 64, 8}, {.max_rate = 4e5}));
+    for (const Nanoseconds ms : {0, 1, 40, 41, 80, 81})  // dark, then bright within a millisecond
+      recording.push(scene::luma(scene::flat<std::uint8_t>(64, 64, ms % 2 == 0 ? 20 : 200)),
+                     ms * 1'000'000, {.rolling_shutter = readout});
+    recording.finish();
+    return recording.events.size();
+  };
+  EXPECT_GT(4 * count_with(30'000'000), 5 * count_with(0));
+}
+
+/// A texture in 16 bits that moves to the right and down, once all rows of a first frame have been
+/// read.
+class MovingTexture {
+ public:
+  static constexpr int width = 120;
+  static constexpr int height = 100;
+
+  static Image<std::uint16_t> at(Nanoseconds time, Nanoseconds readout) {
+    Image<std::uint16_t> frame(width, height);
+    for (int y = 0; y < height; ++y) {
+      const Microseconds seen = time / 1000 + delay_of(y, height, readout);
+      const double t = static_cast<double>(std::max(Microseconds{0}, seen - start)) / 1e6;
+      const auto row = scene::texture<std::uint16_t>(width, 1, 16, -speed_x * t, y - speed_y * t);
+      std::copy_n(row.row(0), width, frame.row(y));
+    }
+    return frame;
+  }
+
+ private:
+  static constexpr Microseconds start = 40'000;
+  static constexpr double speed_x = 40;  ///< pixels per second
+  static constexpr double speed_y = 30;
+};
+
+/// Events between times at which all rows are being seen.
+std::vector<AbsoluteEvent> events_of_texture(Nanoseconds frame_time, Nanoseconds shutter_of_camera,
+                                             Nanoseconds shutter_of_simulator) {
+  const auto settings = settings_of(DvsPreset::ideal);
+  Recording recording(make_dvs({MovingTexture::width, MovingTexture::height, 16},
+                               {.response = settings.response, .upsampling = Upsampling::motion}));
+  for (Nanoseconds time = 0; time < 700'000'000; time += frame_time) {
+    const auto frame = MovingTexture::at(time, shutter_of_camera);
+    recording.push(scene::luma(frame.view(), 16), time, {.rolling_shutter = shutter_of_simulator});
+  }
+  recording.finish();
+  std::erase_if(recording.events,
+                [](const auto& event) { return event.t < 100'000 || event.t > 600'000; });
+  return recording.events;
+}
+
+/// Share of the events of both streams with a match within a millisecond.
+double matches_of(const std::vector<AbsoluteEvent>& reference,
+                  const std::vector<AbsoluteEvent>& candidate) {
+  EventMatcher matcher(MovingTexture::width, MovingTexture::height);
+  auto next = candidate.begin();
+  for (const auto& event : reference) {
+    for (; next != candidate.end() && next->t <= event.t; ++next)
+      matcher.add(StreamRole::candidate, *next);
+    matcher.add(StreamRole::reference, event);
+  }
+  for (; next != candidate.end(); ++next) matcher.add(StreamRole::candidate, *next);
+  const double a = matcher.figures(StreamRole::reference).shares[0];
+  const double b = matcher.figures(StreamRole::candidate).shares[0];
+  return 2 * a * b / (a + b);
+}
+
+TEST(RollingShutter, MatchesAFinelyRenderedSceneAsAGlobalShutterDoes) {
+  constexpr Nanoseconds frame_time = 33'333'333;
+  const auto scene = events_of_texture(1'000'000, 0, 0);
+  ASSERT_GT(scene.size(), 10'000U);
+  const double global = matches_of(scene, events_of_texture(frame_time, 0, 0));
+  EXPECT_GT(global, 0.8);
+  for (const Nanoseconds readout : {10'000'000, 20'000'000, -20'000'000, 30'000'000, -30'000'000}) {
+    const double rolling = matches_of(scene, events_of_texture(frame_time, readout, readout));
+    const double unaware = matches_of(scene, events_of_texture(frame_time, readout, 0));
+    RecordProperty(std::to_string(readout), std::to_string(rolling));
+    std::printf("readout %ld: rolling %.4f global %.4f unaware %.4f\n", readout, rolling, global,
+                unaware);
+    EXPECT_NEAR(rolling, global, 0.01) << readout;
+    EXPECT_LT(unaware, global - 0.2) << readout;
+  }
+}
+
+}  // namespace
