@@ -146,17 +146,6 @@ TEST_F(Hdf5, LabelsAreDatasets) {
   }
 }
 
-TEST_F(Hdf5, NoEventsComeBack) {
-  for (const auto& settings : all_settings({640, 480})) {
-    Hdf5Reader reader(in_memory(contents(write({}, settings))));
-    EXPECT_FALSE(reader.time_range());
-    EXPECT_TRUE(read_all(reader).empty());
-    reader.seek(5);
-    EXPECT_TRUE(read_all(reader).empty());
-    EXPECT_EQ(reader.corruption().places, 0U);
-  }
-}
-
 TEST_F(Hdf5, SeeksToTheFirstEventNotBefore) {
   const auto events = random_events(200'000, {640, 480}, 11, 777'777);
   for (const auto& settings : all_settings({640, 480})) {

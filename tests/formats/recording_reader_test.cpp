@@ -279,25 +279,6 @@ TEST_P(Recording, IsSeekedIn) {
   }
 }
 
-TEST_P(Recording, IsRestartedWhereItIsPushed) {
-  const auto& bytes = GetParam().bytes;
-  RecordingReader reader(GetParam().make_decoder, chunk_length);
-  Outcome all;
-  reader.push(bytes);
-  all.take_all(reader);
-  for (const Microseconds start : {3'700'000, 0}) {
-    const auto seek_point = reader.seek_point_before(start);
-    reader.restart(seek_point, start, std::nullopt);
-    Outcome outcome;
-    outcome.starts = 1;
-    reader.push(std::span(bytes).subspan(seek_point.value_or(SeekPoint{}).position));
-    outcome.take_all(reader);
-    reader.finish();
-    outcome.take_all(reader);
-    EXPECT_EQ(outcome.events(origin()), from(some_events(), origin() + start, 10'000'000));
-  }
-}
-
 /// Events, and a frame every 100 ms; all of one before the first of the other.
 Bytes aedat_of_parts(bool frames_first) {
   Aedat4Encoder encoder({sensor, "a camera", Aedat4Compression::none, true, false});
