@@ -5,7 +5,7 @@
  * @short_description: writes HDF5 files of events
  *
  * Writes events as an HDF5 file in the layout of DSEC or Metavision, whose arrays can be read
- * directly with h5py. Written times are those of the PTS. `format=metavision` keeps triggers; the
+ * directly with h5py. Written times come from the PTS. `format=metavision` keeps triggers; the
  * property `stats` counts them.
  *
  * The file is complete at the end of the stream, or when the pipeline is stopped. If the process is
@@ -205,7 +205,7 @@ static bool write_triggers(GstEventHdf5Sink* self, std::span<const Trigger> trig
   return reported(self, [&] {
     const bool written = state.writer->append(triggers);
     GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " triggers, %s", triggers.size(),
-                   written ? "written" : "left out: the format has none");
+                   written ? "written" : "dropped: the format has none");
     if (written) self->priv->writable.written().lock()->triggers += triggers.size();
   });
 }
