@@ -170,6 +170,12 @@ const PixelProperty pixel_properties[] = {
      "Maximum number of frames interpolated between two frames with upsampling=motion. Without "
      "this limit, steps are a pixel for motion of up to 4 pixels, and longer for more",
      &DvsSettings::max_interpolated_frames, 0, 254},
+    {"exposure-time", "Exposure time",
+     "Exposure of the frames (ns); 0: short or unknown. The motion blur of long exposures is "
+     "removed along the optical flow with upsampling=motion, where the timestamp of a frame must "
+     "be "
+     "the middle of its exposure. Short exposures are more realistic with 0",
+     &DvsSettings::exposure_time, 0, max_time, controllable},
     {"cutoff-frequency", "Cutoff frequency",
      "Bandwidth of the photoreceptor at white; darker pixels are slower (Hz; 0 = no limit)",
      &DvsSettings::cutoff_frequency, 0, 1e6, controllable},
