@@ -353,7 +353,8 @@ void Simulation::start_over(GstClockTime next) {
 void Simulation::start_timeline() {
   if (state_) {
     state_->frames->drop();
-    state_->simulator().drop_late_events();
+    if (state_->simulator().last_time()) stream_.discontinuous = true;
+    state_->simulator().reset();
   }
   stream_.flow = GST_FLOW_OK;
   reported([&] { start_over(); });
@@ -660,8 +661,9 @@ void Simulation::push_interval(std::optional<Interval> interval) {
                        static_cast<GstClockTime>(end - start));
 }
 
-/// Pushes the events in rows that the camera read after the last interval, until the next frame if
-/// that follows soon: no interval of the last frame will have them. May throw.
+/// Pushes the events of rows that a rolling shutter read after the last frame's timestamp. An
+/// interval of their own ends at the `next` frame at the latest; later events are dropped. May
+/// throw.
 void Simulation::push_late_events(GstClockTime next) {
   if (!state_) return;
   auto& simulator = state_->simulator();

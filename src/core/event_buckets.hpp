@@ -61,6 +61,13 @@ class StepBuckets final : public EventBuckets {
   std::vector<Event>& bucket(int step, int band) { return at(step, band).events; }
   FiredPixels& pixels(int step, int band) { return at(step, band).pixels; }
 
+  /// Passes the list and the pixels of each bucket to visit(std::span<const Event>, const
+  /// FiredPixels&), in the order of time; at most one of them is not empty.
+  template <class VisitBucket>
+  void visit_buckets(const VisitBucket& visit) const {
+    for (const auto& [events, pixels] : buckets_) visit(std::span<const Event>(events), pixels);
+  }
+
   std::size_t size() const override;
   void visit_band(int band, const Visit& visit) const override;
 

@@ -47,6 +47,9 @@ class FiredPixels {
     group_count_ = static_cast<std::uint32_t>(count);
   }
 
+  /// Time of the pixels.
+  std::uint32_t time() const { return t_; }
+
   /// Number of pixels.
   std::size_t size() const { return size_; }
 
@@ -60,6 +63,23 @@ class FiredPixels {
 
   /// Writes size() events.
   void write_to(Event* out) const;
+
+  /// Passes the pixels of each row to visit(int y, std::span<const Group>, number of pixels).
+  template <class Visit>
+  void visit_rows(const Visit& visit) const {
+    const auto all = groups();
+    for (std::size_t first = 0; first < all.size();) {
+      std::size_t last = first;
+      std::size_t size = 0;
+      for (; last < all.size() && all[last].y == all[first].y; ++last)
+        size += static_cast<std::size_t>(std::popcount(all[last].fired));
+      visit(int{all[first].y}, all.subspan(first, last - first), size);
+      first = last;
+    }
+  }
+
+  /// Writes the events of groups, at time `t`; `out` has their number.
+  static void write(std::span<const Group> groups, std::uint32_t t, std::span<Event> out);
 
   /// Passes all events to visit(std::span<const Event>), in several calls.
   template <class Visit>
@@ -76,8 +96,6 @@ class FiredPixels {
   }
 
  private:
-  static void write(std::span<const Group> groups, std::uint32_t t, std::span<Event> out);
-
   std::span<const Group> groups() const { return std::span(memory_).first(group_count_); }
 
   std::vector<Group> memory_;

@@ -61,8 +61,8 @@ class PixelSimulator final : public DvsSimulator {
     pixels_.settle(last_, response_, threads());
   }
 
-  void simulate(const LumaView& frame, const StepTimes& interval, const Settings&,
-                StepBuckets& /*events*/) override {
+  void simulate(const LumaView& frame, const StepTimes& interval, const Settings& settings,
+                StepBuckets& events) override {
     see(frame, now_);
     change_settings();
     const double gain = response_.compensate(last_.view(), now_.view(), threads());
@@ -80,30 +80,38 @@ class PixelSimulator final : public DvsSimulator {
       blurred_last_.reset();
       frame_flow_.forget();
     }
-    begin(interval, true);
+    begin(interval, true, settings);
     if (moves)
       advance_along_motion();
     else
       advance_straight();
     is_first_ = false;
-    timeline_.end();
+    end(events);
     std::swap(last_, now_);
   }
 
-  bool hold(const StepTimes& interval, const Settings&, StepBuckets& /*events*/) override {
+  bool hold(const StepTimes& interval, const Settings& settings, StepBuckets& events) override {
     now_.assign(last_.view());
     change_settings();
     is_first_ = false;
-    begin(interval, false);
+    begin(interval, false, settings);
     advance_straight();
-    timeline_.end();
+    end(events);
     return true;
   }
 
-  const EventBuckets& fired() const override { return fired_.fired(); }
+  const EventBuckets& events(Nanoseconds, const Settings&) override { return *made_; }
 
-  const EventBuckets& read_out(const EventBuckets& fired, Nanoseconds duration) override {
-    return fired_.read_out(fired, static_cast<double>(duration) / 1000, events_, threads());
+  std::optional<Nanoseconds> latest() const override {
+    const auto microseconds = fired_.latest();
+    if (!microseconds) return std::nullopt;
+    return static_cast<Nanoseconds>(*microseconds * 1000) + 1;  // rounded up
+  }
+
+  const EventBuckets& late(Nanoseconds duration) override {
+    fired_.begin(in_microseconds(duration), settings_.max_rate, 0);
+    for_each_row([](int, Scratch&) {});
+    return fired_.end(events_, threads());
   }
 
   void label(const LabelledEvents& events) override { separate_causes(events); }
@@ -131,10 +139,15 @@ class PixelSimulator final : public DvsSimulator {
     pixels_.settle(last_, response_, threads());
   }
 
-  void begin(const StepTimes& interval, bool is_exposed) {
+  void begin(const StepTimes& interval, bool is_exposed, const Settings& settings) {
     timeline_.begin(settings_, response_.gain(), *last_time_, interval.duration(), is_exposed);
-    fired_.begin(timeline_.duration(), settings_.max_rate);
+    fired_.begin(timeline_.duration(), settings_.max_rate, settings.rolling_shutter);
     scratch_.resize(static_cast<std::size_t>(threads().threads()));
+  }
+
+  void end(StepBuckets& read) {
+    timeline_.end();
+    made_ = &fired_.end(read, threads());
   }
 
   /// Advances all pixels with linear interpolation.
@@ -269,6 +282,7 @@ class PixelSimulator final : public DvsSimulator {
   PixelArray pixels_{format().width, format().height};
   Timeline timeline_;
   IntervalEvents fired_{format().width, format().height};
+  const EventBuckets* made_ = nullptr;  ///< by the last interval
   FrameFlow frame_flow_;
   bool is_first_ = true;                      ///< last_ is the first frame
   std::optional<Image<Pixel>> blurred_last_;  ///< last_ as recorded, if it was sharpened

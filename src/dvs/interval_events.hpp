@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -11,11 +14,13 @@
 #include "src/core/thread_pool.hpp"
 #include "src/core/time_slices.hpp"
 #include "src/dvs/readout.hpp"
+#include "src/simulate/rolling_shutter.hpp"
 
 namespace eventcamera {
 
 /// Events of an interval, which bands of rows add in any order. Events past its end are deferred to
-/// the next interval. With a limited rate, a Readout delays the others.
+/// the next interval. With a rolling shutter of the frames, all events of a row are delayed; with a
+/// limited rate, a Readout delays them further.
 class IntervalEvents {
   struct DeferredEvent {
     double t;  ///< microseconds after the start of the next interval
@@ -28,27 +33,35 @@ class IntervalEvents {
       : width_(width), height_(height), deferred_(static_cast<std::size_t>(band_count(height))) {}
 
   /// Begins an interval of `duration` microseconds. `max_rate` is in events per second; 0 = no
-  /// limit.
-  void begin(double duration, double max_rate) {
+  /// limit. `rolling_shutter` is as for row_delays().
+  void begin(double duration, double max_rate, Nanoseconds rolling_shutter) {
     duration_ = duration;
     max_rate_ = max_rate;
+    if (rolling_shutter != rolling_shutter_) delays_ = row_delays(rolling_shutter, height_);
+    rolling_shutter_ = rolling_shutter;
     if (max_rate > 0 && !readout_) readout_.emplace(width_, height_);
     fired_.reset(static_cast<std::uint32_t>(duration), band_count(height_));
   }
 
-  /// Events of the interval, after the last one was added; with_cause().
-  const EventBuckets& fired() const { return fired_; }
-
-  /// Reads out events within `duration` microseconds, in `read`; returns `events` themselves if the
-  /// rate has no limit.
-  const EventBuckets& read_out(const EventBuckets& events, double duration, StepBuckets& read,
-                               ThreadPool& threads) {
-    if (!readout_) return events;
-    sorted_.resize(events.size());
-    events.write_to(sorted_.data(), threads);
-    readout_->read(sorted_, duration, max_rate_ > 0 ? max_rate_ : unlimited, read);
+  /// Ends the interval, after the last event. Returns its events, with_cause(): its own slices, or
+  /// in `read` those that were read out.
+  const EventBuckets& end(StepBuckets& read, ThreadPool& threads) {
+    if (!readout_) return fired_;
+    sorted_.resize(fired_.size());
+    fired_.write_to(sorted_.data(), threads);
+    readout_->read(sorted_, duration_, max_rate_ > 0 ? max_rate_ : unlimited, read);
     if (max_rate_ == 0) readout_.reset();  // no events are waiting any more
     return read;
+  }
+
+  /// Microseconds from the end of the interval to the last deferred event of a rolling shutter, if
+  /// any.
+  std::optional<double> latest() const {
+    std::optional<double> latest;
+    if (rolling_shutter_ == 0) return latest;
+    for (const auto& band : deferred_)
+      for (const auto& deferred : band) latest = std::max(latest, std::optional(deferred.t));
+    return latest;
   }
 
   /// Drops the causes of the deferred and waiting events.
@@ -71,18 +84,20 @@ class IntervalEvents {
     /// Begins with the deferred events of the last interval.
     void begin(IntervalEvents& events, int band) {
       duration_ = events.duration_;
+      delays_ = events.rolling_shutter_ != 0 ? events.delays_.data() : nullptr;
       fired_ = &events.fired_;
       band_ = band;
       deferred_ = &events.deferred_[static_cast<std::size_t>(band)];
       added_.clear();
-      std::size_t kept = 0;
+      kept_ = 0;
       for (const auto& [t, event] : *deferred_) {
         if (t > duration_)
-          (*deferred_)[kept++] = {t - duration_, event};
+          (*deferred_)[kept_++] = {t - duration_, event};
         else
           add_within(t, event);
       }
-      deferred_->resize(kept);
+      deferred_->resize(kept_);
+      due_ = added_.size();
     }
 
     /// Duration of the interval, microseconds.
@@ -102,19 +117,47 @@ class IntervalEvents {
     }
 
     /// Must be called after the last event.
-    void end() { fired_->add(band_, added_); }
+    void end() {
+      if (delays_ != nullptr) delay_rows();
+      fired_->add(band_, added_);
+    }
 
    private:
+    /// Delays the events of this interval.
+    void delay_rows() {
+      const auto delay_of = [this](const Event& event) {
+        return delays_[event.y_p & coordinate_bits];
+      };
+      for (std::size_t i = kept_; i < deferred_->size(); ++i)
+        (*deferred_)[i].t += delay_of((*deferred_)[i].event);
+      const double next_start = std::ceil(duration_);
+      std::size_t count = due_;
+      for (std::size_t i = due_; i < added_.size(); ++i) {
+        Event event = added_[i];
+        const std::uint64_t t = std::uint64_t{event.t} + delay_of(event);
+        if (static_cast<double>(t) > duration_) {
+          deferred_->push_back({static_cast<double>(t) - next_start, event});
+        } else {
+          event.t = static_cast<std::uint32_t>(t);
+          added_[count++] = event;
+        }
+      }
+      added_.resize(count);
+    }
+
     void add_within(double t, Event event) {
       event.t = static_cast<std::uint32_t>(t);
       added_.push_back(event);
     }
 
     double duration_ = 0;
+    const std::uint32_t* delays_ = nullptr;  ///< by row, if there is a rolling shutter
     TimeSlices* fired_ = nullptr;
     int band_ = 0;
     Deferred* deferred_ = nullptr;
     std::vector<Event> added_;
+    std::size_t kept_ = 0;  ///< number of events deferred by earlier intervals
+    std::size_t due_ = 0;   ///< number of events added by earlier intervals
   };
 
  private:
@@ -125,6 +168,8 @@ class IntervalEvents {
   int height_;
   double duration_ = 0;
   double max_rate_ = 0;
+  Nanoseconds rolling_shutter_ = 0;
+  std::vector<std::uint32_t> delays_;  ///< by row
   TimeSlices fired_;
   std::vector<Deferred> deferred_;  ///< by band
   std::vector<Event> sorted_;       ///< for the readout

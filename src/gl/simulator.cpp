@@ -23,7 +23,7 @@ void Simulator::queue(const TextureFrame& frame, Nanoseconds time, const Setting
   queued.is_sorted = steps.has_value();
   if (steps) {
     queued.duration = steps->duration();
-    queued.rolling_shutter = settings.rolling_shutter;
+    queued.settings = settings;
     queued.list.sort();
   }
   queued.done.set();
@@ -54,7 +54,7 @@ const EventBuckets* Simulator::read() {
   queued.done.wait();
   if (!queued.is_sorted) return nullptr;
   queued.list.read(events_);
-  return &finished(queued.duration, queued.rolling_shutter);
+  return &events(queued.duration, queued.settings);
 }
 
 }  // namespace eventcamera::gl

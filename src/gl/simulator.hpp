@@ -67,7 +67,7 @@ class Simulator : public IntervalSimulator {
     Fence done;
     bool is_sorted = false;  ///< to be read
     Nanoseconds duration = 0;
-    Nanoseconds rolling_shutter = 0;
+    Settings settings = {};
   };
 
   /// Queues all work on a frame except sorting. Returns the steps of the interval that the frame

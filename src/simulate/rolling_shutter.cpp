@@ -2,73 +2,108 @@
 #include "src/simulate/rolling_shutter.hpp"
 
 #include <algorithm>
-#include <cstddef>
 #include <cstdlib>
-#include <span>
-
-#include "src/core/label.hpp"
+#include <utility>
 
 namespace eventcamera {
 
-const EventBuckets& RollingShutter::delay(const EventBuckets& events, Nanoseconds duration,
-                                          Nanoseconds readout, ThreadPool& threads) {
-  if (delays_.empty() || readout != readout_) set_readout(readout);
-  bands_.resize(static_cast<std::size_t>(events.bands()));
-  const auto last = static_cast<std::uint32_t>(duration / 1000);
-  const auto next = static_cast<std::uint32_t>((duration + 999) / 1000);  // the next interval's 0
-  delayed_.reset(last, events.bands());
-  threads.for_each(events.bands(), [&](int i, int) {
-    auto& [due, deferred] = bands_[static_cast<std::size_t>(i)];
-    due.clear();
-    std::size_t kept = 0;
-    for (Event event : deferred) {
-      if (event.t <= last) {
-        due.push_back(event);
-      } else {
-        event.t -= next;
-        deferred[kept++] = event;
-      }
-    }
-    deferred.resize(kept);
-    events.visit_band(i, [&](std::span<const Event> list) {
-      for (Event event : list) {
-        const std::uint64_t t = std::uint64_t{event.t} + delays_[event.y_p & coordinate_bits];
-        event.t = static_cast<std::uint32_t>(t <= last ? t : t - next);
-        (t <= last ? due : deferred).push_back(event);
-      }
-    });
-    delayed_.add(i, due);
-  });
-  return delayed_;
-}
-
-const EventBuckets& RollingShutter::delay_none(Nanoseconds duration, ThreadPool& threads) {
-  StepBuckets none;
-  none.reset(0, std::max(1, static_cast<int>(bands_.size())));
-  return delay(none, duration, readout_, threads);
-}
-
-std::optional<Nanoseconds> RollingShutter::latest() const {
-  std::optional<Nanoseconds> latest;
-  for (const auto& band : bands_)
-    for (const auto& event : band.deferred)
-      latest = std::max(latest, std::optional(Nanoseconds{event.t} * 1000));
-  return latest;
-}
-
-void RollingShutter::drop_causes() {
-  for (auto& band : bands_)
-    for (auto& event : band.deferred) event = without_cause(event);
-}
-
-void RollingShutter::set_readout(Nanoseconds readout) {
-  readout_ = readout;
-  delays_.resize(static_cast<std::size_t>(height_));
-  for (int y = 0; y < height_; ++y) {
-    const int rows_before = readout < 0 ? height_ - 1 - y : y;
-    delays_[static_cast<std::size_t>(y)] = static_cast<std::uint32_t>(
-        std::abs(readout) * rows_before / std::max(1, height_ - 1) / 1000);
+std::vector<std::uint32_t> row_delays(Nanoseconds readout, int height) {
+  std::vector<std::uint32_t> delays(static_cast<std::size_t>(height));
+  for (int y = 0; y < height; ++y) {
+    const int rows_before = readout < 0 ? height - 1 - y : y;
+    delays[static_cast<std::size_t>(y)] = static_cast<std::uint32_t>(
+        std::abs(readout) * rows_before / std::max(1, height - 1) / 1000);
   }
+  return delays;
+}
+
+void DelayedRows::set(const StepBuckets& events, Nanoseconds duration, Nanoseconds readout) {
+  if (delays_.empty() || readout != readout_) delays_ = row_delays(readout, height_);
+  readout_ = readout;
+  end_ = static_cast<std::uint32_t>(duration / 1000);
+  next_start_ = static_cast<std::uint32_t>((duration + 999) / 1000);
+  rows_.clear();
+  add_due();
+  events.visit_buckets([&](std::span<const Event> list, const FiredPixels& pixels) {
+    add_list(list);
+    pixels.visit_rows([&](int y, std::span<const FiredPixels::Group> groups, std::size_t size) {
+      const std::uint64_t t = std::uint64_t{pixels.time()} + delays_[static_cast<std::size_t>(y)];
+      add({t, y, size, {}, groups});
+    });
+  });
+  sort();
+}
+
+/// Adds the events that the last interval deferred.
+void DelayedRows::add_due() {
+  std::swap(due_, deferred_);
+  std::swap(due_rows_, deferred_rows_);
+  deferred_.clear();
+  deferred_rows_.clear();
+  for (auto& [row, first] : due_rows_) {
+    row.events = std::span(due_).subspan(first, row.size);
+    row.pixels = {};
+    add(row);
+  }
+}
+
+/// Adds sorted events.
+void DelayedRows::add_list(std::span<const Event> events) {
+  for (auto first = events.begin(); first != events.end();) {
+    const auto last = std::find_if(first, events.end(), [&](const Event& event) {
+      return event.t != first->t || event.y() != first->y();
+    });
+    const std::uint64_t t = std::uint64_t{first->t} + delays_[static_cast<std::size_t>(first->y())];
+    const std::span row(first, last);
+    add({t, first->y(), row.size(), row, {}});
+    first = last;
+  }
+}
+
+void DelayedRows::add(const Row& row) {
+  if (row.t <= end_) {
+    rows_.push_back(row);
+    return;
+  }
+  const std::size_t first = deferred_.size();
+  deferred_.resize(first + row.size);
+  deferred_rows_.push_back({row, first});
+  deferred_rows_.back().row.t -= next_start_;
+  write(deferred_rows_.back().row, deferred_.data() + first);
+}
+
+void DelayedRows::sort() {
+  sorted_.clear();
+  for (const auto& row : rows_)
+    sorted_.push_back({row.t << 16 | static_cast<std::uint64_t>(row.y), sorted_.size(), 0});
+  std::ranges::sort(sorted_, {}, &SortedRow::time_and_y);
+  size_ = 0;
+  for (auto& row : sorted_) row.first = std::exchange(size_, size_ + rows_[row.row].size);
+}
+
+void DelayedRows::write(const Row& row, Event* out) {
+  const auto t = static_cast<std::uint32_t>(row.t);
+  for (const auto& event : row.events) *out++ = {t, event.x, event.y_p};
+  if (!row.pixels.empty()) FiredPixels::write(row.pixels, t, {out, row.size});
+}
+
+void DelayedRows::write_part(std::size_t first, std::size_t last, Event* out) const {
+  for (auto row = std::ranges::lower_bound(sorted_, first, {}, &SortedRow::first);
+       row != sorted_.end() && row->first < last; ++row)
+    write(rows_[row->row], out + row->first);
+}
+
+void DelayedRows::visit_band(int /*band*/, const Visit& visit) const {
+  std::vector<Event> events(size_);
+  write_part(0, size_, events.data());
+  visit(events);
+}
+
+std::optional<Nanoseconds> DelayedRows::latest() const {
+  std::optional<Nanoseconds> latest;
+  for (const auto& deferred : deferred_rows_)
+    latest = std::max(latest, std::optional(static_cast<Nanoseconds>(deferred.row.t) * 1000));
+  return latest;
 }
 
 }  // namespace eventcamera

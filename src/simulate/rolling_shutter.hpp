@@ -1,57 +1,81 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "src/core/event_buckets.hpp"
-#include "src/core/thread_pool.hpp"
-#include "src/core/time_slices.hpp"
+#include "src/core/fired_pixels.hpp"
 
 namespace eventcamera {
 
-/// Rolling shutter of a frame camera, which reads the rows of a frame one after another: delays the
-/// events of a row by the time from the first row read. Events past the end of an interval are
-/// deferred to the next one.
+/// Delay of each row of a frame from the row that the camera reads first, microseconds rounded
+/// down. `readout` is the time from the first row read to the last: from top to bottom or, if
+/// negative, from bottom to top.
+std::vector<std::uint32_t> row_delays(Nanoseconds readout, int height);
+
+/// Events of an interval between two frames of a camera with a rolling shutter: those of
+/// StepBuckets, delayed by row. Events past the end of the interval are deferred to the next one.
 ///
-/// All times are whole microseconds, rounded down, so events of a pixel stay distinct.
-class RollingShutter {
+/// The events of a row in a step have the same time. So rows are sorted, events only written.
+class DelayedRows final : public EventBuckets {
  public:
-  explicit RollingShutter(int height) : height_(height) {}
+  explicit DelayedRows(int height) : height_(height) {}
 
-  /// Returns the delayed events of an interval, with deferred ones, valid until the next call.
-  /// `readout` is the time from the first row read to the last: from top to bottom or, if negative,
-  /// from bottom to top.
-  const EventBuckets& delay(const EventBuckets& events, Nanoseconds duration, Nanoseconds readout,
-                            ThreadPool& threads);
+  /// Replaces the events by those of the next interval and the deferred ones that are due.
+  /// `events` must stay unchanged while this is used. `readout` is as for row_delays().
+  void set(const StepBuckets& events, Nanoseconds duration, Nanoseconds readout);
 
-  /// Like delay(), without new events.
-  const EventBuckets& delay_none(Nanoseconds duration, ThreadPool& threads);
-
-  /// Time from the end of the last interval to the last deferred event, if any.
+  /// Time from the end of the interval to the last deferred event, if any.
   std::optional<Nanoseconds> latest() const;
 
-  /// Drops the causes of the deferred events.
-  void drop_causes();
-
   /// Drops the deferred events.
-  void restart() { bands_.clear(); }
+  void restart() { deferred_rows_.clear(); }
+
+  std::size_t size() const override { return size_; }
+  void visit_band(int band, const Visit& visit) const override;
 
  private:
-  /// On its own cache line, because threads fill neighbouring bands concurrently.
-  struct alignas(64) Band {
-    std::vector<Event> due;       ///< in the interval
-    std::vector<Event> deferred;  ///< their times are relative to the next interval
+  /// Events of a row with the same time, in either of two forms.
+  struct Row {
+    std::uint64_t t;
+    int y;
+    std::size_t size;
+    std::span<const Event> events;
+    std::span<const FiredPixels::Group> pixels;
+  };
+  struct DeferredRow {
+    Row row;            ///< its time is relative to the next interval
+    std::size_t first;  ///< index of its first event in deferred_
+  };
+  struct SortedRow {
+    std::uint64_t time_and_y;
+    std::size_t row;    ///< index in rows_
+    std::size_t first;  ///< index of its first event in the interval
   };
 
-  void set_readout(Nanoseconds readout);
+  static void write(const Row& row, Event* out);
+  void write_part(std::size_t first, std::size_t last, Event* out) const override;
+  void add_due();
+  void add_list(std::span<const Event> events);
+  void add(const Row& row);
+  void sort();
 
   int height_;
   Nanoseconds readout_ = 0;
   std::vector<std::uint32_t> delays_;  ///< by row
-  std::vector<Band> bands_;
-  TimeSlices delayed_;
+  std::uint32_t end_ = 0;              ///< of the interval, microseconds
+  std::uint32_t next_start_ = 0;       ///< of the next interval, rounded up
+  std::vector<Row> rows_;
+  std::vector<SortedRow> sorted_;
+  std::size_t size_ = 0;
+  std::vector<Event> deferred_;
+  std::vector<DeferredRow> deferred_rows_;
+  std::vector<Event> due_;  ///< deferred_ of the last interval
+  std::vector<DeferredRow> due_rows_;
 };
 
 }  // namespace eventcamera

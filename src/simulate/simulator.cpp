@@ -8,7 +8,7 @@ namespace eventcamera {
 
 std::optional<StepTimes> IntervalSimulator::steps_to(Nanoseconds time, const Settings& settings) {
   threads_.set_threads(settings.threads);
-  set_labels(settings.labels);
+  labels_ = settings.labels;
   if (!last_time_) return std::nullopt;
   assert(time > *last_time_ && time - *last_time_ <= max_interval);
   return StepTimes(time - *last_time_, settings.interpolated_frames + 1);
@@ -18,47 +18,44 @@ const EventBuckets* IntervalSimulator::hold_until(Nanoseconds time, const Settin
   assert(!last_time_ || time >= *last_time_);
   if (!last_time_) return nullptr;
   threads_.set_threads(settings.threads);
-  set_labels(settings.labels);
+  labels_ = settings.labels;
   flow_.reset();
   const Nanoseconds duration = time - *last_time_;
   if (duration > 0 && duration <= max_interval && hold(StepTimes(duration, 1), settings, events_)) {
     last_time_ = time;
-    return &finished(duration, settings.rolling_shutter);
+    return &events(duration, settings);
   }
   return late_events(time);
 }
 
 std::optional<Nanoseconds> IntervalSimulator::late_until() const {
-  const auto latest = shutter_.latest();
-  if (!last_time_ || !latest) return std::nullopt;
-  return *last_time_ + *latest;
+  const auto time = latest();
+  if (!last_time_ || !time) return std::nullopt;
+  return *last_time_ + *time;
 }
 
 const EventBuckets* IntervalSimulator::late_events(Nanoseconds time) {
   assert(last_time_ && time >= *last_time_);
-  const Nanoseconds duration = time - *last_time_;
+  const Nanoseconds duration = std::min(time - *last_time_, max_interval);
   flow_.reset();
-  const bool has_late_events = shutter_.latest().has_value();
   last_time_ = time;
-  return has_late_events
-             ? &read_out(shutter_.delay_none(std::min(duration, max_interval), threads_), duration)
-             : nullptr;
+  return latest() ? &late(duration) : nullptr;
 }
 
-const EventBuckets& IntervalSimulator::finished(Nanoseconds duration, Nanoseconds rolling_shutter) {
-  const bool has_equal_rows = rolling_shutter == 0 && !shutter_.latest();
-  return read_out(
-      has_equal_rows ? fired() : shutter_.delay(fired(), duration, rolling_shutter, threads_),
-      duration);
+const EventBuckets& IntervalSimulator::events(Nanoseconds duration, const Settings& settings) {
+  if (settings.rolling_shutter == 0 && !delayed_.latest()) return events_;
+  delayed_.set(events_, duration, settings.rolling_shutter);
+  return delayed_;
 }
 
-void IntervalSimulator::set_labels(bool labels) {
-  if (labels_ && !labels) shutter_.drop_causes();
-  labels_ = labels;
+const EventBuckets& IntervalSimulator::late(Nanoseconds duration) {
+  delayed_.set({}, duration, 0);
+  return delayed_;
 }
 
 void IntervalSimulator::reset() {
   last_time_.reset();
+  delayed_.restart();
 }
 
 const EventBuckets* Simulator::push(const LumaView& frame, Nanoseconds time,
@@ -76,7 +73,7 @@ const EventBuckets* Simulator::push(const LumaView& frame, Nanoseconds time,
     start(denoiser_.denoised(frame, amplitude, threads()));
   }
   last_time_ = time;
-  return steps ? &finished(steps->duration(), settings.rolling_shutter) : nullptr;
+  return steps ? &events(steps->duration(), settings) : nullptr;
 }
 
 }  // namespace eventcamera

@@ -92,9 +92,6 @@ class IntervalSimulator {
   /// Like hold_until(), without noise: returns the events of late rows until `time`.
   const EventBuckets* late_events(Nanoseconds time);
 
-  /// Drops the events of late rows, which reset() keeps.
-  void drop_late_events() { shutter_.restart(); }
-
   /// True if the events of the last interval have labels, which label() writes.
   bool has_labels() const { return labels_; }
 
@@ -115,7 +112,7 @@ class IntervalSimulator {
   ThreadPool& threads() { return threads_; }
 
  protected:
-  explicit IntervalSimulator(LumaFormat format) : format_(format), shutter_(format.height) {}
+  explicit IntervalSimulator(LumaFormat format) : format_(format), delayed_(format.height) {}
 
   const LumaFormat& format() const { return format_; }
 
@@ -126,29 +123,24 @@ class IntervalSimulator {
   /// Fills `events` with noise events of an unchanged frame; false if the simulator has no noise.
   virtual bool hold(const StepTimes&, const Settings&, StepBuckets&) { return false; }
 
-  /// Returns the events of the interval that was simulated last, of `duration`, as they leave the
-  /// sensor; with those of late rows.
-  const EventBuckets& finished(Nanoseconds duration, Nanoseconds rolling_shutter);
+  /// Events of the last interval, of `duration`, with those of late rows that are due.
+  virtual const EventBuckets& events(Nanoseconds duration, const Settings& settings);
 
-  /// Events of the last interval, all rows at the same time.
-  virtual const EventBuckets& fired() const { return events_; }
+  /// Time from the last frame to the last event of late rows, if any.
+  virtual std::optional<Nanoseconds> latest() const { return delayed_.latest(); }
 
-  /// Reads the events of an interval out of the sensor, which takes time.
-  virtual const EventBuckets& read_out(const EventBuckets& fired, Nanoseconds /*duration*/) {
-    return fired;
-  }
+  /// Events of late rows until `duration` after the last frame.
+  virtual const EventBuckets& late(Nanoseconds duration);
 
   std::optional<Nanoseconds> last_time_;  ///< of the last frame, where an interval begins
   std::optional<ImageView<Flow>> flow_;   ///< of the interval
   StepBuckets events_;
 
  private:
-  void set_labels(bool labels);
-
   LumaFormat format_;
   ThreadPool threads_;
-  RollingShutter shutter_;
   bool labels_ = false;
+  DelayedRows delayed_;
 };
 
 /// Simulates the events between frames, on the CPU, in one call per frame. The same frames, times

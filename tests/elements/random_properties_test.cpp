@@ -64,6 +64,9 @@ void randomize(GParamSpec* spec, Random& random, GValue* value) {
     case G_TYPE_UINT:
       g_value_set_uint(value, static_cast<guint>(static_cast<guint64>(number)));
       break;
+    case G_TYPE_INT64:
+      g_value_set_int64(value, static_cast<gint64>(number / 2) * (random() % 2 == 0 ? 1 : -1));
+      break;
     case G_TYPE_UINT64:
       g_value_set_uint64(value, static_cast<guint64>(number));
       break;

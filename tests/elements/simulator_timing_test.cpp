@@ -498,6 +498,7 @@ void push_square(Harness& h, int frame, GstClockTime pts, guint flags = 0) {
 struct Script {
   const char* name;
   void (*run)(Harness& h);
+  bool loses_rows = false;  ///< which are later than the next frame
 };
 
 const Script scripts[] = {
@@ -526,7 +527,8 @@ const Script scripts[] = {
        for (int i = 0; i < 3; ++i) push_square(h, i, i * 40 * GST_MSECOND);
        for (int i = 3; i < 5; ++i)
          push_square(h, i, (i * 40 - 25) * GST_MSECOND, i == 3 ? GST_BUFFER_FLAG_DISCONT : 0);
-     }},
+     },
+     true},
     {"another size",
      [](Harness& h) {
        for (int i = 0; i < 3; ++i) push_square(h, i, i * 40 * GST_MSECOND);
@@ -575,7 +577,13 @@ TEST_P(EverySimulatorAlone, DelaysTheRowsOfARollingShutter) {
       auto expected = global;
       for (auto& [t, y, x, y_p] : expected) t += (is_from_top ? y : 23 - y) * 1000;
       std::ranges::sort(expected);
-      EXPECT_EQ(events_with(is_from_top ? shutter : -shutter, script), expected) << script.name;
+      const auto events = events_with(is_from_top ? shutter : -shutter, script);
+      if (script.loses_rows) {
+        EXPECT_TRUE(std::ranges::includes(expected, events)) << script.name;
+        EXPECT_GT(events.size(), expected.size() / 2) << script.name;
+      } else {
+        EXPECT_EQ(events, expected) << script.name;
+      }
     }
   }
 }
