@@ -111,7 +111,7 @@ static GType preset_type() {
        "davis240c"},
       {static_cast<int>(DvsPreset::davis346), "iniVation DAVIS346, fitted to a recording",
        "davis346"},
-      {static_cast<int>(DvsPreset::gen4), "Prophesee Gen4, IMX636", "gen4"},
+      {static_cast<int>(DvsPreset::gen4), "Prophesee Gen4, IMX636; thresholds are a guess", "gen4"},
       {static_cast<int>(DvsPreset::hs_ergb),
        "Event camera of TimeLens' HS-ERGB, fitted to a recording", "hs-ergb"},
       {0, nullptr, nullptr},
@@ -170,6 +170,12 @@ const PixelProperty pixel_properties[] = {
      "Maximum number of frames interpolated between two frames with upsampling=motion. Without "
      "this limit, steps are a pixel for motion of up to 4 pixels, and longer for more",
      &DvsSettings::max_interpolated_frames, 0, 254},
+    {"exposure-time", "Exposure time",
+     "Exposure of the frames (ns); 0: short or unknown. The motion blur of long exposures is "
+     "removed along the optical flow with upsampling=motion, where the timestamp of a frame must "
+     "be "
+     "the middle of its exposure. Short exposures are more realistic with 0",
+     &DvsSettings::exposure_time, 0, max_time, controllable},
     {"cutoff-frequency", "Cutoff frequency",
      "Bandwidth of the photoreceptor at white; darker pixels are slower (Hz; 0 = no limit)",
      &DvsSettings::cutoff_frequency, 0, 1e6, controllable},

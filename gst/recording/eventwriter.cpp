@@ -171,7 +171,7 @@ static void end_file(GstEventWriter* self) {
 }
 
 /// False for words without a header, which have the sensor's size in their caps and may follow
-/// those of another sensor.
+/// words of another sensor.
 static bool is_file(const WrittenFile& file) {
   return gst_structure_has_name(gst_caps_get_structure(file.caps(), 0),
                                 GST_EVENT_CAMERA_MEDIA_TYPE) == FALSE;

@@ -43,7 +43,7 @@ struct EventWriterFormat {
   /// Creates the encoder for a stream with these output caps. May throw.
   std::unique_ptr<eventcamera::Encoder> (*create)(eventcamera::SensorSize size, Choice choice,
                                                   const GstCaps* caps);
-  /// Fixates the caps (not empty) that the member `caps` and downstream have in common; those of
+  /// Fixates the caps (not empty) that the member `caps` and downstream have in common; caps of
   /// words have the size of the sensor. Takes ownership of them and returns fixed caps. Null if
   /// they are always fixed.
   GstCaps* (*fixate)(const GstEventCameraInfo& info, int variant, GstCaps* caps) = nullptr;

@@ -21,17 +21,18 @@ eventcamera::TableSettings FormatSettings::table() const {
 }
 
 void add_sensor_size(FormatProperties& properties) {
-  properties.add([](FormatSettings& settings) -> int& { return settings.sensor.width; },
-                 g_param_spec_uint("width", "Width",
-                                   "Width of the sensor in pixels, for files that do not state it; "
-                                   "needs height. 0: that of the smallest known sensor that events "
-                                   "fit into",
-                                   0, GST_EVENT_CAMERA_MAX_SIDE, 0, mutable_ready_flags));
+  properties.add(
+      [](FormatSettings& settings) -> int& { return settings.sensor.width; },
+      g_param_spec_uint("width", "Width",
+                        "Width of the sensor in pixels, for files that do not state it; "
+                        "needs height. 0: of the smallest known sensor that contains the "
+                        "events",
+                        0, GST_EVENT_CAMERA_MAX_SIDE, 0, mutable_ready_flags));
   properties.add([](FormatSettings& settings) -> int& { return settings.sensor.height; },
                  g_param_spec_uint("height", "Height",
                                    "Height of the sensor in pixels, for files that do not state "
-                                   "it; needs width. 0: that of the smallest known sensor that "
-                                   "events fit into",
+                                   "it; needs width. 0: of the smallest known sensor that contains "
+                                   "the events",
                                    0, GST_EVENT_CAMERA_MAX_SIDE, 0, mutable_ready_flags));
 }
 
@@ -42,6 +43,14 @@ void add_topics(FormatProperties& properties) {
                           "Topics of events and images to read, separated by commas; empty = the "
                           "first topic of events in the file, and all of images",
                           "", mutable_ready_flags));
+}
+
+void add_events_path(FormatProperties& properties) {
+  properties.add(&FormatSettings::events_path,
+                 g_param_spec_string("events-path", "Events path",
+                                     "Path of the events in the file: of a dataset or a group, "
+                                     "such as prophesee/right; empty = the first events",
+                                     "", mutable_ready_flags));
 }
 
 static GType time_unit_type() {

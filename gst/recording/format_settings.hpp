@@ -14,6 +14,7 @@ struct FormatSettings {
   int time_unit = 0;               ///< 0: detect, else TimeUnit + 1
   std::string column_order;        ///< empty: detect
   std::string topics;              ///< of a bag, separated by commas; empty: the usual ones
+  std::string events_path;         ///< in an HDF5 file; empty: the first events
 
   /// Time unit and columns of a table. Throws UnsupportedFormat.
   eventcamera::TableSettings table() const;
@@ -29,6 +30,9 @@ void add_sensor_size(FormatProperties& properties);
 
 /// Adds `topics`, for bags.
 void add_topics(FormatProperties& properties);
+
+/// Adds `events-path`, for HDF5.
+void add_events_path(FormatProperties& properties);
 
 /// Adds `width`, `height`, `time-unit` and `column-order`, for tables.
 void add_table_properties(FormatProperties& properties);

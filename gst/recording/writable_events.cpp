@@ -84,7 +84,7 @@ std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> event
   }
   if (picked_.size() < events.size())
     GST_CAT_LOG_OBJECT(category_, element_,
-                       "left out %" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT
+                       "dropped %" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT
                        " events at %" GST_TIME_FORMAT
                        ": outside the sensor, or earlier than those written",
                        events.size() - picked_.size(), events.size(),

@@ -140,7 +140,7 @@ void WrittenFile::encode(std::span<const Trigger> triggers) {
   for (const auto& trigger : triggers) {
     if (trigger.t < last_ || !encoder_->encode_trigger(trigger, bytes_)) {
       GST_LOG_OBJECT(element(),
-                     "left out a trigger of input %u at %" G_GINT64_FORMAT
+                     "dropped a trigger of input %u at %" G_GINT64_FORMAT
                      " us: late, or the format has none",
                      unsigned{trigger.id}, gint64{trigger.t});
       continue;

@@ -68,7 +68,7 @@ static gboolean can_read_twice(const char* path) {
 
 const FileElement* find_reader(const char* path) {
   static const char matlab[] = "MATLAB 5.0 MAT-file";
-  static guint8 start[1 << 14];
+  static guint8 start[1 << 17];  // typefinders see into compressed files, too
   const FileElement* reader = NULL;
   if (!can_read_twice(path)) return NULL;
   FILE* file = fopen(path, "rb");
@@ -125,8 +125,8 @@ typedef struct {
 static const Target targets[OPTION_COUNT] = {
     [OPTION_FORMAT] = {"format", NULL},
     [OPTION_COMPRESSION] = {"compression", NULL},
-    [OPTION_TIME_UNIT] = {"time-unit", "text or NumPy files"},
-    [OPTION_COLUMN_ORDER] = {"column-order", "text or NumPy files"},
+    [OPTION_TIME_UNIT] = {"time-unit", "text, NumPy or HDF5 files"},
+    [OPTION_COLUMN_ORDER] = {"column-order", "text, NumPy or HDF5 files"},
     [OPTION_WIDTH] = {"width", "files that may lack a sensor size"},
     [OPTION_HEIGHT] = {"height", "files that may lack a sensor size"},
 };

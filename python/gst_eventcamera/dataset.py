@@ -58,7 +58,7 @@ class DatasetVideo:
             yield from self.events()
 
     def events(self) -> Iterator[Events]:
-        """Yields an array per pair of consecutive frames, whatever the recipe's output is."""
+        """Yields an array per pair of consecutive frames, regardless of the recipe's output."""
         with self.playing(SINK) as pipeline:
             pipeline.gaps_as_buffers()
             yield from map(events_of, self._samples(pipeline))
@@ -79,7 +79,7 @@ class DatasetVideo:
 
     @contextlib.contextmanager
     def playing(self, rest: str, threads: int = 0) -> Iterator[Pipeline]:
-        """A pipeline in which the elements `rest` take the events. Its element `decoded` gets the frames.
+        """A pipeline that passes the events to the elements `rest`. Its element `decoded` passes the frames.
 
         threads: of the simulator, 0 = one per processor; the events do not depend on it."""
         recipe = self.recipe
@@ -88,7 +88,7 @@ class DatasetVideo:
             parameters["n-threads"] = threads
         line = recipe.line(parameters)
         with contextlib.ExitStack() as stack:
-            # The line may begin and end with caps, which need an element between them and others.
+            # Caps at the start or end of the line need an element before and after them.
             rest = f"identity ! {line} ! identity ! {EVENT_CAPS} ! {rest}"
             if recipe.window:
                 made: Pipeline = VideoPipeline("appsrc name=window format=time", rest)
@@ -107,7 +107,7 @@ class Dataset(Sequence[DatasetVideo]):
     """The videos of a recipe, by name. Nothing is stored: iterating over one of them simulates it, with the
     same events as event-dataset writes.
 
-    split: only those of this part, such as "train".
+    split: only the videos of this part, such as "train".
 
     Raises RecipeError if the recipe has an error or no video is found."""
 
@@ -132,7 +132,7 @@ class Dataset(Sequence[DatasetVideo]):
 
 
 def pictures_of(folder: str) -> list[str]:
-    """The paths of the pictures of a folder; numbers in their names count as numbers, so 2 comes before 10."""
+    """The paths of the pictures of a folder, sorted with numbers by value: 2 before 10."""
     names = filter(is_picture, os.listdir(folder))
     in_order = sorted(names, key=lambda name: [(int(part), "") if part.isdecimal() else (0, part)
                                                for part in re.split(r"(\d+)", name)])
@@ -173,7 +173,7 @@ def _scaled_picture(path: str, window: Window) -> np.ndarray:
 
 
 def _moving_window(picture: np.ndarray, window: Window) -> Iterator[np.ndarray]:
-    """The window in each of its positions on a scaled picture."""
+    """Yields the window at each of its positions on a scaled picture."""
     for left, top in window.corners():
         yield picture[top:top + window.height, left:left + window.width]
 

@@ -16,7 +16,7 @@ class Events(np.ndarray):
     (uint16, from the top left) and p (bool, True = ON).
 
     width, height: of the sensor, in pixels; 0 if not known.
-    start, end: of the time that the events are from, in seconds, as in `t`. A slice keeps those of the whole.
+    start, end: time span of the array, in seconds, as in `t`. A slice keeps the span of the whole.
     stream_start: `start` as players count, in seconds; differs for videos whose timestamps do not begin at 0, such as
         MP4 with B-frames, and for recordings. Files written from a simulation begin at this time.
     cause, object_class: labels of the events, uint8 and uint16 of the same shape, where an element has
@@ -87,8 +87,7 @@ class Events(np.ndarray):
         self.__dict__.update(attributes)
 
     def between(self, start: float, end: float) -> Events:
-        """The events with start <= t < end; a view, found by binary search. In seconds of the times in the
-        array, which are those of the recording and need not begin at 0."""
+        """The events with start <= t < end, in seconds, as a view. The times of a recording need not begin at 0."""
         bounds = np.searchsorted(self["t"], [round(start * 1e6), round(end * 1e6)])
         part = self[bounds[0]:bounds[1]]
         part.start, part.end = start, end
@@ -96,9 +95,9 @@ class Events(np.ndarray):
 
 
 def join(chunks: Iterable[Events]) -> Events:
-    """One array of chunks that follow each other: from the start of the first to the end of the last, with the
-    largest size of their sensors, which readers of files without a size enlarge, and labels if all events have
-    them. The chunk itself if there is only one.
+    """Concatenates chunks that follow each other: from the start of the first to the end of the last, with the
+    largest sensor size, which grows with files that do not state it, and labels if all events have them. A single
+    chunk is returned as it is.
 
     np.concatenate() would lose the size of the sensor, the times and the labels."""
     parts = list(chunks)
@@ -118,14 +117,14 @@ def join(chunks: Iterable[Events]) -> Events:
 
 
 def packed_events(events: np.ndarray) -> np.ndarray:
-    """A contiguous array of EVENT; the array itself if it is one. Fields are taken by name; p is ON if above 0.
+    """Converts to a contiguous array of EVENT, if it is none. Fields are found by name; p is ON if above 0.
     Raises ValueError for times and pixels that the fields of EVENT cannot hold."""
     if events.dtype == EVENT and events.flags.c_contiguous:
         return events
     packed = np.empty(len(events), EVENT)
     packed["p"] = events["p"] > 0
     for name in ("t", "x", "y"):
-        with np.errstate(invalid="ignore"):  # not a number, which differs from all
+        with np.errstate(invalid="ignore"):  # NaN
             packed[name] = events[name]
         if not np.array_equal(packed[name], events[name]):
             limits = np.iinfo(EVENT[name])

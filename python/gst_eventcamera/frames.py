@@ -6,8 +6,8 @@ import numpy as np
 
 from .pipeline import Gst
 
-# A video is cut off if it is shorter than its file states by more than these seconds and this share, unless other
-# streams last longer than its frames by more than these seconds.
+# A video is truncated if it is shorter than its file states by more than these seconds and this share, unless other
+# streams outlast its frames by more than these seconds.
 CUT_OFF = 1.0, 0.1
 # Maximum deviation of a frame interval from the median, as a share; containers round times to milliseconds.
 STEADY = 0.25

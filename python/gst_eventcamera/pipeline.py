@@ -55,7 +55,7 @@ class PipelineWarning(UserWarning):
 
 
 def printable(path: str) -> str:
-    """A path whose bytes that are not UTF-8 are escaped."""
+    """The path, with bytes that are not UTF-8 escaped."""
     return path.encode(errors="surrogateescape").decode(errors="backslashreplace")
 
 
@@ -87,8 +87,8 @@ def warn(text: str) -> None:
 
 
 class Pipeline:
-    """A pipeline whose output reaches its appsink named `out`. A context manager: leaving it stops the
-    pipeline, and so does the end of the program."""
+    """A pipeline with an appsink named `out`. As a context manager, it stops the pipeline on exit; so does the end of
+    the program."""
 
     def __init__(self, description: str) -> None:
         try:
@@ -222,7 +222,7 @@ def duration_of(pipeline: Pipeline) -> float:
 
 
 def property_limits(element: str) -> dict[str, tuple[float, float]]:
-    """Minimum and maximum of each property of an element, infinite without limits; integers for integer properties.
+    """Minimum and maximum of each property of an element, infinite if it has none; integers for integer properties.
     Properties may follow the element's name. Raises PipelineError if the element does not exist."""
     name = element.split()[0]
     made = Gst.ElementFactory.make(name)

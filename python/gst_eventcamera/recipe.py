@@ -322,7 +322,7 @@ def _framerate(recipe: Mapping[str, Any]) -> Optional[Fraction]:
         return None
     text = str(recipe["framerate"]) if isinstance(recipe["framerate"], (int, float, str)) else ""
     try:
-        # Without exponents: that of 1e500000000 would take all memory.
+        # No exponents: 1e500000000 would take all memory.
         framerate = Fraction(text if FRAMERATE.fullmatch(text) else 0)
     except ZeroDivisionError:
         framerate = Fraction(0)

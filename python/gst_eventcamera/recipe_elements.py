@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What a recipe may run: chains of elements that neither open files nor send anything."""
+"""The elements that a recipe may use, which neither open files nor send anything."""
 from __future__ import annotations
 
 import re
@@ -30,8 +30,8 @@ def is_safe_property(element: str, name: str) -> bool:
 
 
 def reason_against(chain: str) -> str:
-    """Why a chain of elements may not run; empty if it may. The syntax is a part of that of gst-launch-1.0, in which
-    no element has a name, so nothing refers to another."""
+    """Why a chain of elements may not run; empty if it may. Its syntax is a subset of gst-launch-1.0's, without names
+    of elements, so that no element refers to another."""
     for part in filter(None, map(str.strip, chain.split("!"))):
         if CAPS.fullmatch(part):
             continue

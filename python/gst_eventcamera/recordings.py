@@ -26,6 +26,8 @@ MAX_TIME = 1 << 52
 # Longest pause whose windows are returned, in seconds and in windows.
 MAX_PAUSE = 60
 MAX_EMPTY = 10_000
+# Largest len() of a stream: 51 days of 33 ms.
+MAX_LEN = 1 << 27
 # Microseconds of the buffers that are written.
 BUFFER = 10_000
 # Bytes that may wait to be written, and nanoseconds between two looks at them.
@@ -56,9 +58,10 @@ class Stream:
         past the end is empty.
 
     Iterating yields an Events array a window, empty where nothing happened; only one is in memory. Windows of pauses
-    of more than a minute or 10,000 windows are skipped, with a PipelineWarning; start and end of each array say
-    where it lies. The window that the recording ends in is the last one. Indexing and slices seek in the file. The duration, len(),
-    and indices from the end look for the end of the recording, once: a file without an index is read to its end.
+    of more than a minute or 10,000 windows are skipped, with a PipelineWarning; start and end of each array are its
+    times. len() and indices count these windows, too. The window that the recording ends in is the last one. Indexing
+    and slices seek in the file. The duration, len(), and indices from the end look for the end of the recording, once:
+    a file without an index is read to its end.
     Raises PipelineError if the file cannot be read, and ValueError for other lengths and parts."""
 
     path: str
@@ -90,7 +93,7 @@ class Stream:
         return self._length(self._whole)
 
     def _length(self, whole: float) -> float:
-        """Start and end of the part in a recording of this many seconds."""
+        """Length of the part, in a recording of `whole` seconds."""
         return max(0.0, min(whole, math.inf if self.end is None else self.end) - self.start)
 
     def between(self, start: float, end: Optional[float] = None) -> Stream:
@@ -104,11 +107,19 @@ class Stream:
         return part
 
     def _windows(self, seconds: float) -> int:
-        """The number of windows that begin within so many seconds."""
+        """The number of windows that begin within `seconds`."""
         return -(-round(seconds * 1e6) // round(self.window * 1e6))
 
-    def __len__(self) -> int:
+    @property
+    def _count(self) -> int:
         return self._windows(self.duration)
+
+    def __len__(self) -> int:
+        count = self._count
+        if count > MAX_LEN:
+            # list() reserves memory for len() items, but not after a TypeError.
+            raise TypeError(f"{self.path} has {count} windows, most of them in pauses; iterating skips these")
+        return count
 
     @overload
     def __getitem__(self, index: int) -> Events: ...
@@ -119,12 +130,12 @@ class Stream:
     def __getitem__(self, index: int | slice) -> Events | Stream:
         if isinstance(index, slice):
             is_from_end = min(index.start or 0, index.stop or 0) < 0
-            first, last, step = index.indices(len(self) if is_from_end else sys.maxsize)
+            first, last, step = index.indices(self._count if is_from_end else sys.maxsize)
             if step != 1:
                 raise ValueError("a slice of a stream has no step")
             return self.between(first * self.window, None if index.stop is None else max(first, last) * self.window)
         index = operator.index(index)
-        first = index + len(self) if index < 0 else index
+        first = index + self._count if index < 0 else index
         if first >= 0:
             for events in self.between(first * self.window, (first + 1) * self.window):
                 return events
@@ -236,7 +247,7 @@ def stream(path: str | os.PathLike[str], window: float = 0.033) -> Stream:
 def read(path: str | os.PathLike[str], start: float = 0, end: Optional[float] = None) -> Events:
     """All events of a recording, or those with start <= time < end, in seconds from its first event.
 
-    Shape (events,), 16 bytes each; times are those of the file. A part past the end is empty. Raises PipelineError
+    Shape (events,), 16 bytes each, with the times of the file. A part past the end is empty. Raises PipelineError
     if the file cannot be read or has no events to read, and ValueError unless 0 <= start <= end."""
     part = Stream(os.fsdecode(path), window=1, start=start, end=end)
     with part._open() as pipeline:
@@ -285,8 +296,8 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
 
 @contextlib.contextmanager
 def _replacing(path: str) -> Iterator[str]:
-    """A path to write to, whose file then replaces that of `path`, or is removed on failure. Devices and pipes are
-    written to as they are."""
+    """Yields a temporary path, whose file replaces `path` at the end, or is removed on failure; for devices and pipes,
+    the path itself."""
     target = os.path.realpath(path)
     if os.path.exists(target) and not os.path.isfile(target):
         yield target
@@ -338,8 +349,7 @@ def _buffers(events: np.ndarray) -> Iterator[Gst.Buffer]:
 
 
 def buffer_of(events: np.ndarray, start: int, duration: int) -> Gst.Buffer:
-    """A buffer of a stream that covers so many microseconds from `start` on, with the events of this time and
-    their labels."""
+    """A buffer of a stream that covers `duration` microseconds from `start` on, with its events and labels."""
     packed = np.empty(len(events), XYTP)
     packed["t"] = events["t"] - start
     packed["x"] = events["x"]

@@ -11,8 +11,8 @@ _FRAMES = "videoconvert name=decoded ! deinterlace ! videoconvert name=frames"
 
 
 class VideoPipeline(Pipeline):
-    """A pipeline of the elements `source`, such as "appsrc", and `rest`, which take the frames. Its element
-    `decoded` gets the frames as they are decoded."""
+    """A pipeline of the elements `source`, such as "appsrc", and `rest`, which process the frames. Its element
+    `decoded` passes the decoded frames."""
 
     def __init__(self, source: str, rest: str) -> None:
         super().__init__(f"{source} ! {_FRAMES} ! {rest}")
@@ -20,8 +20,8 @@ class VideoPipeline(Pipeline):
             Gst.PadProbeType.EVENT_DOWNSTREAM, self._turn_upright)
 
     def _turn_upright(self, pad: Gst.Pad, info: Gst.PadProbeInfo) -> Gst.PadProbeReturn:
-        """Inserts videoflip once tags say that the video is rotated. It is not always there, because it takes fewer
-        formats than simulators."""
+        """Inserts videoflip once tags say that the video is rotated; not before, because it accepts fewer formats than
+        simulators."""
         event = info.get_event()
         if event.type != Gst.EventType.TAG:
             return Gst.PadProbeReturn.OK

@@ -12,6 +12,7 @@
 #include "src/dvs/exposure_gain.hpp"
 #include "src/dvs/interval_events.hpp"
 #include "src/dvs/light_response.hpp"
+#include "src/dvs/motion_deblur.hpp"
 #include "src/dvs/moving_light.hpp"
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/pixel_solver.hpp"
@@ -48,7 +49,9 @@ class PixelSimulator final : public DvsSimulator {
 
   void start(const LumaView& frame) override {
     see(frame, last_);
+    blurred_last_.reset();
     frame_flow_.forget();
+    is_first_ = true;
     timeline_.restart();
     fired_.restart();
     response_.restart();
@@ -66,13 +69,23 @@ class PixelSimulator final : public DvsSimulator {
     const bool moves = settings_.upsampling == Upsampling::motion;
     if (gain != 1 && moves) {
       expose(last_, format().bits, settings_.linear_light, gain, threads());
+      if (blurred_last_)
+        expose(*blurred_last_, format().bits, settings_.linear_light, gain, threads());
       frame_flow_.forget();  // its copy has the old exposure
+    }
+    if (moves) find_flow();
+    if (moves && settings_.exposure_time > 0) {
+      sharpen(interval.duration());
+    } else if (blurred_last_) {
+      blurred_last_.reset();
+      frame_flow_.forget();
     }
     begin(interval, true, settings);
     if (moves)
       advance_along_motion();
     else
       advance_straight();
+    is_first_ = false;
     end(events);
     std::swap(last_, now_);
   }
@@ -80,6 +93,7 @@ class PixelSimulator final : public DvsSimulator {
   bool hold(const StepTimes& interval, const Settings& settings, StepBuckets& events) override {
     now_.assign(last_.view());
     change_settings();
+    is_first_ = false;
     begin(interval, false, settings);
     advance_straight();
     end(events);
@@ -149,7 +163,7 @@ class PixelSimulator final : public DvsSimulator {
 
   /// Row by row: the events of one microsecond are nearly in raster order.
   void advance_along_motion() {
-    const auto flow = find_flow();
+    const ImageView<Flow>& flow = *flow_;
     const int max_steps = settings_.max_interpolated_frames + 1;
     tiles_.measure(flow, max_steps, threads());
     for (int row = 0; row < tiles_.rows(); ++row)
@@ -214,14 +228,33 @@ class PixelSimulator final : public DvsSimulator {
     return scratch.luma.data();
   }
 
-  ImageView<Flow> find_flow() {
+  /// Finds the flow, unless it is known, between the frames as they were recorded.
+  void find_flow() {
     if (flow_) {
       frame_flow_.forget();
-      return *flow_;
+      return;
     }
-    const Box changed = changed_box(last_.view(), now_.view(), 0);
-    flow_ = frame_flow_.find(FlowMethod::dis_mq, format().bits, last_, now_, changed, threads());
-    return *flow_;
+    const auto& last = blurred_last_ ? *blurred_last_ : last_;
+    const Box changed = changed_box(last.view(), now_.view(), 0);
+    flow_ = frame_flow_.find(FlowMethod::dis_mq, format().bits, last, now_, changed, threads());
+  }
+
+  /// Removes the motion blur of now_ and, if it is the first frame, of last_.
+  void sharpen(Nanoseconds interval) {
+    const double share =
+        std::min(1.0, static_cast<double>(settings_.exposure_time) / static_cast<double>(interval));
+    if (!deblur_) deblur_.emplace(format().width, format().height);
+    if (is_first_) {
+      deblur_->set_motion(*flow_, share, false, threads());
+      deblur_->sharpen(last_, format().bits, threads());
+      pixels_.settle(last_, response_, threads());
+    }
+    if (blurred_last_)
+      blurred_last_->assign(now_.view());
+    else
+      blurred_last_ = now_;
+    deblur_->set_motion(*flow_, share, true, threads());
+    deblur_->sharpen(now_, format().bits, threads());
   }
 
   /// Calls advance_row(y, scratch) for each row, band by band in parallel.
@@ -251,6 +284,9 @@ class PixelSimulator final : public DvsSimulator {
   IntervalEvents fired_{format().width, format().height};
   const EventBuckets* made_ = nullptr;  ///< by the last interval
   FrameFlow frame_flow_;
+  bool is_first_ = true;                      ///< last_ is the first frame
+  std::optional<Image<Pixel>> blurred_last_;  ///< last_ as recorded, if it was sharpened
+  std::optional<MotionDeblur> deblur_;
   MotionTiles tiles_;
   std::vector<Scratch> scratch_;  ///< by thread
 };

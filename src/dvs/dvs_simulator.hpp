@@ -10,6 +10,7 @@
 //
 //   light_response.cpp    response of the photoreceptor to luma, without the exposure that
 //                         exposure_gain.cpp finds
+//   motion_deblur.cpp     sharpens frames of long exposures along their motion
 //   moving_light.cpp      number of steps between two frames for each tile, and the luma of moving
 //                         pixels at each step
 //   sub_intervals.cpp     timeline: divides the interval into sub-intervals at steps and exposure

@@ -23,10 +23,11 @@ using enum RefractoryReset;
 // davis240c, davis346, hs-ergb: fitted by event-calibrate to recordings of docs/realism.md. The
 //   leak of 0.1 Hz is what DVS-Voltmeter was fitted with on recordings of a DAVIS346, whose readout
 //   does 12 million events per second according to the data sheet.
-// gen4: the ranges from which OpenEB's own simulator samples: thresholds 0.15 and 0.1, refractory
-//   period 10 to 1000 us, leak and shot noise up to 1 Hz, cutoff up to 900 Hz. These are their
-//   middles, on a suitable scale. Finateu et al., ISSCC 2020: 1.066 Gev/s of readout, latency below
-//   220 us at 5 lux and about 100 us in office light.
+// gen4: response and thresholds of standard: a guess, as no recording with frames was fitted. The
+//   rest are the middles, on a suitable scale, of the ranges from which OpenEB's own simulator
+//   samples: refractory period 10 to 1000 us, leak and shot noise up to 1 Hz, cutoff up to 900 Hz.
+//   Its thresholds, 0.15 and 0.1, fire two to eight times too much. Finateu et al., ISSCC 2020:
+//   1.066 Gev/s of readout, latency below 220 us at 5 lux and about 100 us in office light.
 //
 // The fractions of hot pixels are guesses.
 constexpr std::pair<DvsPreset, DvsSettings> table[] = {
@@ -91,14 +92,21 @@ constexpr std::pair<DvsPreset, DvsSettings> table[] = {
       .adaptation = 0.05,
       .max_rate = 12e6}},
     {DvsPreset::gen4,
-     {.cutoff_frequency = 450,
-      .positive_threshold = 0.15,
-      .negative_threshold = 0.1,
+     {.denoise = automatic_denoise,
+      .exposure_compensation = true,
+      .response = log,
+      .log_eps = 0.05,
+      .overexposed_light = 1.5,
+      .upsampling = Upsampling::motion,
+      .cutoff_frequency = 450,
+      .positive_threshold = 0.26,
+      .negative_threshold = 0.26,
       .threshold_sigma = 0.005,
       .leak_rate = 0.1,
       .leak_spread = 0.1,
       .shot_noise_rate = 0.1,
       .hot_pixels = 1e-5,
+      .adaptation = 0.05,
       .refractory_period = 100'000,
       .refractory_reset = signal,
       .pixel_latency = 100'000,

@@ -45,12 +45,15 @@ std::size_t Chunker::keep_sorted(std::span<const AbsoluteEvent> events) {
   if (keeps_labels_) std::ranges::transform(events, std::back_inserter(cell.labels), label_of);
   latest_ = events.back().t;
   waiting_ += events.size();
+  rows_ += events.size();
   return events.size();
 }
 
 void Chunker::place(const AbsoluteEvent& event) {
+  ++rows_;
   if (!is_time(event.t)) {
     ++stray_;
+    note_dropped();
     return;
   }
   const bool goes_on =
@@ -63,6 +66,24 @@ void Chunker::place(const AbsoluteEvent& event) {
     keep_all(unsettled_.push(event, !first_));
   else
     keep(event);
+  note_dropped();
+}
+
+/// Looks whether the events are far out of order.
+void Chunker::note_dropped() {
+  constexpr std::uint64_t always_tolerated = 100;
+  const auto [late, stray] = dropped();
+  if (late + stray == 0) return;
+  if (first_dropped_ == 0) first_dropped_ = rows_;
+  if (!disorder_ && late + stray > always_tolerated && (late + stray) * 100 > rows_)
+    disorder_ = {first_dropped_, late + stray, rows_};
+}
+
+std::optional<Chunker::Disorder> Chunker::disorder() const {
+  const auto [late, stray] = dropped();
+  if (!disorder_ && finished_ && (late + stray) * 100 > rows_)
+    return Disorder{first_dropped_, late + stray, rows_};
+  return disorder_;
 }
 
 /// Drops an event before the next interval.
@@ -72,7 +93,9 @@ void Chunker::drop_early(const AbsoluteEvent& event) {
 }
 
 void Chunker::keep(const AbsoluteEvent& event) {
-  if (event.t < start_) return drop_early(event);
+  // An interval that is over counts as returned, whenever next() is called.
+  const auto over = due();
+  if (event.t < start_ || (event.t < over && event.t < grid_before(over))) return drop_early(event);
   auto& cell = cell_of(event.t);
   const auto t = static_cast<std::uint32_t>(event.t - cell.start);
   cell.is_sorted &= cell.events.empty() || t >= cell.events.back().t;
@@ -91,8 +114,9 @@ void Chunker::keep_all(std::span<const AbsoluteEvent> events) {
 }
 
 void Chunker::advance_to(Microseconds t) {
-  reached_ = std::max(reached_, std::clamp(t, -max_time, max_time));
-  keep_all(unsettled_.settle_before(reached_ + settled));
+  const auto reached = std::max(reached_, std::clamp(t, -max_time, max_time));
+  keep_all(unsettled_.settle_before(reached + settled));
+  reached_ = reached;
 }
 
 void Chunker::pause(Microseconds t) {
@@ -103,6 +127,12 @@ void Chunker::pause(Microseconds t) {
 void Chunker::finish() {
   keep_all(unsettled_.finish());
   finished_ = true;
+  note_dropped();
+}
+
+/// Earlier events may be dropped.
+Microseconds Chunker::due() const {
+  return latest_ == never ? reached_ : std::max(reached_, latest_ - settled);
 }
 
 /// The cell of a time that was not returned yet.
@@ -123,8 +153,7 @@ Chunker::Cell& Chunker::cell_of(Microseconds t) {
 
 std::optional<Chunker::Interval> Chunker::next() {
   if (!first_) return std::nullopt;
-  auto due = reached_;
-  if (latest_ != never) due = std::max(due, latest_ - settled);
+  auto due = this->due();
   const auto end = grid_before(start_) + length_;
   if (finished_) {
     if (waiting_ == 0) return std::nullopt;

@@ -18,8 +18,9 @@ namespace eventcamera {
 /// with the same time keep the order in which they came. Times are whole microseconds, rounded
 /// down, so an interval includes its start and excludes its end.
 ///
-/// Events may be out of order by up to `settled`; later ones are dropped. So are events whose times
-/// the following ones do not continue, as after a flipped bit.
+/// Events may be out of order by up to `settled`; those later by more whose interval is over are
+/// dropped, and so are events whose times the following ones do not continue, as after a flipped
+/// bit. Neither depends on how the events are divided between calls.
 class Chunker {
  public:
   static constexpr Microseconds settled = UnsettledEvents::settled;
@@ -38,8 +39,15 @@ class Chunker {
   };
 
   struct Dropped {
-    std::uint64_t late = 0;   ///< their interval was already returned
+    std::uint64_t late = 0;   ///< their interval was over
     std::uint64_t stray = 0;  ///< with an erroneous time
+  };
+
+  /// Where it became certain that the events are not sorted by time.
+  struct Disorder {
+    std::uint64_t row;  ///< number of the first event that showed it, counted from 1
+    std::uint64_t dropped;
+    std::uint64_t rows;
   };
 
   /// The first interval begins at the first event.
@@ -79,6 +87,10 @@ class Chunker {
 
   Dropped dropped() const { return {late_, stray_ + unsettled_.stray()}; }
 
+  /// Set if more than one event in a hundred was dropped: so far, but for the first hundred
+  /// dropped, or once finished.
+  std::optional<Disorder> disorder() const;
+
  private:
   static constexpr Microseconds never = std::numeric_limits<Microseconds>::min();
   static constexpr std::size_t max_spare = 2 * max_events;
@@ -95,6 +107,8 @@ class Chunker {
   std::size_t keep_sorted(std::span<const AbsoluteEvent> events);
   void place(const AbsoluteEvent& event);
   void drop_early(const AbsoluteEvent& event);
+  void note_dropped();
+  Microseconds due() const;
   void keep(const AbsoluteEvent& event);
   void keep_all(std::span<const AbsoluteEvent> events);
   Cell& cell_of(Microseconds t);
@@ -124,6 +138,9 @@ class Chunker {
   UnsettledEvents unsettled_;              ///< not kept yet
   std::uint64_t late_ = 0;
   std::uint64_t stray_ = 0;
+  std::uint64_t rows_ = 0;  ///< events pushed
+  std::uint64_t first_dropped_ = 0;
+  std::optional<Disorder> disorder_;
 };
 
 }  // namespace eventcamera

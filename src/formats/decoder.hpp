@@ -123,6 +123,12 @@ struct ImuItem {
 
 using Item = std::variant<EventItem, FrameItem, TriggerItem, ImuItem>;
 
+/// Streams that are not read but that another setting would read.
+struct UnreadStreams {
+  std::string names;     ///< for users, such as "topics /a, /b"; empty if there are none
+  std::string property;  ///< that selects them
+};
+
 /// Events and triggers, to which decoders append.
 struct Decoded {
   std::vector<AbsoluteEvent> events;
@@ -183,9 +189,10 @@ class Decoder {
   /// Where to restart for the first item of a stream, if the file states it.
   virtual std::optional<SeekPoint> first_of(std::size_t /*stream*/) const { return std::nullopt; }
 
-  /// Topics that are not read but that another setting would read, for users, such as
-  /// "topics /a, /b"; empty if there are none.
-  virtual std::string unread_topics() const { return {}; }
+  virtual UnreadStreams unread_streams() const { return {}; }
+
+  /// True for tables, whose rows may be in any order; cameras write events in the order of time.
+  virtual bool is_table() const { return false; }
 
   /// Name of the format for users; empty if it adds nothing to the media type.
   virtual std::string format_name() const { return {}; }

@@ -81,7 +81,7 @@ constexpr std::string_view prophesee_magic = "% ";
 
 Likelihood match_raw(Bytes bytes) {
   PropheseeHeader header;
-  while (const auto line = header.take(bytes, false)) {
+  while (const auto line = header.read_line(bytes, false)) {
     bytes = bytes.subspan(line);
     if (is_version(header.value("evt")) || names_words(header.value("format")))
       return Likelihood::certain;
@@ -93,7 +93,7 @@ Likelihood match_raw(Bytes bytes) {
 Likelihood match_dat(Bytes bytes) {
   constexpr std::uint8_t types[] = {0x00, 0x0c, 0x0e};
   PropheseeHeader header;
-  while (const auto line = header.take(bytes, false)) bytes = bytes.subspan(line);
+  while (const auto line = header.read_line(bytes, false)) bytes = bytes.subspan(line);
   const bool matches = header.ended() && bytes.size() >= 2 &&
                        std::ranges::count(types, bytes[0]) > 0 && bytes[1] == 8;
   return matches ? Likelihood::high : Likelihood::none;

@@ -28,7 +28,7 @@ Iterator past_zeros(Iterator at, Iterator end) {
 
 }  // namespace
 
-std::size_t PropheseeHeader::take(std::span<const std::uint8_t> bytes, bool ended) {
+std::size_t PropheseeHeader::read_line(std::span<const std::uint8_t> bytes, bool ended) {
   if (ended_) return 0;
   const auto looked_at = bytes.first(std::min(bytes.size(), max_line));
   // Binary data may look like the start of a line, but is unlikely to continue as text.

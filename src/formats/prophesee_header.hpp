@@ -16,7 +16,7 @@ class PropheseeHeader {
   /// Reads a line from the front of `bytes` and returns its length; 0 if it is incomplete or the
   /// header has ended. `ended`: no more bytes will follow. Throws UnsupportedFormat if the header
   /// is too long.
-  std::size_t take(std::span<const std::uint8_t> bytes, bool ended);
+  std::size_t read_line(std::span<const std::uint8_t> bytes, bool ended);
 
   bool ended() const { return ended_; }
 

@@ -26,6 +26,12 @@ constexpr std::uint64_t max_surveyed_bytes = std::uint64_t{1} << 24;
 /// Limits of held items, in bytes of memory (4 million events) and in time.
 constexpr std::size_t max_held = std::size_t{1} << 26;
 constexpr Microseconds max_hold = 1'000'000;
+/// Held items of a table, in bytes: so many are surveyed at least, and sorted at most (16 million
+/// events).
+constexpr std::size_t min_surveyed_rows = std::size_t{1} << 20;
+constexpr std::size_t max_sorted = std::size_t{1} << 28;
+/// Sorted events returned at once.
+constexpr std::size_t sorted_block = std::size_t{1} << 12;
 
 /// True for streams that play by themselves; others accompany them.
 constexpr bool is_shown(StreamKind kind) {
@@ -47,6 +53,15 @@ void copy_content(FrameItem& item, std::vector<std::byte>& memory) {
   const auto* const pixels = reinterpret_cast<const std::byte*>(frame.pixels);
   memory.assign(pixels, pixels + frame.height * frame.stride);
   frame.pixels = reinterpret_cast<const std::uint8_t*>(memory.data());
+}
+
+UnsupportedFormat not_sorted(const Chunker::Disorder& disorder) {
+  return UnsupportedFormat(
+      "its events are not sorted by time: " + std::to_string(disorder.dropped) + " of " +
+      std::to_string(disorder.rows) + " are more than 10 ms out of order, the first near row " +
+      std::to_string(disorder.row) +
+      ". Sort its rows by time; a file of up to 16 million events that "
+      "filesrc reads is sorted without that");
 }
 
 }  // namespace
@@ -74,7 +89,15 @@ std::optional<Item> RecordingReader::Input::decode() {
 std::optional<Item> RecordingReader::Input::next() {
   if (replayed_) {
     if (*replayed_ < held_.size()) return held_[(*replayed_)++].item;
-    clear_held();
+    if (!sorted_) clear_held();
+  }
+  if (sorted_) {
+    const auto block = std::span(*sorted_).subspan(returned_).first(
+        std::min(sorted_->size() - returned_, sorted_block));
+    returned_ += block.size();
+    is_finished_ = block.empty();
+    if (is_finished_) return std::nullopt;
+    return EventItem{0, block};
   }
   while (true) {
     if (const auto item = decode()) return item;
@@ -103,6 +126,19 @@ void RecordingReader::Input::hold(Item item) {
   held_.push_back({item, std::move(memory)});
 }
 
+void RecordingReader::Input::sort_held() {
+  sorted_.emplace();
+  for (auto& [item, memory] : held_) {
+    const auto* const some = std::get_if<EventItem>(&item);
+    if (some == nullptr) continue;
+    sorted_->insert(sorted_->end(), some->events.begin(), some->events.end());
+    memory = {};
+  }
+  std::erase_if(held_,
+                [](const Held& held) { return std::holds_alternative<EventItem>(held.item); });
+  std::ranges::stable_sort(*sorted_, {}, &AbsoluteEvent::t);
+}
+
 void RecordingReader::Input::clear_held() {
   held_.clear();
   held_size_ = 0;
@@ -111,6 +147,11 @@ void RecordingReader::Input::clear_held() {
 
 void RecordingReader::Input::restart(const std::optional<SeekPoint>& seek_point) {
   const auto guard = lock();
+  is_finished_ = false;
+  if (sorted_) {
+    replayed_ = returned_ = 0;
+    return;
+  }
   if (seek_point) {
     decoder_->restart(*seek_point);
   } else {
@@ -118,7 +159,6 @@ void RecordingReader::Input::restart(const std::optional<SeekPoint>& seek_point)
     if (source_ != nullptr) reads_itself_ = decoder_->open(*source_);
   }
   position_ = seek_point ? seek_point->position : 0;
-  is_finished_ = false;
   clear_held();
 }
 
@@ -220,7 +260,11 @@ bool RecordingReader::survey() {
   const bool is_whole = input_.is_finished();
   for (auto& stream : streams_)
     if (is_whole || !stream.first) finish_survey(stream);
-  const auto last = input_.decoder().last_time();
+  if (const auto found = disorder()) {
+    if (!is_whole) throw not_sorted(*found);
+    sort_events();
+  }
+  const auto last = is_sorted() ? std::nullopt : input_.decoder().last_time();
   has_moved |= find_first_items();
   if (input_.source().failed()) return false;
   learn_duration(last, is_whole);
@@ -232,9 +276,29 @@ bool RecordingReader::survey() {
   return true;
 }
 
+/// Disorder of a table that was not sorted.
+std::optional<Chunker::Disorder> RecordingReader::disorder() const {
+  const bool may_be = input_.decoder().is_table() && !input_.is_sorted() && !streams_.empty();
+  return may_be ? streams_.front().chunker.disorder() : std::nullopt;
+}
+
+/// Sorts the events of a table that was surveyed as a whole, and surveys them again.
+void RecordingReader::sort_events() {
+  input_.sort_held();
+  auto& stream = streams_.front();
+  stream.used = {};
+  stream.chunker = Chunker(chunk_length_);
+  input_.restart(std::nullopt);
+  while (survey_next()) continue;
+  finish_survey(stream);
+  input_.restart(std::nullopt);
+}
+
 /// True if there is no need to read more: too much was read, or sizes, origin and duration are
 /// known.
 bool RecordingReader::is_surveyed() {
+  if (disorder()) return input_.held_size() >= max_sorted;
+  if (input_.decoder().is_table() && input_.held_size() < min_surveyed_rows) return false;
   if (input_.held_size() >= max_held || input_.position() >= max_surveyed_bytes) return true;
   const bool sizes_known = std::ranges::all_of(streams_, [](const Stream& stream) {
     return stream.info.kind != StreamKind::events || stream.info.size.width > 0;
@@ -440,6 +504,7 @@ std::optional<RecordingReader::Output> RecordingReader::next() {
     if (const auto item = next_item()) {
       if (begun_) {
         std::visit([this](const auto& some) { add(some); }, *item);
+        if (const auto found = disorder()) throw not_sorted(*found);
       } else {
         std::visit([this](const auto& some) { survey(some); }, *item);
         input_.hold(*item);
@@ -449,9 +514,11 @@ std::optional<RecordingReader::Output> RecordingReader::next() {
       return std::nullopt;
     } else if (!begun_) {
       for (auto& stream : streams_) finish_survey(stream);
+      if (const auto found = disorder()) throw not_sorted(*found);
       begin();
     } else if (!std::exchange(finishing_, true)) {
       finish_chunkers();
+      if (const auto found = disorder()) throw not_sorted(*found);
     } else if (const auto output = next_accompanying(after_all_items)) {
       return output;
     } else {

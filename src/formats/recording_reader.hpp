@@ -31,6 +31,10 @@ namespace eventcamera {
 /// surveyed first: this gives an exact or estimated duration, and the sensor size if the file does
 /// not state it.
 ///
+/// A table of which more than one row in a hundred is far out of order is sorted if the survey
+/// finds that and the table is not too large for memory; otherwise it is refused, wherever that is
+/// found.
+///
 ///     recording.push(bytes);  // or open(), once
 ///     while (const auto output = recording.next()) ...
 class RecordingReader {
@@ -162,7 +166,7 @@ class RecordingReader {
 
   std::string format_name() const { return input_.decoder().format_name(); }
 
-  std::string unread_topics() const { return input_.decoder().unread_topics(); }
+  UnreadStreams unread_streams() const { return input_.decoder().unread_streams(); }
 
   /// True if no events and frames were found before the Start.
   bool is_empty() const { return !earliest(); }
@@ -190,6 +194,9 @@ class RecordingReader {
     std::uint64_t stray = 0;    ///< events and frames with an erroneous time
   };
   Counts counts() const;
+
+  /// True if the file is a table that had to be sorted.
+  bool is_sorted() const { return input_.is_sorted(); }
 
   /// The first corruption of the file.
   const Corruption& corruption() const { return input_.decoder().corruption(); }
@@ -224,6 +231,11 @@ class RecordingReader {
 
     /// Size of the held items in memory, in bytes.
     std::size_t held_size() const { return held_size_; }
+
+    /// Sorts the held events, which are all of the file. From now on, every restart() leads to the
+    /// start of these.
+    void sort_held();
+    bool is_sorted() const { return sorted_.has_value(); }
 
     /// The next items are the held ones.
     void replay() { replayed_ = 0; }
@@ -270,7 +282,9 @@ class RecordingReader {
 
     std::vector<Held> held_;
     std::size_t held_size_ = 0;
-    std::optional<std::size_t> replayed_;  ///< number of held items returned again
+    std::optional<std::size_t> replayed_;               ///< number of held items returned again
+    std::optional<std::vector<AbsoluteEvent>> sorted_;  ///< all events
+    std::size_t returned_ = 0;                          ///< of them
   };
 
   std::optional<Item> next_item();
@@ -278,6 +292,8 @@ class RecordingReader {
 
   bool survey();
   bool is_surveyed();
+  std::optional<Chunker::Disorder> disorder() const;
+  void sort_events();
   bool find_first_items();
   void learn_duration(std::optional<Microseconds> stated, bool is_whole);
   bool is_origin_known() const;

@@ -75,7 +75,7 @@ bool are_frame_numbers(const std::vector<TableNumber>& times) {
 
 /// False if events were further apart in this unit than event cameras and simulators have them,
 /// unless the table is our own, or if integer microseconds began weeks ago without being a date.
-bool is_plausible(const std::vector<TableNumber>& times, TimeUnit unit, bool is_own) {
+bool is_plausible(std::vector<TableNumber> times, TimeUnit unit, bool is_own) {
   constexpr std::size_t min_rows = 4;
   constexpr std::size_t many_rows = 64;
   constexpr double max_uptime = 1e12;
@@ -86,13 +86,19 @@ bool is_plausible(const std::vector<TableNumber>& times, TimeUnit unit, bool is_
   if (is_whole_microsecond && times.front().value >= max_uptime && times.front().value < min_date)
     return false;
   if (is_own) return true;
+  std::size_t falls = 0;
+  for (std::size_t i = 1; i < times.size(); ++i) falls += times[i].value < times[i - 1].value;
+  // Of a shuffled table, the next event is rarely among the first rows.
+  const bool is_shuffled = falls * 4 > times.size();
+  if (is_shuffled) std::ranges::sort(times, {}, &TableNumber::value);
   std::vector<double> gaps;
   for (std::size_t i = 1; i < times.size(); ++i)
     gaps.push_back(std::abs(times[i].value - times[i - 1].value));
   const auto median = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2);
   std::ranges::nth_element(gaps, median);
   const double microseconds = *median * std::pow(10, power_of(unit));
-  const double max_gap = times.size() < many_rows ? 1e6 : is_whole_microsecond ? 1e3 : 1e4;
+  const bool is_dense = times.size() >= many_rows && !is_shuffled;
+  const double max_gap = !is_dense ? 1e6 : is_whole_microsecond ? 1e3 : 1e4;
   return microseconds <= max_gap;
 }
 

@@ -22,7 +22,7 @@ class UnsettledEvents {
 
   bool empty() const { return first_.empty(); }
 
-  /// True if a time is that of an event among these, or near it.
+  /// True if `t` is near the time of an event among these.
   bool is_near(Microseconds t) const { return is_near(t, first_) || is_near(t, second_); }
 
   /// Adds an event. Returns the events known to be right by now, valid until the next call. A

@@ -1,66 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // aedatdemux with AEDAT files that are corrupt or empty, and with files that are not AEDAT.
-#include <set>
-
 #include "tests/elements/aedat_player.hpp"
 #include "tests/elements/aedat_recordings.hpp"
-#include "tests/formats/recordings.hpp"
-#include "tests/formats/shared_data.hpp"
 
 namespace {
 
 using namespace harness;
 using namespace aedat_recordings;
-
-/// The first corruption, as found by the decoder alone.
-std::uint64_t place_of_corruption(const Bytes& bytes) {
-  Aedat4Decoder decoder;
-  decoder.push(bytes);
-  decoder.drain();
-  while (decoder.next()) continue;
-  EXPECT_GT(decoder.corruption().places, 0U);
-  return decoder.corruption().first_at;
-}
-
-TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
-  const auto events = steady_events(2'000'000, 50);
-  const auto whole = aedat4_file(events);
-  std::set<Microseconds> times;
-  for (const auto& event : events) times.insert(event.t);
-  recordings::Random random(11);
-  for (int i = 0; i < 12; ++i) {
-    SCOPED_TRACE(i);
-    auto bytes = whole;
-    const auto at = 2000 + static_cast<std::size_t>(
-                               recordings::below(random, static_cast<int>(bytes.size()) - 4000));
-    if (i % 3 == 0)
-      for (std::size_t k = 0; k < 40; ++k) bytes[at + k] ^= 0x5a;
-    else if (i % 3 == 1)
-      bytes.resize((bytes.size() + at) / 2);
-    else
-      bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(at),
-                  bytes.begin() + static_cast<std::ptrdiff_t>(at) + 33);
-    const TemporaryFile file(bytes);
-    // In pull mode its table is missing, too; the first corruption is reported.
-    const auto first_corruption = place_of_corruption(bytes);
-    for (const char* between : {"", "identity ! "}) {
-      AedatPlayer player(file.source() + between);
-      ASSERT_TRUE(player.play()) << player.error;
-      ASSERT_FALSE(player.warnings.empty());
-      EXPECT_TRUE(player.warnings.front().starts_with("Corrupt data at byte " +
-                                                      std::to_string(first_corruption) + ": "))
-          << player.warnings.front();
-      EXPECT_EQ(
-          std::count_if(player.warnings.begin(), player.warnings.end(),
-                        [](const auto& text) { return text.find("at byte") != std::string::npos; }),
-          1);
-      EXPECT_GE(player.stat("corrupt-places"), 1U);
-      const auto track = player.track("events_0");
-      EXPECT_GT(track.events.size(), events.size() / 3);
-      for (const auto& event : track.events) EXPECT_TRUE(times.contains(event.t));
-    }
-  }
-}
 
 TEST(AedatDemux, SaysWhereTheTableIsWrong) {
   const auto events = steady_events(2'000'000, 50);
@@ -149,20 +95,6 @@ TEST(AedatDemux, TellsDecodebinOfErrors) {
   gst_element_set_locked_state(pipeline["d"], FALSE);
   EXPECT_FALSE(pipeline.wait());
   EXPECT_EQ(pipeline.end, GST_MESSAGE_ERROR);
-}
-
-/// Any byte of the header may be wrong: decodebin ends with EOS or an error.
-TEST(AedatDemux, EndsWhereTheHeaderIsCorrupt) {
-  const auto ends = [](Bytes bytes, std::size_t at) {
-    bytes[at] = 0x7f;
-    const TemporaryFile file(bytes);
-    EXPECT_NE(decoded(file), GST_MESSAGE_UNKNOWN) << at;
-  };
-  const auto made = aedat4_with_frames(steady_events(100'000, 70), PixelFormat::grey8, 3);
-  for (std::size_t at = 0; at < 200; at += 3) ends(made, at);
-  const auto recorded = shared_data::events_file(davis);
-  for (const std::size_t at : {11, 17, 33, 110, 111, 112, 3123})
-    if (!recorded.empty()) ends(recorded, at);
 }
 
 TEST(AedatDemux, SaysWhereAFileHasNoEvents) {

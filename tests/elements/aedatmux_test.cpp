@@ -186,19 +186,6 @@ TEST(AedatMux, WritesFramesInTheSizeOfTheirCaps) {
   EXPECT_EQ(pictures[0].pixels, (Bytes{0, 1, 2, 3, 16, 17, 18, 19, 32, 33, 34, 35}));
 }
 
-TEST(AedatMux, WritesAnewAfterAFlush) {
-  Mux mux;
-  EXPECT_EQ(mux.push(GST_SECOND, {{0, 1, 2}}), GST_FLOW_OK);
-  EXPECT_TRUE(Buffer(gst_harness_pull(mux.get())));  // the header, so the file has begun
-  flush({mux.get()});
-  while (mux.pull()) continue;
-  // The running time of the continued stream is 0 again.
-  push_segment(mux.get(), 500 * GST_MSECOND, 0);
-  EXPECT_EQ(mux.push(600 * GST_MSECOND, {{0, 3, 4}, {7, 5, 6}}), GST_FLOW_OK);
-  EXPECT_EQ(mux.end().events, (Events{AbsoluteEvent::at(3, 4, 600'000, Polarity::off),
-                                      AbsoluteEvent::at(5, 6, 600'007, Polarity::off)}));
-}
-
 TEST(AedatMux, EndsASegmentOnceBothInputsHave) {
   const EventsAndVideo mux;
   auto* const events = mux.first.get();

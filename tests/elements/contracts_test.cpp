@@ -3,7 +3,9 @@
 // events and EOS.
 #include <gst/base/gstbasesink.h>
 
+#include <functional>
 #include <mutex>
+#include <thread>
 
 #include "tests/elements/element_lines.hpp"
 
@@ -19,6 +21,7 @@ class Output {
     std::string name;            ///< of an event; or "buffer"
     GstClockTime base;           ///< of the segment that it belongs to; none before the first
     GstClockTime discontinuity;  ///< PTS of a buffer that is flagged DISCONT; else none
+    std::vector<guint8> bytes;   ///< of a buffer
   };
 
   explicit Output(GstPad* pad) {
@@ -31,7 +34,7 @@ class Output {
           if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0)
             output.add(GST_PAD_PROBE_INFO_BUFFER(info));
           else if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER_LIST) != 0)
-            output.add("buffer");
+            output.add(gst_buffer_list_get(GST_PAD_PROBE_INFO_BUFFER_LIST(info), 0));
           else
             output.add(GST_PAD_PROBE_INFO_EVENT(info));
           return GST_PAD_PROBE_OK;
@@ -49,6 +52,14 @@ class Output {
     const std::lock_guard lock(mutex_);
     return items_;
   }
+  std::vector<std::vector<guint8>> buffers_after_flushes() const {
+    std::vector<std::vector<guint8>> buffers;
+    for (const auto& item : all()) {
+      if (item.name == "buffer") buffers.push_back(item.bytes);
+      if (item.name == "flush-stop") buffers.clear();
+    }
+    return buffers;
+  }
 
  private:
   void add(GstEvent* event) {
@@ -63,11 +74,15 @@ class Output {
     add(is_custom ? gst_structure_get_name(structure) : GST_EVENT_TYPE_NAME(event));
   }
   void add(GstBuffer* buffer) {
-    add("buffer", GST_BUFFER_IS_DISCONT(buffer) ? GST_BUFFER_PTS(buffer) : GST_CLOCK_TIME_NONE);
+    std::vector<guint8> bytes(gst_buffer_get_size(buffer));
+    if (!bytes.empty()) gst_buffer_extract(buffer, 0, bytes.data(), bytes.size());
+    add("buffer", GST_BUFFER_IS_DISCONT(buffer) ? GST_BUFFER_PTS(buffer) : GST_CLOCK_TIME_NONE,
+        std::move(bytes));
   }
-  void add(const std::string& name, GstClockTime discontinuity = GST_CLOCK_TIME_NONE) {
+  void add(const std::string& name, GstClockTime discontinuity = GST_CLOCK_TIME_NONE,
+           std::vector<guint8> bytes = {}) {
     const std::lock_guard lock(mutex_);
-    items_.push_back({name, base_, discontinuity});
+    items_.push_back({name, base_, discontinuity, std::move(bytes)});
   }
 
   mutable std::mutex mutex_;
@@ -87,13 +102,11 @@ std::vector<std::string> seekable_consumers() {
   return names;
 }
 
-/// An aggregator may block one input until another has data, so a single thread would deadlock.
-constexpr const char* one_thread = "several inputs need several threads";
-
-/// A playing element whose inputs a test pushes.
-class EveryConsumer : public testing::TestWithParam<std::string> {
- protected:
-  void SetUp() override {
+/// A playing element. Its inputs receive what has been pushed when play() is called, each in its
+/// own thread: an aggregator may block one until another has data.
+class Consumer {
+ public:
+  explicit Consumer(const std::string& name) : kind_(name) {
     element_.reset(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "it"));
     for (GList* item = element_->srcpads; item != nullptr; item = item->next)
       outputs_.push_back(std::make_unique<Output>(GST_PAD(item->data)));
@@ -103,61 +116,67 @@ class EveryConsumer : public testing::TestWithParam<std::string> {
               ? gst_element_request_pad_simple(element_.get(), pad.name.c_str())
               : gst_element_get_static_pad(element_.get(), pad.name.c_str()));
       inputs_.push_back({Owned<GstPad>(gst_pad_new(nullptr, GST_PAD_SRC)), pad.takes_frames()});
-      ASSERT_EQ(gst_pad_link(inputs_.back().pad.get(), sink.get()), GST_PAD_LINK_OK) << pad.name;
+      EXPECT_EQ(gst_pad_link(inputs_.back().pad.get(), sink.get()), GST_PAD_LINK_OK) << pad.name;
     }
     // A sink that a flush sends back to PAUSED may post EOS before its bin plays again, and the bin
     // then forgets it.
     for (GList* child = GST_BIN_CHILDREN(pipeline_.get()); child != nullptr; child = child->next)
       if (GST_IS_BASE_SINK(child->data)) g_object_set(child->data, "async", FALSE, nullptr);
     gst_element_set_state(pipeline_.get(), GST_STATE_PLAYING);
-    for (const auto& input : inputs_) {
-      gst_pad_set_active(input.pad.get(), TRUE);
+    for (const auto& input : inputs_) gst_pad_set_active(input.pad.get(), TRUE);
+    steps_.emplace_back([](const Input& input) {
       gst_pad_push_event(input.pad.get(), gst_event_new_stream_start("stream"));
       const Owned<GstCaps> caps(gst_caps_from_string(input.takes_frames ? frame_caps : event_caps));
       gst_pad_push_event(input.pad.get(), gst_event_new_caps(caps.get()));
-    }
+    });
   }
-  void TearDown() override { gst_element_set_state(pipeline_.get(), GST_STATE_NULL); }
+  ~Consumer() { gst_element_set_state(pipeline_.get(), GST_STATE_NULL); }
+  Consumer(const Consumer&) = delete;
+  Consumer& operator=(const Consumer&) = delete;
+
+  std::size_t inputs() const { return inputs_.size(); }
+  const std::vector<std::unique_ptr<Output>>& outputs() const { return outputs_; }
 
   /// Pushes an event from make() into each input.
   template <class Make>
   void push(const Make& make) {
-    for (const auto& input : inputs_) gst_pad_push_event(input.pad.get(), make());
+    steps_.emplace_back(
+        [make](const Input& input) { gst_pad_push_event(input.pad.get(), make()); });
   }
   void push_segment(GstClockTime base = 0, GstSegmentFlags flags = GST_SEGMENT_FLAG_NONE) {
     GstSegment segment;
     gst_segment_init(&segment, GST_FORMAT_TIME);
     segment.base = base;
     segment.flags = flags;
-    push([&] { return gst_event_new_segment(&segment); });
-  }
-  static GstBuffer* frame(guint index) {
-    constexpr gsize size = gsize{64} * 48;
-    GstBuffer* const buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
-    gst_buffer_memset(buffer, 0, index % 2 == 1 ? 0xff : 0, size);
-    return buffer;
-  }
-  /// Events of neighbouring pixels, so that a denoiser keeps the last one.
-  static GstBuffer* neighbours() {
-    constexpr GstEventCameraEvent events[] = {{0, 4, 4}, {1, 5, 4}, {2, 4, 5}};
-    return gst_buffer_new_memdup(events, sizeof events);
+    push([segment] { return gst_event_new_segment(&segment); });
   }
   /// Pushes an interval of 10 ms into each input: a frame, or three events.
   void push_interval(guint index, bool discontinuous = false) {
-    for (const auto& input : inputs_) {
-      GstBuffer* const buffer = input.takes_frames ? frame(index) : neighbours();
+    steps_.emplace_back([=](const Input& input) {
+      GstBuffer* const buffer = input.takes_frames ? frame(index) : neighbours(index);
       GST_BUFFER_PTS(buffer) = index * 10 * GST_MSECOND;
       GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;
       if (discontinuous) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
       gst_pad_push(input.pad.get(), buffer);
+    });
+  }
+  void play() {
+    {
+      std::vector<std::jthread> threads;
+      for (const auto& input : inputs_)
+        threads.emplace_back([this, &input] {
+          for (const auto& step : steps_) step(input);
+        });
     }
+    steps_.clear();
   }
   /// Ends all inputs, and waits for the end of the output.
   void end() {
     push(gst_event_new_eos);
+    play();
     const auto message = wait_for(pipeline_.get(), GST_MESSAGE_EOS | GST_MESSAGE_ERROR);
     ASSERT_TRUE(message);
-    EXPECT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_EOS);
+    EXPECT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_EOS) << text_of(message.get());
     for (const auto& output : outputs_) EXPECT_EQ(output->named("eos").size(), 1U);
   }
   /// Expects every buffer and GAP to follow a SEGMENT, also after a flush.
@@ -169,28 +188,47 @@ class EveryConsumer : public testing::TestWithParam<std::string> {
         }
   }
 
+ private:
   struct Input {
     Owned<GstPad> pad;
     bool takes_frames;
   };
 
-  const Kind kind_{GetParam()};
+  static GstBuffer* frame(guint index) {
+    constexpr gsize size = gsize{64} * 48;
+    GstBuffer* const buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
+    gst_buffer_memset(buffer, 0, index % 2 == 1 ? 0xff : 0, size);
+    return buffer;
+  }
+  /// Events of neighbouring pixels, so that a denoiser keeps the last one.
+  static GstBuffer* neighbours(guint index) {
+    const auto x = static_cast<guint16>(4 + 4 * (index % 8));
+    const auto right = static_cast<guint16>(x + 1);
+    const GstEventCameraEvent events[] = {{0, x, 4}, {1, right, 4}, {2, x, 5}};
+    return gst_buffer_new_memdup(events, sizeof events);
+  }
+
+  const Kind kind_;
   const Owned<GstElement> pipeline_ = launched(kind_.launch());
   Owned<GstElement> element_;
   std::vector<std::unique_ptr<Output>> outputs_;
   std::vector<Input> inputs_;
+  std::vector<std::function<void(const Input&)>> steps_;
 };
+
+class EveryConsumer : public testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(, EveryConsumer, testing::ValuesIn(seekable_consumers()),
                          element_lines::test_name);
 
 /// Segments without output, as of seeks with GST_SEEK_FLAG_SEGMENT.
 TEST_P(EveryConsumer, EndsEachSegmentOnceAfterItsStart) {
+  Consumer it(GetParam());
   for (const GstClockTime base : {0 * GST_SECOND, 1 * GST_SECOND}) {
-    push_segment(base, GST_SEGMENT_FLAG_SEGMENT);
-    push([] { return gst_event_new_segment_done(GST_FORMAT_TIME, 0); });
+    it.push_segment(base, GST_SEGMENT_FLAG_SEGMENT);
+    it.push([] { return gst_event_new_segment_done(GST_FORMAT_TIME, 0); });
   }
-  end();
-  for (const auto& output : outputs_) {
+  it.end();
+  for (const auto& output : it.outputs()) {
     std::vector<GstClockTime> bases;
     for (const auto& done : output->named("segment-done")) bases.push_back(done.base);
     // A segment in bytes has the base 0.
@@ -201,43 +239,59 @@ TEST_P(EveryConsumer, EndsEachSegmentOnceAfterItsStart) {
 }
 
 TEST_P(EveryConsumer, EndsWithoutData) {
-  push_segment();
-  end();
+  Consumer it(GetParam());
+  it.push_segment();
+  it.end();
 }
 
 TEST_P(EveryConsumer, EndsAfterGaps) {
-  push_segment();
+  Consumer it(GetParam());
+  it.push_segment();
   for (guint i = 0; i < 3; ++i)
-    push([i] { return gst_event_new_gap(i * 10 * GST_MSECOND, 10 * GST_MSECOND); });
-  end();
-  expect_segments();
+    it.push([i] { return gst_event_new_gap(i * 10 * GST_MSECOND, 10 * GST_MSECOND); });
+  it.end();
+  it.expect_segments();
 }
 
 TEST_P(EveryConsumer, ForwardsCustomEvents) {
-  if (inputs_.size() > 1) GTEST_SKIP() << one_thread;
-  push_segment();
-  for (guint i = 0; i < 3; ++i) push_interval(i);
-  push([] {
+  Consumer it(GetParam());
+  it.push_segment();
+  for (guint i = 0; i < 3; ++i) it.push_interval(i);
+  it.push([] {
     return gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("custom"));
   });
-  end();
-  for (const auto& output : outputs_) EXPECT_GE(output->named("custom").size(), 1U);
+  it.end();
+  for (const auto& output : it.outputs()) EXPECT_GE(output->named("custom").size(), 1U);
 }
 
+/// The output after a flush is that of an element which receives nothing before.
 TEST_P(EveryConsumer, StartsOverAfterAFlush) {
-  if (inputs_.size() > 1) GTEST_SKIP() << one_thread;
-  push_segment();
-  for (guint i = 0; i < 3; ++i) push_interval(i);
-  push(gst_event_new_flush_start);
-  push([] { return gst_event_new_flush_stop(TRUE); });
-  push_segment(1 * GST_SECOND);
-  for (guint i = 0; i < 3; ++i) push_interval(i);
-  end();
-  expect_segments();
-  for (const auto& output : outputs_) {
-    const auto buffers = output->named("buffer");
-    ASSERT_FALSE(buffers.empty());
-    EXPECT_TRUE(buffers.back().base == 1 * GST_SECOND || buffers.back().base == 0);
+  Consumer it(GetParam());
+  Consumer fresh(GetParam());
+  it.push_segment();
+  // An input holds one interval while another has none.
+  const guint before = it.inputs() > 1 ? 1 : 3;
+  for (guint i = 0; i < before; ++i) it.push_interval(i);
+  it.play();
+  // A sequence number in common tells aggregators that all inputs are flushed together.
+  const auto seqnum = gst_util_seqnum_next();
+  for (const bool starts : {true, false}) {
+    it.push([=] {
+      GstEvent* const event = starts ? gst_event_new_flush_start() : gst_event_new_flush_stop(TRUE);
+      gst_event_set_seqnum(event, seqnum);
+      return event;
+    });
+    it.play();
+  }
+  for (auto* consumer : {&it, &fresh}) {
+    consumer->push_segment(1 * GST_SECOND);
+    for (guint i = 0; i < 3; ++i) consumer->push_interval(before + i);
+    consumer->end();
+    consumer->expect_segments();
+  }
+  for (std::size_t i = 0; i < it.outputs().size(); ++i) {
+    EXPECT_EQ(it.outputs()[i]->buffers_after_flushes(),
+              fresh.outputs()[i]->buffers_after_flushes());
   }
 }
 
@@ -249,13 +303,13 @@ bool continues_through_discontinuities(const std::string& name) {
 }
 
 TEST_P(EveryConsumer, MarksADiscontinuity) {
-  if (inputs_.size() > 1) GTEST_SKIP() << one_thread;
   if (continues_through_discontinuities(GetParam())) GTEST_SKIP();
-  push_segment();
-  for (guint i = 0; i < 3; ++i) push_interval(i);
-  for (guint i = 10; i < 13; ++i) push_interval(i, i == 10);
-  end();
-  for (const auto& output : outputs_)
+  Consumer it(GetParam());
+  it.push_segment();
+  for (guint i = 0; i < 3; ++i) it.push_interval(i);
+  for (guint i = 10; i < 13; ++i) it.push_interval(i, i == 10);
+  it.end();
+  for (const auto& output : it.outputs())
     EXPECT_TRUE(std::ranges::any_of(output->named("buffer"), [](const Output::Item& item) {
       return GST_CLOCK_TIME_IS_VALID(item.discontinuity) && item.discontinuity >= 90 * GST_MSECOND;
     }));

@@ -385,6 +385,26 @@ TEST(EvtParse, SaysAtTheEndThatNothingWereWords) {
   EXPECT_NE(parse.warning().find("not valid in this format"), std::string::npos);
 }
 
+TEST(EvtParse, SaysAtTheEndThatThereWereNoEvents) {
+  // Padding of Lucid's cameras, and too few zeros to be most of a camera's data.
+  for (const guint8 byte : {0x99, 0x00}) {
+    Harness parse("evtparse format=EVT3" + std::string(size));
+    gst_harness_set_src_caps_str(parse.get(), "application/octet-stream");
+    const std::vector<guint8> bytes(4096, byte);
+    parse.push(gst_buffer_new_memdup(bytes.data(), bytes.size()));
+    EXPECT_EQ(parse.warning(), "");
+    gst_harness_push_event(parse.get(), gst_event_new_eos());
+    EXPECT_NE(parse.warning().find("No events were found"), std::string::npos);
+    EXPECT_EQ(parse.warning(), "");
+  }
+  Harness parse("evtparse format=EVT3" + std::string(size));
+  gst_harness_set_src_caps_str(parse.get(), "application/octet-stream");
+  const auto words = words_of(some_events(100), EvtFormat::evt3);
+  parse.push(gst_buffer_new_memdup(words.data(), words.size()));
+  gst_harness_push_event(parse.get(), gst_event_new_eos());
+  EXPECT_EQ(parse.warning(), "");
+}
+
 TEST(EvtParse, KeepsTriggers) {
   const auto sent = some_events(2'000);
   const std::vector<Trigger> triggers{{sent[500].t, 2, true}, {sent[1500].t + 3, 2, false}};

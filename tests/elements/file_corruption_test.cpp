@@ -74,24 +74,6 @@ TEST(EventNpzDec, SaysWhenAnArchiveIsTruncated) {
   }
 }
 
-TEST_P(EveryFormat, SurvivesNoise) {
-  const auto file = file_of(format(), some_events());
-  for (unsigned seed = 0; seed < 20; ++seed) {
-    auto noisy = file;
-    g_random_set_seed(seed);
-    for (int i = 0; i < 200; ++i)
-      noisy[static_cast<std::size_t>(g_random_int_range(200, static_cast<gint>(noisy.size())))] ^=
-          static_cast<char>(1 << g_random_int_range(0, 8));
-    Reader h(format());
-    h.read(noisy, 3000);
-    for (const auto& event : pull_events(h)) {
-      if (!format().tells_size) break;
-      ASSERT_LT(event.x, width);
-      ASSERT_LT(event.y(), height);
-    }
-  }
-}
-
 /// Text and cause of the error that ends a file.
 std::string error_of(std::string_view file, const std::string& reader, const std::string& caps) {
   Reader h(reader, caps);

@@ -3,7 +3,6 @@
 #include <gst/base/gsttypefindhelper.h>
 
 #include <stdexcept>
-#include <tuple>
 
 #include "tests/elements/event_files.hpp"
 
@@ -29,20 +28,6 @@ TEST_P(EveryFormat, IsReadAsItWasWrittenHoweverItIsSplit) {
     EXPECT_EQ(h.warning() + h.error(), "");
     EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
   }
-}
-
-TEST_P(EveryFormat, KeepsEveryEventOfATimeInTheFilesOrder) {
-  // Events of the same microsecond, with repeated pixels, against raster order.
-  Events events;
-  for (const Microseconds t : {5'000, 5'001, 25'000})
-    for (const auto& [x, y, polarity] :
-         {std::tuple(9, 9, Polarity::on), std::tuple(1, 2, Polarity::off),
-          std::tuple(1, 2, Polarity::on), std::tuple(1, 2, Polarity::on),
-          std::tuple(2, 2, Polarity::on), std::tuple(0, 0, Polarity::off)})
-      events.push_back(AbsoluteEvent::at(x, y, t, polarity));
-  Reader h(format());
-  h.read(file_of(format(), events));
-  EXPECT_EQ(pull_events(h), events);
 }
 
 TEST_P(EveryFormat, BeginsAtTheFirstEventAndTellsSilence) {

@@ -141,18 +141,4 @@ TEST_P(EveryFormat, KeepsItsPlaceWhenTheRateChanges) {
   }
 }
 
-TEST_P(EveryFormat, HoldsWhatComesAfterASeekAlone) {
-  const auto events = some_events();
-  const TemporaryFile in(file_of(format(), events));
-  const TemporaryFile out;
-  Player player(in.source() + format().reader + " ! tee name=t  t. ! queue ! " + format().writer +
-                out.sink() + "  t. ! queue");
-  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-  ASSERT_TRUE(player.seek(3 * GST_SECOND));
-  ASSERT_TRUE(player.play()) << player.error;
-  const auto bytes = out.bytes();
-  EXPECT_EQ(events_in(format(), std::string(bytes.begin(), bytes.end())),
-            between(events, 3 * GST_SECOND));
-}
-
 }  // namespace

@@ -388,16 +388,6 @@ TEST_F(OverlayHalf, MixesAndRemembers) {
   EXPECT_EQ(drawn(), (Places{{2, 50}}));
 }
 
-TEST_F(OverlayTest, BeginsAnewAfterAFlush) {
-  begin("width=8, height=4");
-  push_events(0, {Event::at(1, 0, 5, Polarity::on)}, 20 * ms);
-  flush({video.get(), events.get()});
-  for (auto* h : {video.get(), events.get()}) push_segment(h);
-  push_frame(0);
-  push_events(0, {Event::at(2, 0, 5, Polarity::on)});
-  EXPECT_EQ(drawn(), (Places{{2, 255}}));
-}
-
 TEST_F(OverlayTest, DrawsAllEventsAfterAFlushOfTheseAlone) {
   begin("width=8, height=4");
   push_frame(0);

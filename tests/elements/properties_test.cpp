@@ -276,8 +276,8 @@ TEST(Dvs, NamesItsPresetsAndTheirsAreInRange) {
 TEST(Dvs, CountsTimeInNanoseconds) {
   gst_init(nullptr, nullptr);
   Owned<GstElement> element(gst_element_factory_make("eventsim-dvs", nullptr));
-  for (const char* name :
-       {"refractory-period", "exposure-lead", "pixel-latency", "pixel-latency-jitter"}) {
+  for (const char* name : {"refractory-period", "exposure-time", "exposure-lead", "pixel-latency",
+                           "pixel-latency-jitter"}) {
     GParamSpec* spec = g_object_class_find_property(G_OBJECT_GET_CLASS(element.get()), name);
     ASSERT_TRUE(G_IS_PARAM_SPEC_UINT64(spec)) << name;
     EXPECT_EQ(G_PARAM_SPEC_UINT64(spec)->maximum, GST_SECOND) << name;
@@ -343,8 +343,8 @@ TEST(Dvs, ChangesOverTimeButItsSensorStaysTheSame) {
         << trait;
   for (const char* property :
        {"denoise", "cutoff-frequency", "dark-light", "negative-threshold", "threshold-jitter",
-        "leak-rate", "shot-noise-rate", "exposure-pulse", "exposure-lead", "pixel-latency",
-        "pixel-latency-jitter", "max-rate"})
+        "leak-rate", "shot-noise-rate", "exposure-pulse", "exposure-time", "exposure-lead",
+        "pixel-latency", "pixel-latency-jitter", "max-rate"})
     EXPECT_TRUE(g_object_class_find_property(G_OBJECT_GET_CLASS(h.element()), property)->flags &
                 GST_PARAM_CONTROLLABLE)
         << property;

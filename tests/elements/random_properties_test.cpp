@@ -76,6 +76,8 @@ void randomize(GParamSpec* spec, Random& random, GValue* value) {
     case G_TYPE_STRING:
       if (spec->name == std::string_view("column-order"))
         g_value_set_static_string(value, random() % 2 == 0 ? "" : "txyp");
+      else if (spec->name == std::string_view("events-path"))
+        g_value_set_static_string(value, random() % 2 == 0 ? "" : "events");
       else if (spec->name == std::string_view("topics"))
         g_value_set_static_string(value,
                                   random() % 2 == 0 ? "" : "/event_camera/events,/dvs/events");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Recordings of every format that an element reads: pulled, pushed, played again, and seeks.
 #include "tests/elements/recording_files.hpp"
+#include "tests/formats/compressed.hpp"
 
 namespace {
 
@@ -43,6 +44,48 @@ TEST_P(EveryRecording, IsReadPulledAndPushedAndAgain) {
       EXPECT_TRUE(player.warnings.empty());
       ASSERT_TRUE(player.reaches(stop));
     }
+  }
+}
+
+TEST_P(EveryRecording, IsReadAndSoughtInWhereItIsCompressed) {
+  std::ifstream file(GetParam().path(), std::ios::binary);
+  const Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  for (const auto compress : {eventcamera::compressed::gzip, eventcamera::compressed::zstd}) {
+    const TemporaryFile compressed(compress(bytes));
+    for (const std::string way : {"", "queue ! ", "identity ! "}) {
+      SCOPED_TRACE(way);
+      Player player(compressed.source() + way +
+                    "decodebin caps=\"application/x-event-camera,format=XYTP\" "
+                    "expose-all-streams=false");
+      ASSERT_TRUE(player.play()) << player.error;
+      ASSERT_FALSE(player.events.empty());
+      const auto first = player.events.front().t;
+      EXPECT_TRUE(since(first, player.events) == between(0, length));
+      constexpr Microseconds start = 3'700'000;
+      ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+      ASSERT_TRUE(player.seek(start * GST_USECOND, length * GST_USECOND, GST_SEEK_FLAG_ACCURATE));
+      ASSERT_TRUE(player.play()) << player.error;
+      EXPECT_TRUE(since(first, player.events) == between(start, length)) << player.events.size();
+      EXPECT_TRUE(player.warnings.empty());
+    }
+  }
+}
+
+TEST(CompressedRecordings, AreReadUpToWhereTheyAreCut) {
+  std::ifstream file(Folder::path("a.csv"), std::ios::binary);
+  const Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  auto cut = eventcamera::compressed::gzip(bytes);
+  cut.resize(cut.size() / 2);
+  const TemporaryFile compressed(cut);
+  for (const std::string way : {"", "queue ! "}) {
+    Player player(compressed.source() + way + "eventcsvdec");
+    ASSERT_TRUE(player.play()) << player.error;
+    EXPECT_GT(player.events.size(), 10'000U);
+    ASSERT_EQ(player.warnings.size(), 1U);
+    EXPECT_NE(
+        player.warnings.front().find("corrupt or cut short at byte " + std::to_string(cut.size())),
+        std::string::npos)
+        << player.warnings.front();
   }
 }
 

@@ -259,15 +259,6 @@ TEST_F(Render, TakesBuffersWithoutDuration) {
                     {40 * ms, 20 * ms, accumulated(column(2))}});
 }
 
-TEST_F(Render, BeginsAnewAfterAFlush) {
-  begin(grey_at("10/1"));
-  push(0, column(1));
-  flush({h.get()});
-  segment(5 * GST_SECOND);
-  push(5 * GST_SECOND, column(2), 100 * ms);
-  expect(finish(), {{5 * GST_SECOND, 100 * ms, accumulated(column(2))}});
-}
-
 TEST_F(Render, IsDiscontinuousAfterTwoFlushes) {
   begin(grey_at("25/1"));
   push(0, column(1));

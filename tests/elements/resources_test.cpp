@@ -123,7 +123,7 @@ INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(element_names()),
                          element_lines::test_name);
 
 TEST_P(EveryElement, ReleasesEverythingOnStop) {
-  const int starts = repetitions(60, 500);
+  const int starts = repetitions(30, 500);
   const std::string line = Kind(GetParam()).launch_with_sources(1'000'000);
   Resources after_some;
   for (int i = 0; i < starts; ++i) {

@@ -189,38 +189,6 @@ TEST(Aedat2, ATimeFarFromItsNeighboursMovesNoOther) {
   EXPECT_EQ(decoder.corruption().outside, 1U);
 }
 
-TEST(Aedat2, RandomCorruptionEndsAndIsTheSameForAnySplit) {
-  std::mt19937 random(5);
-  const auto events = random_events::make(davis346, 1000, 6, 0, {hour});
-  const auto sound = aedat_files::aedat2_davis(events, davis346, "Davis346");
-  for (int round = 0; round < 300; ++round) {
-    auto bytes = sound;
-    for (unsigned i = 0; i < 1 + random() % 20; ++i)
-      bytes[random() % bytes.size()] = static_cast<std::uint8_t>(random());
-    bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(random() % bytes.size()));
-    Decoded whole;
-    Decoded split;
-    Aedat2Decoder a;
-    Aedat2Decoder b;
-    bool refused = false;
-    try {
-      whole = decoded(a, bytes);
-    } catch (const UnsupportedFormat&) {
-      refused = true;
-    }
-    try {
-      split = decoded(b, bytes, 0);
-      ASSERT_FALSE(refused);
-    } catch (const UnsupportedFormat&) {
-      ASSERT_TRUE(refused);
-    }
-    if (refused) continue;
-    ASSERT_TRUE(whole.events == split.events);
-    ASSERT_EQ(a.corruption().places, b.corruption().places);
-    ASSERT_EQ(a.corruption().first_at, b.corruption().first_at);
-  }
-}
-
 TEST(Aedat2, ARecordingWithALongHeader) {
   const auto bytes = shared_data::events_file("aedat2-dvs128-header.aedat");
   if (bytes.empty()) GTEST_SKIP() << "no aedat2-dvs128-header.aedat in $SHARED_DATA";

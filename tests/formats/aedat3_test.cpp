@@ -133,23 +133,4 @@ TEST(Aedat3, EventsOutsideAreDroppedAlone) {
   }
 }
 
-TEST(Aedat3, RandomCorruptionEndsAndIsTheSameForAnySplit) {
-  std::mt19937 random(5);
-  const auto events = random_events::make(davis346, 1000, 6, 0, {hour});
-  const auto sound = aedat_files::aedat3(events, "DAVIS346", 50);
-  const auto header = aedat_files::aedat3_header("DAVIS346").size();
-  for (int round = 0; round < 300; ++round) {
-    auto bytes = sound;
-    for (unsigned i = 0; i < 1 + random() % 20; ++i)
-      bytes[header + random() % (bytes.size() - header)] = static_cast<std::uint8_t>(random());
-    bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(header + random() % 1000));
-    Aedat3Decoder whole;
-    Aedat3Decoder split;
-    const auto expected = decoded(whole, bytes);
-    ASSERT_TRUE(expected.events == decoded(split, bytes, 0).events);
-    ASSERT_EQ(whole.corruption().places, split.corruption().places);
-    ASSERT_EQ(whole.corruption().first_at, split.corruption().first_at);
-  }
-}
-
 }  // namespace

@@ -150,7 +150,7 @@ TEST_F(Bags, HaveTheirEventsAndFrames) {
       for (const auto& stream : decoder->streams())
         EXPECT_EQ(stream.size, stream.kind == StreamKind::events ? (SensorSize{346, 260})
                                                                  : (SensorSize{86, 65}));
-      EXPECT_EQ(decoder->unread_topics(), "topics /second/events");
+      EXPECT_EQ(decoder->unread_streams().names, "topics /second/events");
     }
   }
 }
@@ -611,7 +611,7 @@ TEST(FrameDecompressor, LimitsWhatFewBytesBecome) {
     limit.count(content);
     total += content;
   }
-  EXPECT_LT(total, std::uint64_t{1} << 31);
+  EXPECT_LT(total, std::uint64_t{500'000'000});
   EXPECT_EQ(limit.of(1000, 1'000'000), 1'000'000U);
 }
 

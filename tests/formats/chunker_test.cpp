@@ -137,6 +137,24 @@ TEST(Chunker, DropsWhatComesTooLate) {
   EXPECT_EQ(joined(cuts).size(), events.size() - 1);
 }
 
+TEST(Chunker, DropsTheSameEventsHoweverTheyAreDivided) {
+  std::mt19937_64 random(5);
+  auto events = recordings::random_events(random, {640, 480}, 2'000, 30'000);
+  std::shuffle(events.begin() + 1'000, events.end(), random);
+  Chunker whole(length);
+  const auto expected = joined(slice(whole, events, events.size()));
+  ASSERT_TRUE(whole.disorder());
+  EXPECT_GT(whole.disorder()->row, 1'000U);
+  EXPECT_LT(whole.disorder()->row, 1'100U);
+  for (const std::size_t piece : {1UL, 7UL, 300UL}) {
+    Chunker chunker(length);
+    EXPECT_EQ(joined(slice(chunker, events, piece)), expected);
+    EXPECT_EQ(chunker.dropped().late, whole.dropped().late);
+    EXPECT_EQ(chunker.disorder()->row, whole.disorder()->row);
+    EXPECT_EQ(chunker.disorder()->rows, whole.disorder()->rows);
+  }
+}
+
 TEST(Chunker, IgnoresAClockThatJumpsAheadAndComesBack) {
   std::vector<AbsoluteEvent> events;
   for (Microseconds t = 0; t < 100'000; t += 100) {

@@ -493,16 +493,6 @@ TEST(Csv, EveryFormatComesBack) {
   }
 }
 
-TEST(Csv, NoEventsComeBack) {
-  for (const auto& [name, description, format] : csv_formats()) {
-    CsvEncoder encoder(format, {640, 480});
-    CsvDecoder decoder;
-    const auto bytes = encoded(encoder, {});
-    EXPECT_EQ(bytes.empty(), format.header == CsvFormat::Header::none) << name;
-    EXPECT_TRUE(decoded(decoder, bytes).empty()) << name;
-  }
-}
-
 TEST(Csv, TimesBelowZeroComeBack) {
   const Events events = {on(1, 1, -3'000'001), on(1, 1, -1), on(1, 1, 0), on(1, 1, 1)};
   for (const auto& [name, description, format] : csv_formats()) {

@@ -9,8 +9,10 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <system_error>
 #include <thread>
 
+#include "src/core/byte_order.hpp"
 #include "src/formats/byte_source.hpp"
 #include "src/formats/hdf5/hdf5_filters.hpp"
 #include "src/formats/hdf5/hdf5_reader.hpp"
@@ -141,17 +143,6 @@ TEST_F(Hdf5, LabelsAreDatasets) {
     if (settings.format != Hdf5Format::dsec) continue;
     EXPECT_TRUE(numbers_in(path(), "events/cause") == causes);
     EXPECT_TRUE(numbers_in(path(), "events/class") == classes);
-  }
-}
-
-TEST_F(Hdf5, NoEventsComeBack) {
-  for (const auto& settings : all_settings({640, 480})) {
-    Hdf5Reader reader(in_memory(contents(write({}, settings))));
-    EXPECT_FALSE(reader.time_range());
-    EXPECT_TRUE(read_all(reader).empty());
-    reader.seek(5);
-    EXPECT_TRUE(read_all(reader).empty());
-    EXPECT_EQ(reader.corruption().places, 0U);
   }
 }
 
@@ -386,14 +377,43 @@ TEST_F(Hdf5, WhatWasCommittedSurvivesTheProcess) {
   }
 }
 
+/// A crash or a full disk costs a fifth of the events, or two chunks.
+std::size_t min_kept(std::size_t events) {
+  return events - std::min(events, std::max<std::size_t>(events / 5, 2 * 16384));
+}
+
 /// Events that come faster than the time between commits.
 TEST_F(Hdf5, MostEventsSurviveTheProcess) {
   for (auto settings : all_settings({640, 480})) {
     settings.commit_interval = std::chrono::hours(1);
-    const auto events = random_events(500'000, settings.size, 21, 1'000'000);
-    const auto left = left_by_a_killed_process(path(), settings, events, 0);
-    EXPECT_GE(left.size(), events.size() * 3 / 4);
-    EXPECT_TRUE(std::ranges::equal(left, std::span(events).first(left.size())));
+    for (const std::size_t count : {60'000, 500'000}) {
+      const auto events = random_events(count, settings.size, 21, 1'000'000);
+      const auto left = left_by_a_killed_process(path(), settings, events, 0);
+      EXPECT_GE(left.size(), min_kept(count));
+      EXPECT_TRUE(std::ranges::equal(left, std::span(events).first(left.size())));
+    }
+  }
+}
+
+TEST_F(Hdf5, MostEventsSurviveAFullDisk) {
+  const auto events = random_events(400'000, {640, 480}, 21, 1'000'000);
+  for (auto settings : all_settings({640, 480})) {
+    settings.commit_interval = std::chrono::hours(1);
+    for (const rlim_t most : {300'000, 1'000'000}) {
+      std::size_t written = 0;
+      {
+        const FileSizeLimit limit(most);
+        Hdf5Writer writer(path(), settings);
+        EXPECT_THROW(for (; written < events.size(); written += 1000)
+                         writer.append(std::span(events).subspan(written, 1000)),
+                     std::system_error);
+      }
+      Hdf5Reader reader(in_memory(contents(path())));
+      const auto left = read_all(reader);
+      EXPECT_EQ(reader.corruption().places, 0U);
+      EXPECT_GE(left.size(), min_kept(written));
+      EXPECT_TRUE(std::ranges::equal(left, std::span(events).first(left.size())));
+    }
   }
 }
 
@@ -424,6 +444,48 @@ TEST_F(Hdf5, WhatIsCompressedTwiceIsRefused) {
     EXPECT_NE(std::string(error.what()).find("compressed more than once"), std::string::npos)
         << error.what();
   }
+}
+
+TEST_F(Hdf5, ChunksThatShareAnAddressAreRefused) {
+  fuzz::SmallHdf5 file("shared");
+  file.group("events");
+  constexpr hsize_t rows = 1 << 16;
+  constexpr hsize_t chunks = 30;
+  const std::vector<std::uint8_t> zeros(rows * chunks);
+  for (const auto* const name : {"events/p", "events/x", "events/y"})
+    file.dataset(name, H5T_NATIVE_UINT8, {rows * chunks}, zeros.data());
+  const Bytes large(400'000);
+  const Bytes small(1);
+  std::vector<std::span<const std::uint8_t>> stored(chunks, small);
+  stored[0] = large;
+  file.stored_dataset("events/t", H5T_NATIVE_UINT64, {rows * chunks}, rows, {H5Z_FILTER_DEFLATE},
+                      stored);
+  const auto refusal = [](const Bytes& bytes) -> std::string {
+    try {
+      Hdf5Reader reader(in_memory(bytes));
+    } catch (const UnsupportedFormat& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  auto bytes = file.bytes();
+  EXPECT_EQ(refusal(bytes), "none");
+  // Nodes of chunk indexes: a header of 24 bytes with the number of chunks, then for each chunk its
+  // size, filter mask and two offsets, and its address.
+  constexpr std::string_view node = "TREE\1";
+  constexpr std::size_t entry = 32;
+  for (auto at = bytes.begin();; ++at) {
+    at = std::search(at, bytes.end(), node.begin(), node.end());
+    if (at == bytes.end()) break;
+    auto* const first = &*at + 24;
+    if (little_endian<std::uint32_t>(first) != large.size()) continue;
+    for (std::size_t i = 1; i < at[6]; ++i) {
+      std::copy_n(first, 4, first + i * entry);
+      std::copy_n(first + 24, 8, first + i * entry + 24);
+    }
+  }
+  const auto refused = refusal(bytes);
+  EXPECT_NE(refused.find("has chunks that overlap"), std::string::npos) << refused;
 }
 
 TEST_F(Hdf5, CommitsDoNotChangeTheFile) {
@@ -579,6 +641,58 @@ TEST_F(Hdf5, ColumnsAreFoundByTheirNames) {
   for (auto& t : nanoseconds.t) t = t * 1000 + 7;
   nanoseconds.add(file, {"t_ns", "x", "y", "p"});
   Hdf5Reader reader(in_memory(file.bytes()));
+  EXPECT_EQ(read_all(reader), four.events);
+}
+
+TEST_F(Hdf5, APathSelectsACamera) {
+  const FourEvents left;
+  auto right = left;
+  for (auto& t : right.t) t += 5;
+  fuzz::SmallHdf5 file("cameras");
+  for (const auto* const group : {"left", "right", "other"}) file.group(group);
+  left.add(file, {"left/t", "left/x", "left/y", "left/p"});
+  right.add(file, {"right/t", "right/x", "right/y", "right/p"});
+  const std::vector<std::int64_t> rows = {1, 10, 20, 1, 2, 11, 21, 0};
+  file.dataset("other/events", H5T_NATIVE_INT64, {2, 4}, rows.data());
+  file.dataset("other/event_numbers", H5T_NATIVE_INT64, {4}, left.t.data());
+  const auto times = [&](const std::string& path) {
+    Hdf5Reader reader(in_memory(file.bytes()), {.path = path});
+    EXPECT_EQ(reader.others(), path.empty() ? "/other/events, /right" : "");
+    const auto range = reader.time_range();
+    return range ? range->last : -1;
+  };
+  EXPECT_EQ(times(""), left.t.back());
+  EXPECT_EQ(times("left"), left.t.back());
+  EXPECT_EQ(times("/right/"), right.t.back());
+  EXPECT_EQ(times("other"), 2);
+  EXPECT_EQ(times("other/events"), 2);
+  try {
+    times("middle");
+    ADD_FAILURE() << "it was read";
+  } catch (const UnsupportedFormat& error) {
+    EXPECT_STREQ(error.what(),
+                 "the HDF5 file has no events at events-path /middle; it has some at /left, "
+                 "/other/events, /right");
+  }
+}
+
+TEST_F(Hdf5, UnitAndColumnsMayBeSet) {
+  const FourEvents four;
+  auto nanoseconds = four;
+  for (auto& t : nanoseconds.t) t = t * 1000 + 7;
+  const TableSettings settings{.columns = *columns_of("pyxt"), .unit = TimeUnit::nanoseconds};
+  fuzz::SmallHdf5 file("nanoseconds");
+  nanoseconds.add(file, {"t", "x", "y", "p"});
+  Hdf5Reader columns(in_memory(file.bytes()), {.table = settings});
+  EXPECT_EQ(read_all(columns), four.events);
+  std::vector<double> rows;
+  for (std::size_t i = 0; i < 4; ++i)
+    for (const auto* const column :
+         {&nanoseconds.p, &nanoseconds.y, &nanoseconds.x, &nanoseconds.t})
+      rows.push_back(static_cast<double>((*column)[i]));
+  fuzz::SmallHdf5 other("rows");
+  other.dataset("events", H5T_NATIVE_DOUBLE, {4, 4}, rows.data());
+  Hdf5Reader reader(in_memory(other.bytes()), {.table = settings});
   EXPECT_EQ(read_all(reader), four.events);
 }
 

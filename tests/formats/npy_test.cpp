@@ -55,14 +55,6 @@ TEST(Npy, ComesBack) {
   expect_same_however_cut([] { return std::make_unique<NpyDecoder>(); }, patched(encoder, bytes));
 }
 
-TEST(Npy, NoEventsComeBack) {
-  NpyEncoder encoder;
-  const auto bytes = patched(encoder, encoded(encoder, {}));
-  NpyDecoder decoder;
-  EXPECT_TRUE(decoded(decoder, bytes).empty());
-  EXPECT_EQ(decoder.corruption().places, 0U);
-}
-
 TEST(Npy, FieldsOfAnyKindInAnyOrder) {
   auto bytes = with_header(
       "{'descr': [('p', '|i1'), ('', '|V3'), ('label', '<U2'), ('time', '>f8'), ('box', '<f4', (2, "

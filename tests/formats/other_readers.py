@@ -317,7 +317,7 @@ class OtherReaders(TableTest):
         self.assertIn('fractional numbers', self.refused())
 
     def test_our_ecf_by_its_description(self):
-        for seed, last in ((10, 20_000_000), (11, 3000), (12, 5 * 3600 * 1_000_000)):
+        for seed, last in ((10, 20_000_000), (11, 3000), (12, 80 * 60 * 1_000_000)):  # of more than 32 bits
             events = random_events(60_000, seed, last)
             self.write('metavision-hdf5', events)
             with h5py.File(self.file) as file:

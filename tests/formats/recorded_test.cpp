@@ -11,7 +11,6 @@
 #include "src/formats/event_decoder.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/recording_reader.hpp"
-#include "tests/formats/evt_validator.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {
@@ -90,29 +89,6 @@ TEST(Recorded, PlaysEveryEventInTheOrderOfTheFile) {
         for (const auto& event : chunk->events)
           played.push_back({reader.origin() + chunk->start + event.t, event.x, event.y_p});
     EXPECT_TRUE(played == events) << name;
-  }
-}
-
-TEST(Recorded, WrittenAgainInEveryFormatIsTheSame) {
-  for (const std::string name : {"evt3-1280x720-triggers.raw", "evt3-640x480-triggers.raw"}) {
-    if (!std::filesystem::exists(path(name))) GTEST_SKIP() << "no " << path(name);
-    const auto decoder = make_prophesee_raw_decoder();
-    auto events = recordings::decode(*decoder, bytes_of(name)).events;
-    // Events from cameras are not strictly sorted by time.
-    std::stable_sort(events.begin(), events.end(),
-                     [](const auto& a, const auto& b) { return a.t < b.t; });
-    for (const auto format : {EvtFormat::evt2, EvtFormat::evt21, EvtFormat::evt21_legacy,
-                              EvtFormat::evt3, EvtFormat::evt4}) {
-      const auto encoder = make_evt_encoder(format, decoder->size());
-      const auto bytes = recordings::encode(*encoder, events);
-      if (format == EvtFormat::evt3) {
-        EXPECT_EQ(evt_validator::evt3(bytes, decoder->size()), "");
-      } else if (format == EvtFormat::evt4) {
-        EXPECT_EQ(evt_validator::evt4(bytes, decoder->size()), "");
-      }
-      EXPECT_EQ(recordings::decode(*make_evt_decoder(format, decoder->size()), bytes).events,
-                events);
-    }
   }
 }
 

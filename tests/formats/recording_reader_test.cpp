@@ -279,25 +279,6 @@ TEST_P(Recording, IsSeekedIn) {
   }
 }
 
-TEST_P(Recording, IsRestartedWhereItIsPushed) {
-  const auto& bytes = GetParam().bytes;
-  RecordingReader reader(GetParam().make_decoder, chunk_length);
-  Outcome all;
-  reader.push(bytes);
-  all.take_all(reader);
-  for (const Microseconds start : {3'700'000, 0}) {
-    const auto seek_point = reader.seek_point_before(start);
-    reader.restart(seek_point, start, std::nullopt);
-    Outcome outcome;
-    outcome.starts = 1;
-    reader.push(std::span(bytes).subspan(seek_point.value_or(SeekPoint{}).position));
-    outcome.take_all(reader);
-    reader.finish();
-    outcome.take_all(reader);
-    EXPECT_EQ(outcome.events(origin()), from(some_events(), origin() + start, 10'000'000));
-  }
-}
-
 /// Events, and a frame every 100 ms; all of one before the first of the other.
 Bytes aedat_of_parts(bool frames_first) {
   Aedat4Encoder encoder({sensor, "a camera", Aedat4Compression::none, true, false});
@@ -768,6 +749,76 @@ TEST(RecordingReader, SaysWhatIsNoRecording) {
   RecordingReader pulled(make, chunk_length);
   pulled.open(empty);
   EXPECT_THROW(pulled.next(), UnsupportedFormat);
+}
+
+/// A table in any order: pulled, it is sorted; pushed, it is refused, however it is divided.
+TEST(RecordingReader, SortsATableOrRefusesIt) {
+  const auto sorted = some_events();
+  auto shuffled = sorted;
+  std::mt19937 random(3);
+  std::ranges::shuffle(shuffled, random);
+  // Few rows are not told apart from a flipped bit by their number, but by their share.
+  const std::vector<Events> tables{shuffled, Events(shuffled.begin(), shuffled.begin() + 10)};
+  for (const auto& events : tables) {
+    NpyEncoder encoder;
+    const auto file = recordings::encode(encoder, events);
+    auto expected = events;
+    std::ranges::stable_sort(expected, {}, &AbsoluteEvent::t);
+    const auto first = expected.front().t;
+    for (const SensorSize size : {SensorSize{}, sensor}) {
+      const auto make = [size] {
+        return std::make_unique<NpyDecoder>(TableSettings{.size = size});
+      };
+      MemoryBytes bytes(file);
+      RecordingReader pulled(make, chunk_length);
+      pulled.open(bytes);
+      Outcome outcome;
+      outcome.take_all(pulled);
+      EXPECT_EQ(outcome.events(first), expected);
+      EXPECT_TRUE(pulled.is_sorted());
+      EXPECT_EQ(pulled.duration(), expected.back().t + 1 - first);
+      EXPECT_EQ(pulled.counts().late + pulled.counts().stray, 0U);
+
+      const Microseconds start = (expected.back().t - first) / 2;
+      Outcome sought;
+      sought.starts = outcome.starts;
+      pulled.seek(start, std::nullopt);
+      sought.take_all(pulled);
+      EXPECT_EQ(sought.events(first), from(expected, first + start, expected.back().t + 1));
+
+      std::vector<std::string> errors;
+      for (const std::size_t piece : {1UL, 1000UL, 1UL << 24}) {
+        RecordingReader pushed(make, chunk_length);
+        Outcome before;
+        try {
+          for (const auto part : pieces::of(file, piece)) {
+            pushed.push(part);
+            before.take_all(pushed);
+          }
+          pushed.finish();
+          before.take_all(pushed);
+        } catch (const UnsupportedFormat& error) {
+          errors.emplace_back(error.what());
+        }
+      }
+      ASSERT_EQ(errors.size(), 3U);
+      EXPECT_NE(errors[0].find("not sorted by time"), std::string::npos) << errors[0];
+      EXPECT_EQ(std::ranges::count(errors, errors[0]), 3);
+    }
+  }
+}
+
+TEST(RecordingReader, DropsAWrongTimeOfALongTable) {
+  auto events = some_events();
+  events[100].t += Microseconds{1} << 30;
+  NpyEncoder encoder;
+  MemoryBytes table(recordings::encode(encoder, events));
+  RecordingReader pulled([] { return std::make_unique<NpyDecoder>(); }, chunk_length);
+  pulled.open(table);
+  Outcome outcome;
+  outcome.take_all(pulled);
+  EXPECT_FALSE(pulled.is_sorted());
+  EXPECT_EQ(pulled.counts().stray, 1U);
 }
 
 /// A source that fails once.

@@ -89,22 +89,6 @@ TEST_P(EveryFormat, ReadsTheSameHoweverTheBytesAreSplit) {
   }
 }
 
-TEST_P(EveryFormat, ReadsTheSameSplitAtAnyByte) {
-  Random random(3);
-  const SensorSize size{64, 64};
-  const auto events = random_events(random, size, 60, 1000);
-  const auto bytes = encoded(size, events);
-  for (std::size_t at = 1; at < bytes.size(); ++at) {
-    const auto decoder = GetParam().make_decoder(size);
-    Decoded decoded;
-    decoder->decode(std::span(bytes).first(at), decoded);
-    decoder->decode({}, decoded);
-    decoder->decode(std::span(bytes).subspan(at), decoded);
-    decoder->finish(decoded);
-    ASSERT_EQ(decoded.events, events) << "split at " << at;
-  }
-}
-
 TEST_P(EveryFormat, WritesWhatReadsTheSameHoweverTheEventsAreSplit) {
   Random random(4);
   for (int i = 0; i < 20; ++i) {

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tests/formats/compressed.hpp"
 #include "tests/formats/formats.hpp"
 #include "tests/formats/recordings.hpp"
 #include "tests/fuzz/aedat_seeds.hpp"
@@ -172,6 +173,13 @@ std::vector<Seed> mask_seeds() {
   return seeds;
 }
 
+/// A file of text, compressed.
+std::vector<Seed> compressed_seeds() {
+  constexpr std::string_view text = "t,x,y,p\n100,10,20,1\n200,11,21,0\n1300,12,22,1\n";
+  const std::vector<std::uint8_t> bytes(text.begin(), text.end());
+  return {{"gzip", compressed::gzip(bytes)}, {"zstd", compressed::zstd(bytes)}};
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -198,6 +206,7 @@ int main(int argc, char** argv) {
   write(corpus / "hdf5_chunk", hdf5_chunk_seeds());
   write(corpus / "hdf5_filters", hdf5_filters_seeds());
   write(corpus / "chunker", chunker_seeds());
+  write(corpus / "compressed", compressed_seeds());
   write(corpus / "datagram", datagram_seeds());
   write(corpus / "filter", filter_seeds());
   write(corpus / "pixel_list", pixel_list_seeds());

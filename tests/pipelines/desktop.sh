@@ -45,6 +45,10 @@ with h5py.File("columns.h5", "w") as file:
     group = file.create_group("events")
     for name in ("t", "x", "y", "p"):
         group.create_dataset(name, data=np.zeros(5, int))
+with h5py.File("e2vid.h5", "w") as file:
+    group = file.create_group("events")
+    for name in ("xs", "ys", "ts", "ps"):
+        group.create_dataset(name, data=np.zeros(5, int))
 with h5py.File("v2e.h5", "w") as file:
     file.create_dataset("events", shape=(0, 4), maxshape=(None, 4), dtype="uint32", compression="gzip")
 PYTHON
@@ -77,6 +81,7 @@ application/x-event-hdf5 ball.h5
 application/x-event-hdf5 ball.hdf5
 application/x-event-hdf5 dsec.h5
 application/x-event-hdf5 columns.h5
+application/x-event-hdf5 e2vid.h5
 application/x-event-hdf5 v2e.h5
 application/x-npy numbers.npy
 application/x-npz numbers.npz

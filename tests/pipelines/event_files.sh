@@ -44,6 +44,9 @@ for ending in "${written[@]}"; do
   cp "ball.$ending" "content of $ending.bin"
   convert "content of $ending.bin" back.csv
   cmp ball.csv back.csv || fail "ball.$ending has other events"
+  gzip -c "ball.$ending" >"compressed $ending.bin"
+  convert "compressed $ending.bin" back.csv
+  cmp ball.csv back.csv || fail "ball.$ending, compressed, has other events"
 done
 cp ball.npy misnamed.dat
 convert misnamed.dat misnamed.csv
@@ -372,7 +375,7 @@ refused "does not apply to .dat" ball.raw ball.dat --format=rpg
 refused "can only be read" ball.raw ball.aedat
 refused "choose one of auto seconds" --time-unit=hours ball.csv other.raw
 refused "must have each of t, x, y and p once" --column-order=xy ball.csv other.raw
-refused "only to reading text or NumPy" --time-unit=seconds ball.raw other.raw
+refused "only to reading text, NumPy or HDF5" --time-unit=seconds ball.raw other.raw
 refused "only to reading files that may lack a sensor size" --width=320 ball.es other.raw
 refused "--height: " --height=tall ball.csv other.raw
 printf '1000 2 3 1\n2000 4 5 0\n3000 6 7 1\n' >unclear.txt

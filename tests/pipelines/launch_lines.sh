@@ -46,7 +46,7 @@ launch filesrc location=events.mp4 ! decodebin ! eventsim-dense flow=dis-hq ! vi
 [ -s events.mp4 ] || fail "no video was written"
 
 # Formats of cameras and decoders, without a converter.
-for format in YUY2 UYVY NV12 I420 GRAY8 P010_10LE GRAY16_BE BGRx RGB xRGB GBR RGB16 ARGB64; do
+for format in NV12 P010_10LE BGRx; do
   launch videotestsrc num-buffers=5 ! video/x-raw,format=$format ! eventsim-frame positive-threshold=15 ! fakesink
 done
 launch videotestsrc num-buffers=5 ! jpegenc ! jpegdec ! eventsim-frame ! fakesink
@@ -80,11 +80,9 @@ done
 launch videotestsrc pattern=ball num-buffers=30 ! eventsim-frame ! eventrender palette=viridis ! videoconvert ! x264enc ! mp4mux ! filesink location=rendered.mp4
 [ -s rendered.mp4 ] || fail "no rendered video was written"
 # As tensors of every kind.
-for representation in voxel-grid histogram time-surface event-frame; do
-  for windows in "" accumulation-time=50000000 "event-count=20000 overlap=0.5" frame-count=3; do
-    # shellcheck disable=SC2086
-    launch videotestsrc is-live=true pattern=ball num-buffers=10 ! eventsim-diff ! eventtensor representation=$representation $windows ! other/tensors,format=static ! fakesink sync=true
-  done
+for tensors in voxel-grid "histogram accumulation-time=50000000" "time-surface event-count=20000 overlap=0.5" "event-frame frame-count=3"; do
+  # shellcheck disable=SC2086
+  launch videotestsrc is-live=true pattern=ball num-buffers=10 ! eventsim-diff ! eventtensor representation=$tensors ! other/tensors,format=static ! fakesink sync=true
 done
 launch videotestsrc is-live=true pattern=ball num-buffers=20 ! eventsim-diff ! eventrender event-count=5000 ! video/x-raw,framerate=50/1 ! fakesink sync=true
 launch videotestsrc is-live=true pattern=black num-buffers=20 ! eventsim-diff ! eventrender ! fakesink sync=true
@@ -118,9 +116,8 @@ grep -q '"map-correlation" : [0-9-]' compare.json || fail "no comparison was wri
 launch filesrc location=candidate.raw ! evtdec ! eventstats location=/dev/null interval=0 ! fakesink
 
 # Filtered, with each filter: fewer events, but not none.
-for filter in eventdenoise "eventdenoise method=baf" "eventdenoise method=time-kernel" "eventdenoise method=dwf" \
-  "eventhotpixel location=hot.txt min-rate=0 learning-period=100000000" "eventratecontrol max-rate=1000" \
-  "eventrefractory refractory-period=10000000" eventtrail "eventtrail mode=stc-cut-trail" "eventtrail mode=stc-keep-trail"; do
+for filter in eventdenoise "eventdenoise method=dwf" eventtrail "eventrefractory refractory-period=10000000" \
+  "eventhotpixel location=hot.txt min-rate=0 learning-period=100000000" "eventratecontrol max-rate=1000"; do
   # shellcheck disable=SC2086
   launch filesrc location=candidate.raw ! evtdec ! $filter ! evtenc ! filesink location=filtered.raw
   size=$(stat -c %s filtered.raw)
@@ -163,7 +160,7 @@ launch filesrc location=interrupted.mp4 ! decodebin ! fakesink
 
 # A client that joins a server late gets the header first.
 port=$((20000 + $$ % 20000))
-for writer in "evtenc format=EVT3" "evtenc format=EVT4" eventdatenc eventesenc "application/x-event-camera ! aedatmux"; do
+for writer in "evtenc format=EVT3" eventdatenc "application/x-event-camera ! aedatmux"; do
   echo "tcpserversink of $writer"
   timeout 60 "$GST_LAUNCH" -q videotestsrc is-live=true pattern=ball ! eventsim-frame ! $writer ! tcpserversink host=127.0.0.1 port=$port &
   serving=$!
@@ -180,7 +177,7 @@ for writer in "evtenc format=EVT3" "evtenc format=EVT4" eventdatenc eventesenc "
 done
 
 # What cameras send: buffers of V4L2, a serial line, and a socket that a client joins late.
-for words in EVT2 EVT21 EVT3 EVT4; do
+for words in EVT21 EVT3; do
   launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! evtenc ! application/x-event-camera,format=$words ! filesink location=line.$words
   launch filesrc location=line.$words blocksize=1000 ! evtparse format=$words width=320 height=240 ! evtdec ! eventcsvenc ! filesink location=line.csv
   launch filesrc location=line.$words ! application/x-event-camera,format=$words,width=320,height=240 ! evtdec ! eventcsvenc ! filesink location=words.csv
@@ -201,7 +198,7 @@ wait $serving || true
 [ -s joined.xytp ] || fail "a client of words without a header got no events"
 
 # Datagrams of other tools, without a network.
-for format in spif spif-timestamps t64-x16-y16-on8 t32-x16-y15-on1 es jaer; do
+for format in spif es; do
   launch videotestsrc pattern=ball num-buffers=20 ! eventsim-diff ! eventdatagrampay format=$format ! eventdatagramdepay format=$format width=320 height=240 ! eventrender ! videoconvert ! fakesink
 done
 

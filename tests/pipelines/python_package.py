@@ -382,6 +382,12 @@ class Recordings(unittest.TestCase):
         path = path_of("decades.csv")
         ec.write(path, events)
         self.assertTrue(same(ec.read(path), events))
+        stream = ec.stream(path)
+        with self.assertWarnsRegex(ec.PipelineWarning, "pause of .* s: its windows are skipped"):
+            self.assertEqual([len(window) for window in list(stream) if len(window)], [2, 1])
+        with self.assertRaisesRegex(TypeError, "windows, most of them in pauses"):
+            len(stream)
+        self.assertEqual(len(stream[-1]), 1)
 
     def test_skips_the_windows_of_long_pauses(self):
         events = self.events[:4].copy()

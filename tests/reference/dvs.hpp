@@ -42,6 +42,55 @@ Image<Pixel> denoised(const ImageView<Pixel>& frame, int limit) {
   return out;
 }
 
+/// The sharp light L of a frame I (white is 255, plus half a grey level) that is its mean along
+/// `path(x, y)`, which has dx, dy and length:
+///   mean(J)(x) = 1 / length sum over j of w(j) J(x + j (dx, dy)),
+///   w(j) = clamp(length / 2 + 1/2 - |j|, 0, 1)
+///   L = L * mean(min(I / mean(L), 4))^2, repeated, at first L = I.
+/// Samples are bilinear, the border is replicated. Returns L - 1/2, in [0, 255].
+template <class Pixel, class PathOf>
+Image<double> deblurred(const Image<Pixel>& frame, int bits, int iterations, const PathOf& path) {
+  const int width = frame.width();
+  const int height = frame.height();
+  const auto map = [&](const auto& value) {
+    Image<double> out(width, height);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) out.at(x, y) = value(x, y);
+    return out;
+  };
+  const auto sample = [&](const Image<double>& image, double x, double y) {
+    x = std::clamp(x, 0.0, width - 1.0);
+    y = std::clamp(y, 0.0, height - 1.0);
+    const int left = static_cast<int>(x);
+    const int top = static_cast<int>(y);
+    const auto row = [&](int v) {
+      return std::lerp(image.at(left, v), image.at(std::min(left + 1, width - 1), v), x - left);
+    };
+    return std::lerp(row(top), row(std::min(top + 1, height - 1)), y - top);
+  };
+  const auto mean = [&](const Image<double>& image, int x, int y) {
+    const auto& along = path(x, y);
+    const int reach = static_cast<int>(along.length);
+    double sum = 0;
+    for (int j = -reach; j <= reach; ++j)
+      sum += std::clamp(along.length / 2 + 0.5 - std::abs(j), 0.0, 1.0) *
+             sample(image, x + j * along.dx, y + j * along.dy);
+    return sum / along.length;
+  };
+  const auto light =
+      map([&](int x, int y) { return frame.at(x, y) * 255.0 / ((1 << bits) - 1) + 0.5; });
+  auto found = light;
+  for (int i = 0; i < iterations; ++i) {
+    const auto ratio =
+        map([&](int x, int y) { return std::min(light.at(x, y) / mean(found, x, y), 4.0); });
+    found = map([&](int x, int y) {
+      const double gain = mean(ratio, x, y);
+      return found.at(x, y) * gain * gain;
+    });
+  }
+  return map([&](int x, int y) { return std::clamp(found.at(x, y) - 0.5, 0.0, 255.0); });
+}
+
 /// Gain of the exposure from one frame to the next:
 ///   usable   a pixel whose luma is above 16/255 and below 235/255 of white in both frames
 ///   block    8x8 pixels, half of them usable: d = ln(sum of light now / sum of light before)

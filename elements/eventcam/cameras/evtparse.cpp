@@ -365,6 +365,13 @@ static void end_stream(GstEvtParse* self) {
     scanner.finish(priv.stream->state->pieces);
     add(priv.stats.lock()->words, before, scanner.counts());
     note_losses(self, before, 0);
+    if (scanner.counts().events == 0 && priv.stats.copy().buffers > 0)
+      priv.stream->warn_of_no_words(
+          self,
+          {GST_STREAM_ERROR_DECODE,
+           "No events were found. If the camera sent some, set format, width and height to match "
+           "it."},
+          std::to_string(scanner.counts().lost_bytes) + " bytes are not valid");
     return push_pieces(self);
   });
 }

@@ -5,7 +5,7 @@
  * @short_description: writes AEDAT 4, events and frames in one file
  *
  * Writes one event stream, one video stream, or both, in time order. The times in the file are
- * those of the event stream, floor(PTS / 1000) + t microseconds; video is synchronised to it.
+ * the event stream's, floor(PTS / 1000) + t microseconds; video is synchronised to it.
  *
  * A link without a pad name, `queue ! mux.`, takes either, and learns which from its caps. The pads
  * `events_0` and `video_0` take one kind, for applications that request pads by name.
@@ -241,7 +241,7 @@ static std::optional<GstSegment> segment_of_events(GstAedatMux* self) {
   return std::nullopt;
 }
 
-/// Time of a frame in the file: that of events at its running time, or its own PTS if there are
+/// Time of a frame in the file: the time of events at its running time, or its own PTS if there are
 /// none.
 static Microseconds frame_time(GstAedatMux* self, GstBuffer* frame, GstClockTime running) {
   GstClockTime time = GST_BUFFER_PTS(frame);

@@ -5,7 +5,7 @@
  * @short_description: writes HDF5 files of events
  *
  * Writes events as an HDF5 file in the layout of DSEC or Metavision, whose arrays can be read
- * directly with h5py. Written times are those of the PTS. `format=metavision` keeps triggers; the
+ * directly with h5py. Written times come from the PTS. `format=metavision` keeps triggers; the
  * property `stats` counts them.
  *
  * The file is complete at the end of the stream, or when the pipeline is stopped. If the process is
@@ -23,10 +23,12 @@
  */
 #include <gst/base/gstbasesink.h>
 
+#include <cerrno>
 #include <chrono>
 #include <memory>
 #include <span>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "gst/base/authors.hpp"
@@ -107,6 +109,12 @@ static GType compression_type() {
 
 /* the file */
 
+static bool is_full(const std::exception& error) {
+  const auto* const failed = dynamic_cast<const std::system_error*>(&error);
+  const int code = failed != nullptr ? failed->code().value() : 0;
+  return code == ENOSPC || code == EDQUOT || code == EFBIG;
+}
+
 /// Runs `work`; reports any exception and ends the file, because it cannot be repaired.
 template <class Work>
 static bool reported(GstEventHdf5Sink* self, const Work& work) {
@@ -116,9 +124,14 @@ static bool reported(GstEventHdf5Sink* self, const Work& work) {
         auto* priv = self->priv;
         priv->state.writer.reset();
         priv->state.ended = true;
+        const std::string location = priv->settings.copy().location;
+        if (is_full(error))
+          return Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+                        "The disk is full, or limits the size of files. " + location +
+                            " can be read up to its last commit."};
         return WritableEvents::failure(
             error, {GST_RESOURCE_ERROR_WRITE,
-                    "Cannot write " + priv->settings.copy().location +
+                    "Cannot write " + location +
                         ". Set location to a writable folder on a disk with enough space."});
       },
       work);
@@ -192,7 +205,7 @@ static bool write_triggers(GstEventHdf5Sink* self, std::span<const Trigger> trig
   return reported(self, [&] {
     const bool written = state.writer->append(triggers);
     GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " triggers, %s", triggers.size(),
-                   written ? "written" : "left out: the format has none");
+                   written ? "written" : "dropped: the format has none");
     if (written) self->priv->writable.written().lock()->triggers += triggers.size();
   });
 }

@@ -154,8 +154,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_re
  *
  * Reads the `.bin` files of N-MNIST and N-Caltech101, which were recorded with an ATIS: five bytes
  * an event. They have no signature, so files are recognised by the order of their times, and those
- * with less than 300 events are not. The sensor size is that of #GstEventAtisDec:width and
- * #GstEventAtisDec:height, or else that of downstream's caps, or else that of the smallest known
+ * with less than 300 events are not. The sensor size comes from #GstEventAtisDec:width and
+ * #GstEventAtisDec:height, or else from downstream's caps; otherwise, it is the smallest known
  * sensor that contains the events. N-MNIST has 34x34 pixels.
  *
  * ## Example launch line
@@ -187,10 +187,10 @@ GST_ELEMENT_REGISTER_DEFINE(eventatisdec, "eventatisdec", GST_RANK_PRIMARY, even
  * lines, unless #GstEventCsvDec:column-order and #GstEventCsvDec:time-unit are set. A file whose
  * time unit is in doubt is rejected unless the unit is set, and so is one in which more than one
  * line in a hundred is not an event; the error names the first of them. If the file does not
- * contain the sensor size, it is that of #GstEventCsvDec:width and #GstEventCsvDec:height, or else
- * that of downstream's caps, or else that of the smallest known sensor that contains the events; if
- * later events lie outside it, the caps change. Writers cannot change the size within a file: set
- * it for them.
+ * contain the sensor size, it comes from #GstEventCsvDec:width and #GstEventCsvDec:height, or else
+ * from downstream's caps; otherwise, it is the smallest known sensor that contains the events, and
+ * if later events lie outside it, the caps change. Writers cannot change the size within a file:
+ * set it for them.
  *
  * ## Example launch line
  * |[
@@ -218,10 +218,10 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_
  * Reads structured NumPy arrays with the fields t, x, y and p, and arrays of the shape (N, 4) or
  * (4, N), whose columns are detected from the first rows, unless #GstEventNpyDec:column-order is
  * set. Integer times are microseconds and fractional ones seconds, unless #GstEventNpyDec:time-unit
- * or a name such as t_ns says otherwise. Arrays do not contain the sensor size: it is that of
- * #GstEventNpyDec:width and #GstEventNpyDec:height, or else that of downstream's caps, or else that
- * of the smallest known sensor that contains the events; if later events lie outside it, the caps
- * change. Writers cannot change the size within a file: set it for them.
+ * or a name such as t_ns says otherwise. Arrays do not contain the sensor size: it comes from
+ * #GstEventNpyDec:width and #GstEventNpyDec:height, or else from downstream's caps; otherwise, it
+ * is the smallest known sensor that contains the events, and if later events lie outside it, the
+ * caps change. Writers cannot change the size within a file: set it for them.
  *
  * ## Example launch line
  * |[
@@ -283,8 +283,12 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
  * Reads the events of HDF5 files from Metavision (compressed with ECF), and of all others in which
  * one search finds datasets of a group that are named t, x, y and p, or the like, or a dataset
  * named events with such members or four columns: DSEC, TUM-VIE, M3ED, MVSEC, v2e, E2VID and
- * others. Of several cameras, the first by name is read. Events are output in buffers of
+ * others. Of several cameras, the first by name is read, unless #GstEventHdf5Dec:events-path
+ * selects another; a message names them. Events are output in buffers of
  * #GstEventReader:buffer-duration, with triggers for writers that store them.
+ *
+ * The time unit is detected by the name and the numbers of the times, unless
+ * #GstEventHdf5Dec:time-unit is set; a file whose time unit is in doubt is rejected.
  *
  * HDF5 files need random access, so upstream should support pull mode, as filesrc does. In push
  * mode the file is collected in memory, up to 256 MiB, and read at its end.
@@ -306,9 +310,15 @@ static const EventReaderFormat hdf5 = {
     .description = "Reads HDF5 files of events: DSEC, TUM-VIE, MVSEC, Metavision, v2e",
     .caps = "application/x-hdf5",
     .has_triggers = true,
-    .add_properties = add_sensor_size,
-    .make_decoder = [](const GstCaps*,
-                       const FormatSettings&) { return eventcamera::make_hdf5_decoder(); },
+    .add_properties =
+        [](FormatProperties& properties) {
+          add_table_properties(properties);
+          add_events_path(properties);
+        },
+    .make_decoder =
+        [](const GstCaps*, const FormatSettings& settings) {
+          return eventcamera::make_hdf5_decoder({settings.events_path, settings.table()});
+        },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, event_reader_type(hdf5))
 #endif
@@ -334,8 +344,9 @@ GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, even
  * Corrupt data are skipped; a warning reports the first occurrence, and `stats` counts all.
  *
  * An AEDAT 2.0 file may not name its camera. The layout of addresses is then inferred from the
- * first ones; the sensor size is #GstAedatDemux:width and #GstAedatDemux:height, or else that of
- * downstream caps, or else that of the smallest DAVIS that contains the events, with a warning.
+ * first ones; the sensor size comes from #GstAedatDemux:width and #GstAedatDemux:height, or else
+ * from downstream's caps; otherwise, it is the smallest DAVIS that contains the events, with a
+ * warning.
  *
  * A stream without a frame or event in the first second may get its pad only with the first one.
  *

@@ -3,16 +3,18 @@
 
 #include <algorithm>
 #include <span>
+#include <vector>
 
 #include "gst/base/owned.hpp"
+#include "src/formats/compressed_file.hpp"
 #include "src/formats/file_formats.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 using eventcamera::FileFormat;
 using eventcamera::Likelihood;
 
-/// Peeks at the part at the start of the file that likelihood() examines.
-static std::span<const guint8> first_bytes(GstTypeFind* find) {
-  constexpr guint64 max_bytes = eventcamera::max_recognised_bytes;
+/// Peeks at up to `max_bytes` at the start of the file.
+static std::span<const guint8> first_bytes(GstTypeFind* find, guint64 max_bytes) {
   const guint64 length = gst_type_find_get_length(find);
   const auto limit = static_cast<guint>(length > 0 ? std::min(length, max_bytes) : max_bytes);
   // The length may be unknown, and a peek past the end returns nothing, so extend it by halves.
@@ -22,6 +24,21 @@ static std::span<const guint8> first_bytes(GstTypeFind* find) {
     if (const guint8* peeked = gst_type_find_peek(find, 0, count)) bytes = {peeked, count};
   }
   return bytes;
+}
+
+/// Decompresses the part at the start of a file that likelihood() examines.
+static std::vector<guint8> decompressed(std::span<const guint8> start) {
+  std::vector<guint8> content;
+  eventcamera::FileDecompressor decompressor;
+  decompressor.push(start);
+  try {
+    for (auto part = decompressor.next();
+         !part.empty() && content.size() < eventcamera::max_recognised_bytes;
+         part = decompressor.next())
+      content.insert(content.end(), part.begin(), part.end());
+  } catch (const eventcamera::UnsupportedFormat&) {
+  }
+  return content;
 }
 
 static guint probability(Likelihood likelihood) {
@@ -40,7 +57,14 @@ static guint probability(Likelihood likelihood) {
 
 static void find_format(GstTypeFind* find, gpointer data) {
   const auto& format = *static_cast<const FileFormat*>(data);
-  const auto bytes = first_bytes(find);
+  // A block of Zstandard gives nothing before its end, and typefind sees no more than this.
+  constexpr guint64 max_compressed = 1U << 17;
+  auto bytes = first_bytes(find, eventcamera::max_recognised_bytes);
+  std::vector<guint8> content;
+  if (eventcamera::FileDecompressor::is_compressed(bytes)) {
+    content = decompressed(first_bytes(find, max_compressed));
+    bytes = content;
+  }
   const auto found = probability(likelihood(format, bytes));
   if (found == GST_TYPE_FIND_NONE) return;
   if (format.version != nullptr)

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/reader/event_reader.hpp"
 
+#include <array>
 #include <exception>
 #include <new>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -18,8 +20,10 @@
 GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
 #define GST_CAT_DEFAULT event_reader_debug
 
+using eventcamera::FileDecompressor;
 using eventcamera::Microseconds;
 using eventcamera::RecordingReader;
+using eventcamera::TemporaryFileError;
 using eventcamera::UnsupportedFormat;
 
 namespace {
@@ -58,6 +62,10 @@ Report report_of(const std::exception& error, const EventReaderFormat& format) {
   if (is_a<UnsupportedFormat>(error))
     return {GST_STREAM_ERROR_WRONG_TYPE,
             std::string("Cannot read this file: ") + error.what() + "."};
+  if (is_a<TemporaryFileError>(error))
+    return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+            std::string("Cannot decompress this file to a ") + error.what() +
+                ". Set the environment variable TMPDIR to a folder with enough space."};
   if (is_a<std::bad_alloc>(error))
     return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
             "There is not enough memory for the events. Lower buffer-duration."};
@@ -105,6 +113,8 @@ void EventReader::reset() {
   output_.reset();
   reports_.reset();
   timeline_.reset();
+  decompressed_.reset();
+  decompressor_.reset();
   bytes_.reset();
   caps_.reset();
   flow_ = GST_FLOW_OK;
@@ -139,7 +149,10 @@ void EventReader::open_recording() {
   const auto length = static_cast<Microseconds>(settings_.copy().buffer_duration / GST_USECOND);
   recording_ = std::make_shared<RecordingReader>(
       make, length, is_timed ? RecordingReader::Clock::stream : RecordingReader::Clock::file);
-  if (bytes_) recording_->open(*bytes_);
+  if (decompressed_)
+    recording_->open(*decompressed_);
+  else if (bytes_)
+    recording_->open(*bytes_);
   timeline_.set_recording(recording_);
   output_.set_recording(recording_);
   GST_DEBUG_OBJECT(element_, "opened in %s mode, with %s of %" GST_PTR_FORMAT,
@@ -170,7 +183,8 @@ GstFlowReturn EventReader::step() {
                      ", duration %" GST_TIME_FORMAT,
                      recording_->streams().size(), GST_TIME_ARGS(nanoseconds(recording_->origin())),
                      GST_TIME_ARGS(timeline_.duration()));
-    reports_.post_unread_topics(*recording_);
+    reports_.post_sorted(*recording_);
+    reports_.post_unread_streams(*recording_);
   }
   return std::visit([this](const auto& item) { return output_.push(item); }, *output);
 }
@@ -220,11 +234,21 @@ GstFlowReturn EventReader::pull() {
     OwnedCaps caps(gst_pad_peer_query_caps(sink_, nullptr));
     if (gst_caps_is_fixed(caps.get())) caps_ = std::move(caps);
     bytes_.emplace(sink_);
+    decompressed_.reset();
+    std::array<std::uint8_t, FileDecompressor::magic_size> start{};
+    const auto count = bytes_->read(0, start);
+    if (!count) return bytes_->flow();
+    if (FileDecompressor::is_compressed(std::span(start).first(*count)))
+      decompressed_.emplace(*bytes_);
     open_recording();
     const auto segment = timeline_.segment();
     recording_->seek(position_of(segment), stop_of(segment));
   }
   bytes_->retry();
+  if (decompressed_) {
+    if (!decompressed_->decompress()) return bytes_->flow();
+    reports_.post_cut(decompressed_->corrupt_at());
+  }
   GstFlowReturn result = step();
   if (result != nothing_ready) return result;
   result = output_.begin();
@@ -263,8 +287,14 @@ GstFlowReturn EventReader::handle_buffer(GstBuffer* buffer) {
   if (timeline_.is_timed() && GST_BUFFER_PTS_IS_VALID(buffer))
     interval = {static_cast<Microseconds>(GST_BUFFER_PTS(buffer) / GST_USECOND),
                 has_end ? static_cast<Microseconds>(GST_BUFFER_DURATION(buffer) / GST_USECOND) : 0};
-  recording_->push(bytes.get(), interval);
-  GstFlowReturn result = push_pending();
+  GstFlowReturn result = GST_FLOW_OK;
+  if (decompressor_) {
+    decompressor_->push(bytes.get());
+    result = push_decompressed();
+  } else {
+    recording_->push(bytes.get(), interval);
+    result = push_pending();
+  }
   if (result == GST_FLOW_OK && interval && has_end) {
     recording_->advance_to(static_cast<Microseconds>(
         (GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer)) / GST_USECOND));
@@ -278,6 +308,20 @@ GstFlowReturn EventReader::handle_buffer(GstBuffer* buffer) {
     }
   }
   timeline_.add_bytes(bytes.get().size());
+  return result;
+}
+
+/// Pushes the output of the bytes that were given to the decompressor. May throw.
+GstFlowReturn EventReader::push_decompressed() {
+  GstFlowReturn result = GST_FLOW_OK;
+  while (result == GST_FLOW_OK) {
+    const auto bytes = decompressor_->next();
+    if (bytes.empty()) break;
+    recording_->push(bytes);
+    result = push_pending();
+  }
+  timeline_.set_compressed(decompressor_->is_compressed());
+  reports_.post_cut(decompressor_->corrupt_at());
   return result;
 }
 
@@ -328,8 +372,14 @@ void EventReader::finish_input() {
   if (flow_ != GST_FLOW_OK) return;
   flow_ = guard([&] {
     if (!recording_) open_recording();
+    GstFlowReturn result = GST_FLOW_OK;
+    if (decompressor_) {
+      decompressor_->finish();
+      result = push_decompressed();
+      if (result != GST_FLOW_OK) return result;
+    }
     recording_->finish();
-    GstFlowReturn result = push_pending();
+    result = push_pending();
     if (result == GST_FLOW_OK) result = output_.begin();
     const bool is_timed = timeline_.is_timed();
     if (!is_timed) timeline_.update_duration(*recording_);
@@ -360,6 +410,8 @@ gboolean EventReader::handle_segment(GstEvent* event) {
   const bool was_timed = timeline_.is_timed();
   const guint64 start = segment.start;
   timeline_.begin_bytes(is_timed, segment.format == GST_FORMAT_BYTES ? start : 0);
+  decompressor_.reset();
+  if (!is_timed && (segment.format != GST_FORMAT_BYTES || start == 0)) decompressor_.emplace();
   if (is_timed) {
     if (!was_timed) close_recording();
     output_.expect_segment();

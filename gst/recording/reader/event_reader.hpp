@@ -14,6 +14,7 @@
 #include "gst/recording/reader/reader_output.hpp"
 #include "gst/recording/reader/reader_reports.hpp"
 #include "gst/recording/reader/reader_timeline.hpp"
+#include "src/formats/compressed_file.hpp"
 #include "src/formats/recording_reader.hpp"
 
 /// User-settable values of every reader, read at the start of a file.
@@ -57,6 +58,7 @@ class EventReader {
   GstFlowReturn pull();
 
   GstFlowReturn handle_buffer(GstBuffer* buffer);
+  GstFlowReturn push_decompressed();
   gboolean handle_caps(GstEvent* event);
   gboolean handle_segment(GstEvent* event);
   gboolean handle_bytes_segment(guint64 start, guint32 seqnum);
@@ -77,8 +79,10 @@ class EventReader {
   ReaderTimeline timeline_;
   ReaderReports reports_;
   ReaderOutput output_;
-  OwnedCaps caps_;                 ///< input caps
-  std::optional<PadBytes> bytes_;  ///< pull mode only
+  OwnedCaps caps_;                                             ///< input caps
+  std::optional<PadBytes> bytes_;                              ///< pull mode only
+  std::optional<eventcamera::DecompressedFile> decompressed_;  ///< of bytes_, if compressed
+  std::optional<eventcamera::FileDecompressor> decompressor_;  ///< push mode, from a file's start
   std::shared_ptr<eventcamera::RecordingReader> recording_;
   bool is_consuming_ = false;         ///< bytes were passed to the recording
   GstFlowReturn flow_ = GST_FLOW_OK;  ///< anything else refuses pushed bytes

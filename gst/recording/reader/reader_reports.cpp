@@ -21,7 +21,7 @@ void ReaderReports::reset() {
   restart();
   warn_of_corruption_.reset();
   dropped_level_.reset();
-  posted_topics_.clear();
+  posted_streams_.clear();
 }
 
 void ReaderReports::restart() {
@@ -74,14 +74,33 @@ GstStructure* ReaderReports::stats() const {
   return stats;
 }
 
-void ReaderReports::post_unread_topics(const RecordingReader& recording) {
-  const auto topics = recording.unread_topics();
-  if (topics.empty() || topics == posted_topics_) return;
-  posted_topics_ = topics;
-  post_message(element_, GST_MESSAGE_INFO,
-               {GST_STREAM_ERROR_DEMUX,
-                "The file also has " + topics + ", which are not read. Set topics to read them."},
-               recording.format_name());
+void ReaderReports::post_cut(const std::optional<std::uint64_t>& corrupt_at) {
+  if (!corrupt_at) return;
+  const auto at = std::to_string(*corrupt_at);
+  warn_of_corruption_(element_,
+                      {data_error_, "The compressed file is corrupt or cut short at byte " + at +
+                                        "; reading only what is before."},
+                      "cannot be decompressed from byte " + at + " on");
+}
+
+void ReaderReports::post_sorted(const RecordingReader& recording) {
+  if (!recording.is_sorted()) return;
+  post_message(element_, GST_MESSAGE_WARNING,
+               {data_error_,
+                "The file is not sorted by time. Its events were read into memory and "
+                "sorted."},
+               "more than one event in a hundred is over 10 ms out of order");
+}
+
+void ReaderReports::post_unread_streams(const RecordingReader& recording) {
+  const auto [names, property] = recording.unread_streams();
+  if (names.empty() || names == posted_streams_) return;
+  posted_streams_ = names;
+  post_message(
+      element_, GST_MESSAGE_INFO,
+      {GST_STREAM_ERROR_DEMUX,
+       "The file also has " + names + ", which are not read. Set " + property + " to read them."},
+      recording.format_name());
 }
 
 void ReaderReports::post_end(const RecordingReader& recording, bool is_timed) {

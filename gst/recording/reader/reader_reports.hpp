@@ -3,6 +3,8 @@
 
 #include <gst/gst.h>
 
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "gst/base/errors.hpp"
@@ -30,8 +32,14 @@ class ReaderReports {
   /// The property `stats`. May be called from any thread.
   GstStructure* stats() const;
 
-  /// Posts an info message listing the topics that are not read.
-  void post_unread_topics(const eventcamera::RecordingReader& recording);
+  /// Posts a warning, once a file, if a compressed file cannot be read from a byte on.
+  void post_cut(const std::optional<std::uint64_t>& corrupt_at);
+
+  /// Posts a warning if the events of a table had to be sorted.
+  void post_sorted(const eventcamera::RecordingReader& recording);
+
+  /// Posts an info message listing the streams that are not read.
+  void post_unread_streams(const eventcamera::RecordingReader& recording);
 
   /// At the end of a file: posts warnings if there were no events, or if items were dropped.
   void post_end(const eventcamera::RecordingReader& recording, bool is_timed);
@@ -45,5 +53,5 @@ class ReaderReports {
   bool has_new_corruption_ = false;
   WarnOnce warn_of_corruption_;
   RepeatLevel dropped_level_;
-  std::string posted_topics_;  ///< in the last message
+  std::string posted_streams_;  ///< in the last message
 };

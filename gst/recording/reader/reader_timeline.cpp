@@ -132,7 +132,7 @@ ReaderTimeline::Restart ReaderTimeline::begin_restart(const SeekRequest& request
   Recording recording;
   {
     const auto state = state_.lock();
-    recording = state->recording;
+    if (!state->is_compressed) recording = state->recording;
   }
   if (recording) restart.seek_point = recording->seek_point_before(position_of(segment));
   const auto state = state_.lock();

@@ -57,6 +57,9 @@ class ReaderTimeline {
   void add_bytes(guint64 count) { state_.lock()->pushed_bytes += count; }
   bool is_timed() { return state_.lock()->is_timed; }
 
+  /// Whether positions in the recording differ from those upstream: seeks then read from the start.
+  void set_compressed(bool is_compressed) { state_.lock()->is_compressed = is_compressed; }
+
   /// The recording whose seek points are used; null while there is none.
   void set_recording(Recording recording);
 
@@ -100,6 +103,7 @@ class ReaderTimeline {
     guint32 last_seek = GST_SEQNUM_INVALID;
     bool is_pulling = false;
     bool is_timed = false;
+    bool is_compressed = false;
     Recording recording;
   };
 

@@ -83,7 +83,6 @@ std::optional<SeekPoint> AedatDecoder::seek_point_before(Microseconds t) const {
 }
 
 void AedatDecoder::restart(const SeekPoint& seek_point) {
-  finished_ = false;
   reader_->restart(seek_point);
 }
 

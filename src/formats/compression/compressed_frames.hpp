@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
 #include <vector>
+
+#include "src/formats/expansion_limit.hpp"
 
 struct LZ4F_dctx_s;
 struct ZSTD_DCtx_s;
@@ -23,24 +24,6 @@ struct CompressionDeleter {
   void operator()(LZ4F_dctx_s* context) const;
   void operator()(ZSTD_DCtx_s* context) const;
   void operator()(ZSTD_CCtx_s* context) const;
-};
-
-/// Limits what a file decompresses to: a few kilobytes of zeros would take minutes.
-class ExpansionLimit {
- public:
-  /// Maximum size of the content of the next `compressed` bytes, at most `limit`.
-  std::size_t of(std::size_t compressed, std::size_t limit) {
-    allowed_ += max_ratio * compressed;
-    return static_cast<std::size_t>(std::min<std::uint64_t>(limit, allowed_));
-  }
-
-  /// Counts bytes that were decompressed.
-  void count(std::size_t bytes) { allowed_ -= std::min<std::uint64_t>(bytes, allowed_); }
-
- private:
-  /// Black pictures, which compress best, reach 13,000.
-  static constexpr std::uint64_t max_ratio = 16384;
-  std::uint64_t allowed_ = std::uint64_t{1} << 28;
 };
 
 /// Decompresses frames. Memory grows with the actual output, not with sizes stated in the data.

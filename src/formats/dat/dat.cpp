@@ -131,8 +131,8 @@ class DatDecoder final : public UnitStreamDecoder {
 
   std::size_t read_header(std::span<const std::uint8_t> bytes, bool ended) override {
     if (!header_.ended()) {
-      const auto taken = header_.take(bytes, ended);
-      if (!header_.ended() || taken != 0) return taken;
+      const auto length = header_.read_line(bytes, ended);
+      if (!header_.ended() || length != 0) return length;
     }
     if (!header_.found()) throw UnsupportedFormat("not a DAT file: no header");
     if (bytes.size() < 2) return 0;

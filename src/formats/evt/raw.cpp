@@ -114,13 +114,13 @@ EvtFormat format_of(const PropheseeHeader& header) {
 class RawDecoder final : public UnitStreamDecoder {
  private:
   std::size_t read_header(std::span<const std::uint8_t> bytes, bool ended) override {
-    const auto taken = header_.take(bytes, ended);
+    const auto length = header_.read_line(bytes, ended);
     if (header_.ended()) {
       if (!header_.found()) throw UnsupportedFormat("not a Prophesee RAW file: no header");
       const auto size = size_of(header_);
       begin(make_evt_unit_decoder(format_of(header_), size), size);
     }
-    return taken;
+    return length;
   }
 
   PropheseeHeader header_;

@@ -17,12 +17,13 @@ class DsecLayout final : public Hdf5Layout {
       : file_(file),
         compression_(compression),
         group_(make_group(file, "events")),
-        p_(group_.get(), "p", H5T_STD_U8LE, H5T_NATIVE_UINT8, chunk, compression_),
-        x_(group_.get(), "x", H5T_STD_U16LE, H5T_NATIVE_UINT16, chunk, compression_),
-        y_(group_.get(), "y", H5T_STD_U16LE, H5T_NATIVE_UINT16, chunk, compression_),
-        t_(group_.get(), "t", H5T_STD_U32LE, H5T_NATIVE_UINT64, chunk, compression_),
-        // Compressed, because it grows in pauses, too: 691 MB a day.
-        index_(file, "ms_to_idx", H5T_STD_U64LE, H5T_NATIVE_UINT64, chunk, Hdf5Compression::gzip) {
+        p_(group_.get(), "p", H5T_STD_U8LE, H5T_NATIVE_UINT8, hdf5_chunk, compression_),
+        x_(group_.get(), "x", H5T_STD_U16LE, H5T_NATIVE_UINT16, hdf5_chunk, compression_),
+        y_(group_.get(), "y", H5T_STD_U16LE, H5T_NATIVE_UINT16, hdf5_chunk, compression_),
+        t_(group_.get(), "t", H5T_STD_U32LE, H5T_NATIVE_UINT64, hdf5_chunk, compression_),
+        // Compressed, because a pause of a day takes 691 MB.
+        index_(file, "ms_to_idx", H5T_STD_U64LE, H5T_NATIVE_UINT64, hdf5_index_chunk,
+               Hdf5Compression::gzip) {
     write_number(file, "width", size.width);
     write_number(file, "height", size.height);
   }
@@ -50,28 +51,25 @@ class DsecLayout final : public Hdf5Layout {
     return labels.size();
   }
 
-  void flush() override {
-    if (labels_) {
-      labels_->complete(t_.count());
-      labels_->cause.flush();
-      labels_->object_class.flush();
+  void flush(bool with_partial_chunks) override {
+    if (labels_) labels_->complete(t_.count());
+    if (with_partial_chunks) {
+      if (labels_) labels_->flush();
+      p_.flush();
+      x_.flush();
+      y_.flush();
+      t_.flush();
     }
-    p_.flush();
-    x_.flush();
-    y_.flush();
-    t_.flush();
     index_.flush();
     if (first_ && !has_offset_) write_offset(*first_);
   }
 
   void close() override {
-    flush();
+    flush(true);
     if (!has_offset_) write_offset(0);
   }
 
  private:
-  static constexpr hsize_t chunk = 65536;
-
   static void write_number(hid_t object, const char* name, int number) {
     const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
     const Hdf5Handle attribute(
@@ -89,15 +87,15 @@ class DsecLayout final : public Hdf5Layout {
     has_offset_ = true;
   }
 
-  /// DSEC stores times with 32 bits (71 minutes). Longer recordings get 64 bits, which readers
-  /// accept.
+  /// Continues with times of 64 bits, which readers accept. DSEC has 32 bits, which last 71
+  /// minutes.
   void widen() {
     t_.flush();
     wide_ = true;
-    Times wide(group_.get(), "t64", H5T_STD_U64LE, H5T_NATIVE_UINT64, chunk, compression_);
-    std::vector<std::uint64_t> times(chunk);
+    Times wide(group_.get(), "t64", H5T_STD_U64LE, H5T_NATIVE_UINT64, hdf5_chunk, compression_);
+    std::vector<std::uint64_t> times(hdf5_chunk);
     while (wide.rows() < t_.rows()) {
-      const auto count = std::min(chunk, t_.rows() - wide.rows());
+      const auto count = std::min(hdf5_chunk, t_.rows() - wide.rows());
       t_.read(wide.rows(), count, times.data());
       wide.append(times.data(), count);
     }
@@ -110,17 +108,22 @@ class DsecLayout final : public Hdf5Layout {
 
   struct Labels {
     Labels(hid_t group, Hdf5Compression compression)
-        : cause(group, "cause", H5T_STD_U8LE, H5T_NATIVE_UINT8, chunk, compression),
-          object_class(group, "class", H5T_STD_U16LE, H5T_NATIVE_UINT16, chunk, compression) {}
+        : cause(group, "cause", H5T_STD_U8LE, H5T_NATIVE_UINT8, hdf5_chunk, compression),
+          object_class(group, "class", H5T_STD_U16LE, H5T_NATIVE_UINT16, hdf5_chunk, compression) {}
 
     void put(const Label& label) {
       cause.put(static_cast<std::uint8_t>(label.cause));
       object_class.put(label.object_class);
     }
 
-    /// Adds empty labels for events without.
+    /// Adds empty labels for unlabelled events, up to this number of events.
     void complete(hsize_t events) {
       while (cause.count() < events) put({});
+    }
+
+    void flush() {
+      cause.flush();
+      object_class.flush();
     }
 
     BufferedDataset<std::uint8_t> cause;

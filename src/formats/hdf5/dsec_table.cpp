@@ -28,11 +28,11 @@ class DsecTable final : public NumberTable {
     read_offset(file);
     open_index(file);
     // Nanoseconds of 32 bits would wrap after four seconds.
-    const bool are_microseconds = index_ || (columns_[0].is_unsigned_32() && !datasets.unit);
-    const auto unit =
-        detect(read_sample(), *columns_of("txyp"),
-               are_microseconds ? std::optional(TimeUnit::microseconds) : datasets.unit,
-               !columns_[0].is_integers(), datasets.group + datasets.names[0]);
+    auto known = datasets.set_unit;
+    if (!known && (index_ || (columns_[0].is_unsigned_32() && !datasets.unit)))
+      known = TimeUnit::microseconds;
+    const auto unit = detect(read_sample(), *columns_of("txyp"), known ? known : datasets.unit,
+                             !columns_[0].is_integers(), datasets.group + datasets.names[0]);
     columns_[0].set_unit(0, unit);
     wraps_ = columns_[0].is_unsigned_32() && unit == TimeUnit::microseconds;
     open_labels(file, datasets.group);

@@ -16,6 +16,7 @@ struct ColumnDatasets {
   std::string group;                 ///< empty or with a final slash
   std::array<std::string, 4> names;  ///< by EventColumn
   std::optional<TimeUnit> unit;      ///< in the name of the times
+  std::optional<TimeUnit> set_unit;  ///< by the user
 };
 
 /// Creates the table of columns: the DSEC layout, and others without its index. Throws

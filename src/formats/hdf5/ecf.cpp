@@ -67,8 +67,8 @@ bool read_times(ByteCursor& reader, std::span<AbsoluteEvent> events) {
   return true;
 }
 
-/// Writes runs of equal values: Word has the value in its upper bits and the count in the lower
-/// ones; if all of the latter are set, the count follows.
+/// Writes runs of equal values as words, with the value in the upper bits and the length in the
+/// lower ones. If all lower bits are set, the length follows the word.
 template <class Word, unsigned count_mask, class Value>
 void put_runs(std::span<const AbsoluteEvent> events, ByteAppender& writer, const Value& value) {
   for (std::size_t i = 0; i < events.size();) {
@@ -203,7 +203,8 @@ bool read_xp_packed(ByteCursor& reader, std::span<AbsoluteEvent> events) {
   return true;
 }
 
-/// Chooses the packing by the first quarter of the events: runs pay off only if they are common.
+/// Chooses the packing from the first quarter of the events: run lengths only pay off if runs are
+/// common.
 std::uint32_t packing(std::span<const AbsoluteEvent> events) {
   const auto sample = events.first(events.size() < 16 ? events.size() : events.size() / 4);
   std::size_t same_row = 0;

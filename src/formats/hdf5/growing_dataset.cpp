@@ -5,8 +5,8 @@
 
 namespace eventcamera {
 
-void require(bool done) {
-  if (!done) throw std::runtime_error("the HDF5 library failed to write the file");
+void require(bool succeeded) {
+  if (!succeeded) throw std::runtime_error("the HDF5 library failed to write the file");
 }
 
 Hdf5Handle make_group(hid_t file, const char* name) {
@@ -26,12 +26,12 @@ GrowingDataset::GrowingDataset(hid_t parent, const char* name, hid_t stored, hid
     : memory_(memory) {
   constexpr hsize_t none = 0;
   constexpr hsize_t no_limit = H5S_UNLIMITED;
-  constexpr unsigned quickest = 1;  // higher levels hardly make events smaller
+  constexpr unsigned level = 1;  // the fastest; others hardly make events smaller
   const Hdf5Handle space(H5Screate_simple(1, &none, &no_limit), H5Sclose);
   const auto creation = make_creation();
   require(H5Pset_chunk(creation.get(), 1, &chunk) >= 0);
   if (compression == Hdf5Compression::gzip)
-    require(H5Pset_shuffle(creation.get()) >= 0 && H5Pset_deflate(creation.get(), quickest) >= 0);
+    require(H5Pset_shuffle(creation.get()) >= 0 && H5Pset_deflate(creation.get(), level) >= 0);
   if (filter != 0)
     require(H5Pset_filter(creation.get(), filter, H5Z_FLAG_OPTIONAL, 0, nullptr) >= 0);
   dataset_ = {

@@ -10,15 +10,15 @@
 
 namespace eventcamera {
 
-/// Throws std::runtime_error unless the library has done what it was asked for.
-void require(bool done);
+/// Throws std::runtime_error if a call of the library failed.
+void require(bool succeeded);
 
 Hdf5Handle make_group(hid_t file, const char* name);
 
 /// Creates the properties of a dataset, without modification times.
 Hdf5Handle make_creation();
 
-/// Dataset with rows appended.
+/// Dataset to which rows are appended.
 class GrowingDataset {
  public:
   GrowingDataset(hid_t parent, const char* name, hid_t stored, hid_t memory, hsize_t chunk,
@@ -26,7 +26,7 @@ class GrowingDataset {
 
   void append(const void* rows, hsize_t count);
 
-  /// Writes the last chunk, of `count` rows from `begin` on, already filtered.
+  /// Writes a filtered chunk of `count` rows, the last ones of the dataset, from `begin` on.
   void write_chunk(std::span<const std::uint8_t> chunk, hsize_t begin, hsize_t count);
 
   void read(hsize_t first, hsize_t count, void* rows) const;
@@ -43,7 +43,7 @@ class GrowingDataset {
   hsize_t rows_ = 0;
 };
 
-/// Growing dataset of Row, written one chunk at a time, or flushed in between.
+/// Buffers rows until a chunk is full, or they are flushed.
 template <class Row>
 class BufferedDataset : public GrowingDataset {
  public:

@@ -85,7 +85,7 @@ void Hdf5Dataset::check_chunks() {
                                       nullptr, 0, nullptr, nullptr));
   }
   own_filters_ = std::ranges::all_of(filters_, is_own_hdf5_filter);
-  // Each compression multiplies the size: 100 kB would become terabytes.
+  // Nested compression multiplies ratios: 100 kB could expand to terabytes.
   const auto compressions = std::ranges::count_if(filters_, [](int filter) {
     return filter != H5Z_FILTER_SHUFFLE && filter != H5Z_FILTER_FLETCHER32 &&
            filter != H5Z_FILTER_NBIT && filter != H5Z_FILTER_SCALEOFFSET;
@@ -106,7 +106,10 @@ void Hdf5Dataset::check_storage(hid_t file) {
       const Hdf5Handle space(H5Dget_space(dataset_.get()), H5Sclose);
       if (claimed > 0 && H5Dget_num_chunks(dataset_.get(), space.get(), &chunks) < 0)
         refuse(path_, "has a corrupt index of its chunks");
-      // Limits holes: they are read, unless they make up most of the file.
+      // A crafted index may refer to one chunk many times, so that a small file never ends.
+      if (H5Dget_storage_size(dataset_.get()) > file_bytes_)
+        refuse(path_, "has chunks that overlap");
+      // Bounds the number of missing chunks, which take time to skip.
       const auto max_chunks = 2 * std::min<std::uint64_t>(chunks, UINT32_MAX) + max_holes;
       const auto max_rows = std::min<std::uint64_t>(max_chunks, UINT64_MAX / chunk_[0]) * chunk_[0];
       rows_ = std::min<std::uint64_t>(claimed, max_rows);
@@ -209,7 +212,7 @@ double floating(std::int64_t bits, std::size_t bytes) {
   return std::bit_cast<float>(static_cast<std::uint32_t>(bits));
 }
 
-/// Turns the bits of a number into an integer. Impossible ones become the least integer.
+/// Converts the bits of a number to an integer; the smallest integer if it does not fit.
 std::int64_t Hdf5Dataset::number_from(std::int64_t bits, std::size_t column) const {
   constexpr auto impossible = std::numeric_limits<std::int64_t>::min();
   constexpr double max = 4e18;
@@ -279,7 +282,7 @@ bool Hdf5Dataset::sample(std::uint64_t count, std::vector<TableSample::Row>& out
   return true;
 }
 
-/// Returns the properties of a type of numbers; nothing if it is not a supported one.
+/// Describes a numeric type; nothing if it is unsupported.
 std::optional<Hdf5Dataset::Number> Hdf5Dataset::number_of(hid_t type) {
   const auto kind = H5Tget_class(type);
   // h5py writes booleans as an enumeration of bytes.
@@ -392,8 +395,7 @@ void Hdf5Dataset::require_filters() {
     refuse(path_, "is compressed with the HDF5 filter " + name +
                       ", whose plugin is not installed (or not in HDF5_PLUGIN_PATH)");
   }
-  // The library decompresses whole chunks. A chunk that does not fit into its cache would be
-  // decompressed again for every part.
+  // The cache must hold a chunk: the library would decompress it again for every read.
   const Hdf5Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
   H5Pset_chunk_cache(access.get(), H5D_CHUNK_CACHE_NSLOTS_DEFAULT,
                      std::max(min_cache_bytes, chunk_bytes_), 1.0);

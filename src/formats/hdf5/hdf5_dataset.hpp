@@ -16,8 +16,8 @@
 
 namespace eventcamera {
 
-/// Dataset with rows of numbers in an untrusted file. Ensures that it is stored in the file
-/// itself, chunk sizes are bounded, and there are no more rows than are stored.
+/// Dataset with rows of numbers in an untrusted file. Checks that it is stored in the file itself,
+/// that chunk sizes are bounded, and that the file has as many rows as it claims.
 class Hdf5Dataset {
  public:
   /// True if there is an object of this type at `path`; links to other files do not count.
@@ -47,17 +47,17 @@ class Hdf5Dataset {
   /// not a number.
   void choose(std::span<const std::string> members);
 
-  /// Reads a column, or chosen member, as a time in this unit, and returns microseconds.
+  /// Converts a column, or chosen member, from this time unit to microseconds.
   void set_unit(std::size_t column, TimeUnit unit) {
     time_column_ = column;
     power_ = power_of(unit);
   }
 
-  /// Reads the first rows as they are. False if the file is corrupt there.
+  /// Reads the first rows without converting times. False if the file is corrupt there.
   bool sample(std::uint64_t count, std::vector<TableSample::Row>& out);
 
-  /// Reads rows, with all columns or the chosen members. Numbers with a fraction are rounded down,
-  /// or times as by max_rounding_up. False if the file is corrupt there.
+  /// Reads all columns or chosen members of rows. Rounds fractions down, except for times within
+  /// max_rounding_up of the next integer. False if the file is corrupt there.
   bool read(std::uint64_t first, std::uint64_t count, std::vector<std::int64_t>& out);
 
   /// Rows per chunk; 0 if the dataset is not chunked.

@@ -15,19 +15,23 @@ namespace {
 /// The events of a file.
 class Hdf5Decoder final : public Decoder {
  public:
+  explicit Hdf5Decoder(Hdf5Selection selection) : selection_(std::move(selection)) {}
+
   void push(std::span<const std::uint8_t> piece) override { collected_.push(piece); }
 
   void drain() override {
-    reader_ = std::make_unique<Hdf5Reader>(collected_.take());
+    reader_ = std::make_unique<Hdf5Reader>(collected_.take(), selection_);
     describe();
   }
 
   bool open(ByteSource& source) override {
-    reader_ = std::make_unique<Hdf5Reader>(source);
+    reader_ = std::make_unique<Hdf5Reader>(source, selection_);
     opened_ = true;
     describe();
     return true;
   }
+
+  bool is_table() const override { return true; }
 
   /// Returns events after the triggers up to their time.
   std::optional<Item> next() override {
@@ -52,6 +56,11 @@ class Hdf5Decoder final : public Decoder {
   const Corruption& corruption() const override {
     static const Corruption none;
     return reader_ ? reader_->corruption() : none;
+  }
+
+  UnreadStreams unread_streams() const override {
+    if (!reader_ || reader_->others().empty()) return {};
+    return {.names = "events in " + reader_->others(), .property = "events-path"};
   }
 
   /// A pushed file must be pushed again as a whole.
@@ -80,6 +89,7 @@ class Hdf5Decoder final : public Decoder {
     streams_.front().labelled = reader_->has_labels();
   }
 
+  Hdf5Selection selection_;
   CollectedBytes collected_{"an HDF5 file"};
   std::unique_ptr<Hdf5Reader> reader_;  ///< set once the file can be read
   std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
@@ -92,8 +102,8 @@ class Hdf5Decoder final : public Decoder {
 
 }  // namespace
 
-std::unique_ptr<Decoder> make_hdf5_decoder() {
-  return std::make_unique<Hdf5Decoder>();
+std::unique_ptr<Decoder> make_hdf5_decoder(Hdf5Selection selection) {
+  return std::make_unique<Hdf5Decoder>(std::move(selection));
 }
 
 }  // namespace eventcamera

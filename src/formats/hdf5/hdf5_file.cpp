@@ -7,9 +7,10 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <memory>
-#include <stdexcept>
 #include <system_error>
+#include <utility>
 
 namespace eventcamera {
 
@@ -99,6 +100,19 @@ herr_t truncate_file(H5FD_t* file, hid_t /*transfer*/, hbool_t /*closing*/) {
   return 0;
 }
 
+/// Writes `bytes` at `position`, and advances both past what was written. Returns an error as in
+/// errno, or 0.
+int write_all(int fd, std::uint64_t& position, std::span<const std::uint8_t>& bytes) {
+  while (!bytes.empty()) {
+    const auto written = pwrite(fd, bytes.data(), bytes.size(), static_cast<off_t>(position));
+    if (written < 0 && errno != EINTR) return errno;
+    if (written <= 0) continue;
+    position += static_cast<std::uint64_t>(written);
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return 0;
+}
+
 H5FD_class_t make_driver() {
   H5FD_class_t driver = {};
 #ifdef H5FD_CLASS_VERSION
@@ -151,6 +165,7 @@ Hdf5Output::Hdf5Output(const std::filesystem::path& path) : path_(path) {
 }
 
 Hdf5Output::~Hdf5Output() {
+  finish_commit();
   close(fd_);
 }
 
@@ -162,8 +177,7 @@ Hdf5Handle Hdf5Output::create() {
 }
 
 void Hdf5Output::fail(int error) const {
-  throw std::runtime_error(path_.string() +
-                           " cannot be written: " + std::generic_category().message(error));
+  throw std::system_error(error, std::generic_category(), path_.string() + " cannot be written");
 }
 
 void Hdf5Output::check() const {
@@ -180,12 +194,14 @@ void Hdf5Output::read(std::uint64_t position, std::span<std::uint8_t> out) const
     left = left.subspan(static_cast<std::size_t>(got));
   }
   std::ranges::fill(left, 0);
-  for (const auto& [start, bytes] : held_) {
-    const auto begin = std::max(position, start);
-    const auto end = std::min(position + out.size(), start + bytes.size());
-    if (begin >= end) continue;
-    std::ranges::copy(std::span(bytes).subspan(begin - start, end - begin),
-                      out.begin() + static_cast<std::ptrdiff_t>(begin - position));
+  for (const auto* const pieces : {&committing_, &held_}) {
+    for (const auto& [start, bytes] : *pieces) {
+      const auto begin = std::max(position, start);
+      const auto end = std::min(position + out.size(), start + bytes.size());
+      if (begin >= end) continue;
+      std::ranges::copy(std::span(bytes).subspan(begin - start, end - begin),
+                        out.begin() + static_cast<std::ptrdiff_t>(begin - position));
+    }
   }
 }
 
@@ -195,21 +211,10 @@ void Hdf5Output::write(std::uint64_t position, std::span<const std::uint8_t> byt
   const auto first_new = std::min<std::uint64_t>(replaced, bytes.size());
   hold(position, bytes.first(first_new));
   position += first_new;
-  const auto failed = write_to_file(position, bytes.subspan(first_new));
-  hold(position + (bytes.size() - first_new - failed.size()), failed);
-}
-
-/// Returns the bytes that could not be written.
-std::span<const std::uint8_t> Hdf5Output::write_to_file(std::uint64_t position,
-                                                        std::span<const std::uint8_t> bytes) {
-  while (!bytes.empty() && error_ == 0) {
-    const auto put = pwrite(fd_, bytes.data(), bytes.size(), static_cast<off_t>(position));
-    if (put < 0 && errno != EINTR) error_ = errno;
-    if (put <= 0) continue;
-    position += static_cast<std::uint64_t>(put);
-    bytes = bytes.subspan(static_cast<std::size_t>(put));
-  }
-  return bytes;
+  auto rest = bytes.subspan(first_new);
+  if (error_ == 0) error_ = write_all(fd_, position, rest);
+  written_ = std::max(written_, position);
+  hold(position, rest);
 }
 
 void Hdf5Output::hold(std::uint64_t position, std::span<const std::uint8_t> bytes) {
@@ -220,14 +225,49 @@ void Hdf5Output::truncate(std::uint64_t size) {
   size_ = size;
 }
 
-void Hdf5Output::commit() {
-  // New bytes reach the disk before the pointers to them. Some file systems cannot sync.
-  if (error_ == 0 && fdatasync(fd_) != 0 && errno != EINVAL) error_ = errno;
-  for (const auto& [position, bytes] : held_) write_to_file(position, bytes);
-  if (error_ == 0 && ftruncate(fd_, static_cast<off_t>(size_)) != 0) error_ = errno;
+void Hdf5Output::start_commit() {
+  finish_commit();
   if (error_ != 0) return;
-  held_.clear();
+  if (size_ > written_ && ftruncate(fd_, static_cast<off_t>(size_)) != 0) {
+    error_ = errno;
+    return;
+  }
+  written_ = std::max(written_, size_);
   committed_ = size_;
+  committing_ = std::exchange(held_, {});
+  commit_ = std::async([this] { return write_committing(); });
+}
+
+/// Runs in another thread. Returns an error as in errno, or 0.
+int Hdf5Output::write_committing() const {
+  // New bytes reach the disk before the pointers to them. Some file systems cannot sync.
+  if (fdatasync(fd_) != 0 && errno != EINVAL) return errno;
+  for (const auto& [position, bytes] : committing_) {
+    auto begin = position;
+    std::span<const std::uint8_t> rest = bytes;
+    if (const int error = write_all(fd_, begin, rest); error != 0) return error;
+  }
+  return 0;
+}
+
+bool Hdf5Output::is_committing() const {
+  return commit_.valid() &&
+         commit_.wait_for(std::chrono::seconds(0)) == std::future_status::timeout;
+}
+
+void Hdf5Output::finish_commit() {
+  if (!commit_.valid()) return;
+  const int error = commit_.get();
+  if (error == 0)
+    committing_.clear();
+  else if (error_ == 0)
+    error_ = error;
+}
+
+void Hdf5Output::finish() {
+  start_commit();
+  finish_commit();
+  if (error_ == 0 && ftruncate(fd_, static_cast<off_t>(size_)) != 0) error_ = errno;
 }
 
 }  // namespace eventcamera

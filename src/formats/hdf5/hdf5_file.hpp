@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <future>
 #include <span>
 #include <vector>
 
@@ -15,15 +16,15 @@ namespace eventcamera {
 /// on failure.
 Hdf5Handle open_hdf5(ByteSource& source);
 
-/// Output file for the HDF5 library, which survives the end of the process: new bytes are written
-/// at the end of the file, and bytes that replace committed ones are held until the next commit().
+/// Output file of the HDF5 library that stays readable if the process is killed: new bytes are
+/// appended to the file, and bytes that overwrite committed ones are held until the next commit.
 ///
-/// The library does not survive a failed write, as on a full disk: it crashes when it closes the
-/// file or when the process ends. So every write succeeds for the library; callers must call
-/// check() and stop writing after an error.
+/// After a failed write, as on a full disk, the library crashes when it closes the file or when the
+/// process ends. So every write reports success to the library; callers must call check() and stop
+/// writing after an error.
 class Hdf5Output {
  public:
-  /// Overwrites an existing file. Throws std::runtime_error.
+  /// Overwrites an existing file. Throws std::system_error.
   explicit Hdf5Output(const std::filesystem::path& path);
   ~Hdf5Output();
   Hdf5Output(const Hdf5Output&) = delete;
@@ -33,10 +34,16 @@ class Hdf5Output {
   /// failure.
   Hdf5Handle create();
 
-  /// Makes the file what the library has flushed or closed.
-  void commit();
+  /// Commits what the library has flushed, in the background: syncs the new bytes, then writes the
+  /// held ones. Waits for an earlier commit.
+  void start_commit();
+  bool is_committing() const;
+  void finish_commit();
 
-  /// Throws std::runtime_error if a write failed.
+  /// Completes the file after the library has closed it.
+  void finish();
+
+  /// Throws std::system_error if a write failed.
   void check() const;
 
   // Called by the library.
@@ -51,8 +58,7 @@ class Hdf5Output {
     std::vector<std::uint8_t> bytes;
   };
 
-  std::span<const std::uint8_t> write_to_file(std::uint64_t position,
-                                              std::span<const std::uint8_t> bytes);
+  int write_committing() const;
   void hold(std::uint64_t position, std::span<const std::uint8_t> bytes);
   [[noreturn]] void fail(int error) const;
 
@@ -60,9 +66,12 @@ class Hdf5Output {
   int fd_ = -1;
   int error_ = 0;                ///< first error, as in errno
   std::uint64_t size_ = 0;       ///< as seen by the library
-  std::uint64_t committed_ = 0;  ///< size at the last commit
-  /// Writes below that size, and failed ones, which the library may read again.
+  std::uint64_t written_ = 0;    ///< size of the file
+  std::uint64_t committed_ = 0;  ///< size at the start of the last commit
+  /// Writes below committed_, and failed ones, which the library may read again.
   std::vector<Piece> held_;
+  std::vector<Piece> committing_;  ///< held pieces that the last commit writes
+  std::future<int> commit_;        ///< error of the last commit, while it runs
 };
 
 }  // namespace eventcamera

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Filters that the HDF5 library applies to chunks. They are undone here, because the library trusts
-// sizes stated in a chunk.
+// Decoders of the HDF5 filters of chunks, because those of the library trust sizes in the chunk.
 #pragma once
 
 #include <cstddef>
@@ -16,9 +15,8 @@ constexpr int lzf_filter = 32000;
 /// True for a supported filter: deflate, LZF, shuffle or Fletcher-32.
 bool is_own_hdf5_filter(int filter);
 
-/// Undoes the filters of a chunk of numbers of the given size, the last filter first. Set bits of
-/// `filter_mask` mark filters that were not applied. False if the result does not have
-/// `chunk_bytes`.
+/// Undoes the filters of a chunk of numbers with `number_bytes` each, the last filter first. Bits
+/// of `filter_mask` mark filters that were not applied. False unless the result has `chunk_bytes`.
 bool undo_hdf5_filters(std::span<const int> filters, std::uint32_t filter_mask,
                        std::size_t number_bytes, std::size_t chunk_bytes,
                        std::vector<std::uint8_t>& bytes);

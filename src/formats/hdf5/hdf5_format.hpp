@@ -2,18 +2,27 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+
+#include "src/formats/event_table.hpp"
 
 namespace eventcamera {
 
 /// Format of an HDF5 file of events.
 enum class Hdf5Format : std::uint8_t {
-  dsec,        ///< /events/{t,x,y,p} or /raw_events/{t,x,y,p}, /ms_to_idx, /t_offset
-  v2e,         ///< /events, rows of t, x, y, p
+  dsec,        ///< datasets t, x, y and p of a group; written with /ms_to_idx and /t_offset
+  v2e,         ///< /events, rows or records of t, x, y, p
   metavision,  ///< /CD/events and /EXT_TRIGGER/events, compressed with ECF
   mvsec,       ///< /davis/left/events, rows of x, y, t in seconds, p
 };
 
-/// Compression of the layouts that leave it open.
+/// Which events of a file to read, and how.
+struct Hdf5Selection {
+  std::string path = {};     ///< of a dataset or a group; empty: the first events
+  TableSettings table = {};  ///< columns are for rows without names
+};
+
+/// Compression of the DSEC layout.
 enum class Hdf5Compression : std::uint8_t { none, gzip };
 
 }  // namespace eventcamera

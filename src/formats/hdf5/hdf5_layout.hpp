@@ -13,6 +13,10 @@
 
 namespace eventcamera {
 
+/// Rows per chunk. The index has small chunks, because each commit writes the last one.
+constexpr hsize_t hdf5_chunk = 16384;
+constexpr hsize_t hdf5_index_chunk = 4096;
+
 /// Writes the datasets of one layout.
 class Hdf5Layout {
  public:
@@ -21,8 +25,9 @@ class Hdf5Layout {
   virtual bool append(std::span<const Trigger> triggers) = 0;
   virtual std::size_t label(std::span<const Label> /*labels*/) { return 0; }
 
-  /// Hands all rows to the library.
-  virtual void flush() = 0;
+  /// Passes rows to the library. Partial chunks cost time: the library compresses and writes them
+  /// again once they have more rows.
+  virtual void flush(bool with_partial_chunks) = 0;
   virtual void close() = 0;
 };
 
@@ -31,8 +36,8 @@ std::unique_ptr<Hdf5Layout> make_dsec_layout(hid_t file, SensorSize size,
                                              Hdf5Compression compression);
 std::unique_ptr<Hdf5Layout> make_metavision_layout(hid_t file, SensorSize size);
 
-/// Microseconds since the first event of a recording, of at most a week: both layouts have an index
-/// that grows with time even without events.
+/// Returns the time since the first event of a recording. Throws std::invalid_argument after a
+/// week, because the index of both layouts grows with time, even without events.
 inline Microseconds since(Microseconds first, Microseconds t) {
   constexpr Microseconds max_recording = 7LL * 24 * 3600 * 1'000'000;
   Microseconds passed = 0;

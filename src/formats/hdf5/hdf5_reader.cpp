@@ -48,25 +48,30 @@ Hdf5Handle open_source(ByteSource& bytes) {
 
 }  // namespace
 
-Hdf5Reader::Hdf5Reader(std::unique_ptr<ByteSource> bytes)
-    : Hdf5Reader([&] {
-        File file;
-        file.handle = open_source(*bytes);
-        file.bytes = std::move(bytes);
-        return file;
-      }()) {}
+Hdf5Reader::Hdf5Reader(std::unique_ptr<ByteSource> bytes, const Hdf5Selection& selection)
+    : Hdf5Reader(
+          [&] {
+            File file;
+            file.handle = open_source(*bytes);
+            file.bytes = std::move(bytes);
+            return file;
+          }(),
+          selection) {}
 
-Hdf5Reader::Hdf5Reader(ByteSource& bytes)
-    : Hdf5Reader([&] {
-        File file;
-        file.handle = open_source(bytes);
-        return file;
-      }()) {}
+Hdf5Reader::Hdf5Reader(ByteSource& bytes, const Hdf5Selection& selection)
+    : Hdf5Reader(
+          [&] {
+            File file;
+            file.handle = open_source(bytes);
+            return file;
+          }(),
+          selection) {}
 
-Hdf5Reader::Hdf5Reader(File file) : file_(std::make_unique<File>(std::move(file))) {
+Hdf5Reader::Hdf5Reader(File file, const Hdf5Selection& selection)
+    : file_(std::make_unique<File>(std::move(file))) {
   const Hdf5Session session;
   const auto id = file_->handle.get();
-  table_ = Hdf5Table::open(id);
+  table_ = Hdf5Table::open(id, selection);
   size_ = table_->size();
   has_labels_ = table_->has_labels();
   if (table_->format() == Hdf5Format::metavision) triggers_ = Hdf5Triggers::open(id);
@@ -82,6 +87,10 @@ Hdf5Reader::~Hdf5Reader() {
   file_.reset();
 }
 
+std::string Hdf5Reader::others() const {
+  return table_->others();
+}
+
 std::optional<Hdf5Reader::TimeRange> Hdf5Reader::time_range() const {
   const Hdf5Session session;
   if (table_->rows() == 0) return std::nullopt;
@@ -93,14 +102,14 @@ std::optional<Hdf5Reader::TimeRange> Hdf5Reader::time_range() const {
 
 /// Reads until there are events to return, or to the end.
 void Hdf5Reader::fill() {
-  while (taken_ == events_.size() && row_ < table_->rows()) {
+  while (returned_ == events_.size() && row_ < table_->rows()) {
     events_.clear();
-    taken_ = 0;
+    returned_ = 0;
     row_ = table_->read(row_, validator_, events_, corruption_);
     if (!not_before_) continue;
     const auto found = std::ranges::find_if(
         events_, [&](const AbsoluteEvent& event) { return event.t >= *not_before_; });
-    taken_ = static_cast<std::size_t>(found - events_.begin());
+    returned_ = static_cast<std::size_t>(found - events_.begin());
     if (found != events_.end()) not_before_.reset();
   }
 }
@@ -110,11 +119,11 @@ std::size_t Hdf5Reader::read(std::size_t count, std::vector<AbsoluteEvent>& out)
   std::size_t read = 0;
   while (read < count) {
     fill();
-    const auto part = std::min(count - read, events_.size() - taken_);
+    const auto part = std::min(count - read, events_.size() - returned_);
     if (part == 0) break;
-    const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(taken_);
+    const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(returned_);
     out.insert(out.end(), begin, begin + static_cast<std::ptrdiff_t>(part));
-    taken_ += part;
+    returned_ += part;
     read += part;
   }
   return read;
@@ -131,7 +140,7 @@ std::size_t Hdf5Reader::read_triggers(std::size_t count, std::vector<Trigger>& o
 void Hdf5Reader::seek(Microseconds t) {
   const Hdf5Session session;
   events_.clear();
-  taken_ = 0;
+  returned_ = 0;
   row_ = table_->row_before(t);
   not_before_ = t;
   if (triggers_) triggers_->seek(t);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "src/core/event.hpp"
@@ -11,6 +12,7 @@
 #include "src/formats/byte_source.hpp"
 #include "src/formats/corruption.hpp"
 #include "src/formats/event_table.hpp"
+#include "src/formats/hdf5/hdf5_format.hpp"
 
 namespace eventcamera {
 
@@ -25,9 +27,9 @@ class Hdf5Reader {
   };
 
   /// Throws UnsupportedFormat if it cannot be read.
-  explicit Hdf5Reader(std::unique_ptr<ByteSource> bytes);
+  explicit Hdf5Reader(std::unique_ptr<ByteSource> bytes, const Hdf5Selection& selection = {});
   /// `bytes` must outlive the reader.
-  explicit Hdf5Reader(ByteSource& bytes);
+  explicit Hdf5Reader(ByteSource& bytes, const Hdf5Selection& selection = {});
   ~Hdf5Reader();
   Hdf5Reader(const Hdf5Reader&) = delete;
   Hdf5Reader& operator=(const Hdf5Reader&) = delete;
@@ -37,6 +39,9 @@ class Hdf5Reader {
 
   /// True if events carry labels.
   bool has_labels() const { return has_labels_; }
+
+  /// Paths of other events in the file, for users; empty if there are none, or a path was selected.
+  std::string others() const;
 
   /// Times of the first and last event; nothing if there are none.
   std::optional<TimeRange> time_range() const;
@@ -54,7 +59,7 @@ class Hdf5Reader {
 
  private:
   struct File;
-  explicit Hdf5Reader(File file);
+  Hdf5Reader(File file, const Hdf5Selection& selection);
 
   void fill();
 
@@ -67,9 +72,9 @@ class Hdf5Reader {
   Corruption corruption_;
 
   std::uint64_t row_ = 0;              ///< next row to read
-  std::vector<AbsoluteEvent> events_;  ///< events read; the first taken_ were returned
-  std::size_t taken_ = 0;
-  std::optional<Microseconds> not_before_;  ///< set until an event was found
+  std::vector<AbsoluteEvent> events_;  ///< read; the first returned_ were returned
+  std::size_t returned_ = 0;
+  std::optional<Microseconds> not_before_;  ///< time of a seek, until its first event is found
 };
 
 }  // namespace eventcamera

@@ -10,13 +10,13 @@
 
 namespace eventcamera {
 
-/// Returns the end of the block of rows, from `row` on, that are read at once.
+/// Returns the end of the block of rows to read at once, from `row` on.
 inline std::uint64_t block_end(std::uint64_t row, std::uint64_t rows) {
   constexpr std::uint64_t block_rows = 16384;
   return std::min(rows, (row / block_rows + 1) * block_rows);
 }
 
-/// Returns the first row for which `precedes(row)`, which must be sorted, is false.
+/// Returns the first row for which `precedes(row)` is false; it must be false for all later rows.
 template <class Precedes>
 std::uint64_t first_row(std::uint64_t rows, const Precedes& precedes) {
   std::uint64_t first = 0;
@@ -29,7 +29,7 @@ std::uint64_t first_row(std::uint64_t rows, const Precedes& precedes) {
   return first;
 }
 
-/// Looks up the position for the first corruption only, because that is slow and only the first is
+/// Finds the position of the first corruption only: the search is slow, and only the first is
 /// reported.
 inline void note(Corruption& corruption, const Hdf5Dataset& dataset, std::uint64_t row,
                  const char* what) {

@@ -58,7 +58,7 @@ std::unique_ptr<Hdf5Table> open_metavision(hid_t file) {
                         ColumnOrder{0, 1, 2, 3}, TimeUnit::microseconds);
 }
 
-/// Names that belong to t, x, y and p.
+/// Names of the datasets or members with t, x, y and p.
 struct NamedColumns {
   std::array<std::string, event_columns> names;
   std::optional<TimeUnit> unit;
@@ -77,22 +77,42 @@ struct NamedColumns {
   }
 };
 
+NamedColumns named_columns(const Hdf5Dataset& events) {
+  NamedColumns columns;
+  for (const auto& member : events.members()) columns.add(member);
+  return columns;
+}
+
+bool is_row_of_numbers(const Hdf5Dataset& events) {
+  return events.rank() == 2 && events.columns() == event_columns && events.is_numbers();
+}
+
+/// Order of the columns that the user has set.
+std::optional<ColumnOrder> order_of(const Columns& columns) {
+  if (columns.empty()) return std::nullopt;
+  if (columns.size() != event_columns)
+    throw UnsupportedFormat("column-order must have four letters: HDF5 rows have four numbers");
+  ColumnOrder order = {};
+  for (std::size_t i = 0; i < event_columns; ++i) order[static_cast<std::size_t>(*columns[i])] = i;
+  return order;
+}
+
 /// Creates the table of a dataset whose rows are events: records with members t, x, y and p, or
 /// rows of four numbers. Throws UnsupportedFormat.
-std::unique_ptr<Hdf5Table> open_rows(hid_t file, const std::string& path) {
+std::unique_ptr<Hdf5Table> open_rows(hid_t file, const std::string& path,
+                                     const TableSettings& settings) {
   Hdf5Dataset events(file, path);
   auto size = size_of_attributes(file);
   if (size == SensorSize{}) size = size_of_frames(file);
-  if (const auto members = events.members(); !members.empty()) {
-    NamedColumns columns;
-    for (const auto& member : members) columns.add(member);
+  if (!events.members().empty()) {
+    const auto columns = named_columns(events);
     if (!columns.are_complete())
       throw UnsupportedFormat("HDF5 dataset /" + path + " has no members t, x, y and p");
     events.choose(columns.names);
     return make_row_table(Hdf5Format::v2e, std::move(events), path, size, ColumnOrder{0, 1, 2, 3},
-                          columns.unit);
+                          settings.unit ? settings.unit : columns.unit);
   }
-  if (events.rank() != 2 || events.columns() != event_columns || !events.is_numbers())
+  if (!is_row_of_numbers(events))
     throw UnsupportedFormat("HDF5 dataset /" + path +
                             " must hold rows of four numbers t, x, y and p");
   // MVSEC (A. Z. Zhu et al., "The Multi Vehicle Stereo Event Camera Dataset", 2018) has rows of x,
@@ -103,43 +123,46 @@ std::unique_ptr<Hdf5Table> open_rows(hid_t file, const std::string& path) {
     throw UnsupportedFormat("HDF5 dataset /" + path +
                             " must hold rows of four fractional numbers x, y, t and p");
   if (size == SensorSize{} && is_mvsec) size = {346, 260};
-  std::optional<ColumnOrder> order;
-  if (is_mvsec) order = ColumnOrder{2, 0, 1, 3};
-  if (events.is_integers()) order = ColumnOrder{0, 1, 2, 3};  // v2e
-  std::optional<TimeUnit> unit;
-  if (is_mvsec) unit = TimeUnit::seconds;
+  auto order = order_of(settings.columns);
+  if (!order && is_mvsec) order = ColumnOrder{2, 0, 1, 3};
+  if (!order && events.is_integers()) order = ColumnOrder{0, 1, 2, 3};  // v2e
+  auto unit = settings.unit;
+  if (!unit && is_mvsec) unit = TimeUnit::seconds;
   return make_row_table(is_mvsec ? Hdf5Format::mvsec : Hdf5Format::v2e, std::move(events), path,
                         size, order, unit);
 }
 
-/// Searches a file for events.
+/// Searches a group of a file for events.
 class EventSearch {
  public:
-  explicit EventSearch(hid_t file) : file_(file) {}
-
-  /// Returns the events of the first group that has some, of those closest to the root. Throws
-  /// UnsupportedFormat.
-  std::unique_ptr<Hdf5Table> find() {
-    for (std::vector<std::string> groups = {""}; !groups.empty();) {
+  /// `group` is empty for the root, or ends with a slash.
+  EventSearch(hid_t file, const std::string& group, const TableSettings& settings)
+      : file_(file), settings_(settings) {
+    for (std::vector<std::string> groups = {group}; !groups.empty();) {
       std::vector<std::string> next;
-      for (const auto& group : groups)
-        if (auto table = find_in(group, next)) return table;
+      for (const auto& candidate : groups) look_into(candidate, next);
       groups = ++depth_ < max_depth ? std::move(next) : std::vector<std::string>();
     }
-    if (!cause_.empty()) throw UnsupportedFormat(cause_);
-    throw UnsupportedFormat(
-        "no events in the HDF5 file: it needs four datasets of a group that are named t, x, y and "
-        "p "
-        "(or xs, timestamp, polarity and the like), or one named events, with these members or "
-        "columns");
   }
+
+  /// Returns the events of the first group that has some, of those closest to `group`. Null if
+  /// there are none.
+  std::unique_ptr<Hdf5Table> table() { return std::move(table_); }
+
+  /// Error of the first dataset with events in its name; empty if there is none.
+  const std::string& cause() const { return cause_; }
+
+  /// Paths of the first events, and of the others.
+  const std::string& path() const { return path_; }
+  const std::string& others() const { return others_; }
 
  private:
   static constexpr int max_depth = 6;
   static constexpr std::size_t max_links = 4096;
+  static constexpr std::size_t max_others = 8;
 
-  /// Returns the events of a group, or else appends its groups to `next`.
-  std::unique_ptr<Hdf5Table> find_in(const std::string& group, std::vector<std::string>& next) {
+  /// Looks for events in a group, and appends its groups to `next`.
+  void look_into(const std::string& group, std::vector<std::string>& next) {
     NamedColumns columns;
     std::vector<std::string> rows;
     for (const auto& name : names_in(group)) {
@@ -152,16 +175,34 @@ class EventSearch {
       else if (column_named(name) && Hdf5Dataset::exists(file_, path, H5O_TYPE_DATASET))
         columns.add(name);
     }
-    // Events of a right camera are after those of a left one, in the order of names.
-    if (columns.are_complete()) return make_dsec_table(file_, {group, columns.names, columns.unit});
+    // Names are sorted, so a left camera comes before a right one.
+    if (columns.are_complete()) {
+      if (!table_)
+        table_ = make_dsec_table(file_, {group, columns.names, columns.unit, settings_.unit});
+      add_path(group.substr(0, group.size() - (group.empty() ? 0 : 1)));
+      return;
+    }
     for (const auto& path : rows) {
       try {
-        return open_rows(file_, path);
+        if (!table_)
+          table_ = open_rows(file_, path, settings_);
+        else if (const Hdf5Dataset events(file_, path);
+                 !is_row_of_numbers(events) && !named_columns(events).are_complete())
+          continue;
+        add_path(path);
       } catch (const UnsupportedFormat& error) {
         if (cause_.empty()) cause_ = error.what();
       }
     }
-    return nullptr;
+  }
+
+  void add_path(const std::string& path) {
+    if (count_++ == 0)
+      path_ = "/" + path;
+    else if (count_ <= max_others + 1)
+      others_ += (others_.empty() ? "/" : ", /") + path;
+    else if (count_ == max_others + 2)
+      others_ += ", …";
   }
 
   std::vector<std::string> names_in(const std::string& group) {
@@ -180,10 +221,30 @@ class EventSearch {
   }
 
   hid_t file_;
+  const TableSettings& settings_;
+  std::unique_ptr<Hdf5Table> table_;
+  std::string path_, others_;
+  std::size_t count_ = 0;  ///< events found
   int depth_ = 0;
   std::size_t links_ = 0;
-  std::string cause_;  ///< what was wrong with the first dataset that may be one of events
+  std::string cause_;
 };
+
+/// Opens the events at a path that the user has set.
+std::unique_ptr<Hdf5Table> open_path(hid_t file, const std::string& path,
+                                     const TableSettings& settings) {
+  if (Hdf5Dataset::exists(file, path, H5O_TYPE_DATASET)) return open_rows(file, path, settings);
+  if (Hdf5Dataset::exists(file, path, H5O_TYPE_GROUP)) {
+    EventSearch search(file, path + "/", settings);
+    if (auto table = search.table()) return table;
+  }
+  const EventSearch everywhere(file, "", settings);
+  const auto& others = everywhere.others();
+  throw UnsupportedFormat(
+      "the HDF5 file has no events at events-path /" + path +
+      (everywhere.path().empty() ? "" : "; it has some at " + everywhere.path()) +
+      (others.empty() ? "" : ", ") + others);
+}
 
 }  // namespace
 
@@ -192,7 +253,7 @@ SensorSize size_of_attributes(hid_t object) {
   const auto height = read_number_attribute(object, "height");
   if (width && height && is_side(*width) && is_side(*height))
     return {static_cast<int>(*width), static_cast<int>(*height)};
-  // Some tools state the height first; no sensor is upright.
+  // Some tools state the height first; sensors are wider than high.
   for (const char* const name :
        {"sensor_resolution", "sensor_size", "sensor_shape", "resolution"}) {
     const auto pair = read_pair_attribute(object, name);
@@ -203,9 +264,24 @@ SensorSize size_of_attributes(hid_t object) {
   return {};
 }
 
-std::unique_ptr<Hdf5Table> Hdf5Table::open(hid_t file) {
-  if (Hdf5Dataset::exists(file, "CD/events", H5O_TYPE_DATASET)) return open_metavision(file);
-  return EventSearch(file).find();
+std::unique_ptr<Hdf5Table> Hdf5Table::open(hid_t file, const Hdf5Selection& selection) {
+  const auto begin = std::min(selection.path.find_first_not_of('/'), selection.path.size());
+  const auto path = selection.path.substr(begin, selection.path.find_last_not_of('/') + 1 - begin);
+  const bool is_metavision = path.empty() || path == "CD" || path == "CD/events";
+  if (is_metavision && Hdf5Dataset::exists(file, "CD/events", H5O_TYPE_DATASET))
+    return open_metavision(file);
+  if (!path.empty()) return open_path(file, path, selection.table);
+  EventSearch search(file, "", selection.table);
+  auto table = search.table();
+  if (table) {
+    table->others_ = search.others();
+    return table;
+  }
+  if (!search.cause().empty()) throw UnsupportedFormat(search.cause());
+  throw UnsupportedFormat(
+      "no events in the HDF5 file: it needs four datasets of a group that are named t, x, y and p "
+      "(or xs, timestamp, polarity and the like), or one named events, with these members or "
+      "columns");
 }
 
 }  // namespace eventcamera

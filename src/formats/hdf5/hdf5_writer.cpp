@@ -23,11 +23,10 @@ struct Hdf5Writer::File {
 
 namespace {
 
-/// Limits of the number of events between two commits, and its share of all events: a crash or a
-/// full disk costs a fifth of them. More commits would cost time, since each waits for the disk.
-constexpr std::size_t min_uncommitted = std::size_t{1} << 15;
+/// A commit follows a tenth more events, or this many. A crash or a full disk loses at most the
+/// events of two commits, since the last one may be incomplete.
+constexpr std::size_t new_share = 10;
 constexpr std::size_t max_uncommitted = std::size_t{1} << 20;
-constexpr std::size_t uncommitted_share = 4;
 
 void check(const Hdf5Writer::Settings& settings) {
   const auto [width, height] = settings.size;
@@ -76,11 +75,15 @@ void Hdf5Writer::append(std::span<const AbsoluteEvent> events) {
   }
   layout_->append(events);
   file_->output.check();
-  uncommitted_ += events.size();
-  const auto many =
-      std::clamp(committed_events_ / uncommitted_share, min_uncommitted, max_uncommitted);
-  const bool is_due = Clock::now() - committed_ >= commit_interval_ || uncommitted_ >= many;
-  if (commit_interval_.count() > 0 && is_due) commit();
+  events_ += events.size();
+  if (commit_interval_.count() == 0) return;
+  const auto complete = events_ / hdf5_chunk * hdf5_chunk;
+  const auto max_new =
+      std::clamp<std::size_t>(committed_events_ / new_share, hdf5_chunk, max_uncommitted);
+  if (Clock::now() - committed_ >= commit_interval_ && !file_->output.is_committing())
+    start_commit(true);
+  else if (complete >= committed_events_ + max_new)
+    start_commit(false);
 }
 
 std::size_t Hdf5Writer::label(std::span<const Label> labels) {
@@ -99,12 +102,18 @@ bool Hdf5Writer::append(std::span<const Trigger> triggers) {
 
 void Hdf5Writer::commit() {
   const Hdf5Session session;
-  layout_->flush();
-  require(H5Fflush(file_->handle.get(), H5F_SCOPE_GLOBAL) >= 0);
-  file_->output.commit();
+  start_commit(true);
+  file_->output.finish_commit();
   file_->output.check();
-  committed_ = Clock::now();
-  committed_events_ += std::exchange(uncommitted_, 0);
+}
+
+void Hdf5Writer::start_commit(bool with_partial_chunks) {
+  layout_->flush(with_partial_chunks);
+  require(H5Fflush(file_->handle.get(), H5F_SCOPE_GLOBAL) >= 0);
+  file_->output.start_commit();
+  file_->output.check();
+  if (with_partial_chunks) committed_ = Clock::now();
+  committed_events_ = with_partial_chunks ? events_ : events_ / hdf5_chunk * hdf5_chunk;
 }
 
 void Hdf5Writer::close() {
@@ -115,7 +124,7 @@ void Hdf5Writer::close() {
   layout->close();
   layout.reset();
   file_->handle = {};
-  file_->output.commit();
+  file_->output.finish();
   file_->output.check();
 }
 

@@ -39,13 +39,13 @@ class Hdf5Writer {
   Hdf5Writer(const Hdf5Writer&) = delete;
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
 
-  /// Events must be sorted by time and within the sensor. Commits, too, if the last commit was
-  /// `commit_interval` or many events ago.
+  /// Events must be sorted by time and within the sensor. Starts a commit if the last one was
+  /// `commit_interval` or a tenth of the events ago.
   void append(std::span<const AbsoluteEvent> events);
 
-  /// Labels the next events, one for each, before these are appended. The DSEC layout stores the
-  /// labels as events/cause and events/class, 0 for events without; the other has none. Returns the
-  /// number of stored labels.
+  /// Sets the labels of the next events to append, one each. The DSEC layout stores them as
+  /// events/cause and events/class, with 0 for events without a label; Metavision drops them.
+  /// Returns the number of stored labels.
   std::size_t label(std::span<const Label> labels);
 
   /// False for the DSEC layout, which has no triggers.
@@ -55,6 +55,8 @@ class Hdf5Writer {
   void close();
 
  private:
+  void start_commit(bool with_partial_chunks);
+
   using Clock = std::chrono::steady_clock;
   struct File;
 
@@ -63,9 +65,9 @@ class Hdf5Writer {
   std::unique_ptr<File> file_;
   std::unique_ptr<Hdf5Layout> layout_;
   Microseconds latest_ = INT64_MIN;
-  Clock::time_point committed_{};  ///< time of the last commit
+  Clock::time_point committed_{};  ///< time of the last commit of all events
+  std::size_t events_ = 0;
   std::size_t committed_events_ = 0;
-  std::size_t uncommitted_ = 0;
 };
 
 }  // namespace eventcamera

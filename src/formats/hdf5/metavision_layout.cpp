@@ -25,13 +25,13 @@ Hdf5Handle make_compound(std::size_t size, std::initializer_list<Member> members
   return type;
 }
 
-/// Index of the first event to read for each 2 ms since the first event. Compressed, because it
-/// grows in pauses, too: 691 MB a day.
+/// Index of the first event to read for each 2 ms since the first event. Compressed, because a
+/// pause of a day takes 691 MB.
 class MetavisionIndex {
  public:
   explicit MetavisionIndex(hid_t group)
       : type_(make_type()),
-        out_(group, "indexes", type_.get(), type_.get(), chunk, Hdf5Compression::gzip) {}
+        out_(group, "indexes", type_.get(), type_.get(), hdf5_index_chunk, Hdf5Compression::gzip) {}
 
   void add(std::uint64_t id, Microseconds t) {
     if (!first_) {
@@ -56,7 +56,6 @@ class MetavisionIndex {
   }
 
  private:
-  static constexpr hsize_t chunk = 16384;
   static constexpr Microseconds period = 2000;
 
   struct Entry {
@@ -83,9 +82,9 @@ class MetavisionLayout final : public Hdf5Layout {
         trigger_(make_group(file, "EXT_TRIGGER")),
         event_type_(make_event_type()),
         trigger_type_(make_trigger_type()),
-        events_out_(cd_.get(), "events", event_type_.get(), event_type_.get(), chunk,
+        events_out_(cd_.get(), "events", event_type_.get(), event_type_.get(), hdf5_chunk,
                     Hdf5Compression::none, ecf_filter),
-        triggers_(trigger_.get(), "events", trigger_type_.get(), trigger_type_.get(), chunk,
+        triggers_(trigger_.get(), "events", trigger_type_.get(), trigger_type_.get(), hdf5_chunk,
                   Hdf5Compression::none),
         event_index_(cd_.get()),
         trigger_index_(trigger_.get()) {
@@ -102,9 +101,9 @@ class MetavisionLayout final : public Hdf5Layout {
     for (const auto& event : events) {
       event_index_.add(complete_ + events_.size(), event.t);
       events_.push_back(event);
-      if (events_.size() < chunk) continue;
+      if (events_.size() < hdf5_chunk) continue;
       write_chunk();
-      complete_ += chunk;
+      complete_ += hdf5_chunk;
       events_.clear();
     }
   }
@@ -121,22 +120,20 @@ class MetavisionLayout final : public Hdf5Layout {
     return true;
   }
 
-  void flush() override {
-    write_chunk();
+  void flush(bool with_partial_chunks) override {
+    if (with_partial_chunks) write_chunk();
     triggers_.flush();
     event_index_.flush();
     trigger_index_.flush();
   }
 
   void close() override {
-    flush();
+    flush(true);
     event_index_.close();
     trigger_index_.close();
   }
 
  private:
-  static constexpr hsize_t chunk = 16384;
-
   /// Memory layout of Metavision events.
   struct EventRow {
     std::uint16_t x, y;

@@ -49,13 +49,12 @@ TimeUnit NumberTable::detect(const TableSample& sample, const Columns& columns,
   unit = sample.find_unit(columns, false);
   if (!unit)
     throw UnsupportedFormat("the time unit of the HDF5 dataset " + path +
-                            " is ambiguous; rename the times to t_s, t_us or t_ns, or convert them "
-                            "to text or NumPy, whose readers have time-unit");
+                            " is ambiguous; set time-unit, or name the times t_s, t_us or t_ns");
   return *unit;
 }
 
 std::uint64_t NumberTable::row_before(Microseconds t) {
-  // An unreadable row counts as late, so that no event is skipped.
+  // Treats unreadable rows as late, so that no event is skipped.
   return first_row(rows_, [&](std::uint64_t row) {
     const auto time = time_at(row);
     return time && *time < t;
@@ -76,14 +75,14 @@ Microseconds NumberTable::unwrapped(std::uint64_t row, std::int64_t number) {
   return clock.follow(static_cast<std::uint32_t>(number));
 }
 
-/// Time of a row as the file has it.
+/// Time of a row as stored in the file.
 std::optional<std::int64_t> NumberTable::time_number(std::uint64_t row) {
   std::vector<std::int64_t> numbers;
   if (!t_dataset().read(row, 1, numbers)) return std::nullopt;
   return numbers[t_column()];
 }
 
-/// Follows the clock through rows that must be less than about half an hour apart.
+/// Samples the clock along the file. Samples must be less than half a wrap, 35 minutes, apart.
 void NumberTable::read_samples() {
   constexpr std::uint64_t max_samples = 256;
   const auto steps = std::clamp<std::uint64_t>(rows_, 2, max_samples) - 1;

@@ -13,7 +13,7 @@
 
 namespace eventcamera {
 
-/// Base of layouts with events as plain numbers.
+/// Base of tables whose events are plain numbers.
 class NumberTable : public Hdf5Table {
  public:
   std::uint64_t read(std::uint64_t row, RowValidator& validator, std::vector<AbsoluteEvent>& out,
@@ -32,20 +32,20 @@ class NumberTable : public Hdf5Table {
   /// be read, or nullptr.
   virtual const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) = 0;
 
-  /// Number of rows to detect what the numbers mean.
+  /// Number of rows to sample for detection.
   std::uint64_t sample_rows() const {
     return std::min<std::uint64_t>(rows_, TableSample::max_binary_rows);
   }
 
-  /// Detects the polarities of these columns, and returns the time unit unless it is known. Throws
-  /// UnsupportedFormat if they do not tell.
+  /// Detects the meaning of the polarities, and the time unit unless `unit` is set, which it
+  /// returns. Throws UnsupportedFormat if either is ambiguous.
   TimeUnit detect(const TableSample& sample, const Columns& columns, std::optional<TimeUnit> unit,
                   bool are_floating, const std::string& path);
 
   /// First row after the chunk of this row.
   virtual std::uint64_t chunk_end(std::uint64_t row) const = 0;
 
-  /// Time of the row with this number, before the offset is added.
+  /// Unwraps the time of a row, `number`; without the offset.
   virtual Microseconds unwrapped(std::uint64_t row, std::int64_t number);
 
   PolarityCode polarities_;
@@ -63,7 +63,7 @@ class NumberTable : public Hdf5Table {
   std::optional<std::int64_t> time_number(std::uint64_t row);
   void read_samples();
 
-  std::vector<Sample> samples_;  ///< once they are needed
+  std::vector<Sample> samples_;  ///< read on first use
   std::uint64_t next_row_ = 0;
   Clock clock_;  ///< before next_row_
 };

@@ -32,12 +32,12 @@ class RowTable final : public NumberTable {
       const auto found = sample.find_columns();
       if (!found || found->size() != event_columns)
         throw UnsupportedFormat("unknown columns in the HDF5 dataset " + path +
-                                "; store datasets named t, x, y and p");
+                                "; set column-order, or store datasets named t, x, y and p");
       columns = *found;
     }
     for (std::size_t i = 0; i < event_columns; ++i)
       order_[static_cast<std::size_t>(*columns[i])] = i;
-    if (events_.rank() == 2 && events_.is_unsigned_32()) unit = TimeUnit::microseconds;
+    if (!unit && events_.rank() == 2 && events_.is_unsigned_32()) unit = TimeUnit::microseconds;
     const auto detected = detect(sample, columns, unit, !events_.is_integers(), path);
     events_.set_unit(order_[0], detected);
     wraps_ = events_.rank() == 2 && events_.is_unsigned_32() && detected == TimeUnit::microseconds;

@@ -10,7 +10,7 @@
 
 namespace eventcamera {
 
-/// Columns of rows, by their place: t, x, y and p.
+/// Column numbers of t, x, y and p.
 using ColumnOrder = std::array<std::size_t, event_columns>;
 
 /// Creates the table of a dataset with the numbers of each event in a row: v2e, MVSEC, Metavision

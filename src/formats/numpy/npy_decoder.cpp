@@ -201,7 +201,7 @@ void NpyDecoder::find_layout(std::span<const std::uint8_t> elements) {
 void NpyDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
   if (bytes.empty()) return;
   if (!header_) {
-    auto header = preamble_.take(bytes);
+    auto header = preamble_.read(bytes);
     if (!header) return;
     begin(*std::move(header));
   }

@@ -32,6 +32,7 @@ class NpyDecoder final : public EventDecoder {
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
   void finish(Decoded& out) override;
+  bool is_table() const override { return true; }
   void decode_tail(ByteSource& source, Decoded& out) const override;
 
  private:

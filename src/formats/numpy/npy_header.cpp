@@ -20,7 +20,7 @@ class Literal {
   explicit Literal(std::string_view text) : rest_(text) {}
 
   /// Consumes `mark` if it is next.
-  bool take(char mark) {
+  bool accept(char mark) {
     skip_blanks();
     if (!rest_.starts_with(mark)) return false;
     rest_.remove_prefix(1);
@@ -28,15 +28,15 @@ class Literal {
   }
 
   void expect(char mark) {
-    if (!take(mark)) fail();
+    if (!accept(mark)) fail();
   }
 
   /// Calls element(), which must parse one, for each element of a list up to its `end`.
   template <class Element>
   void elements(char end, const Element& element) {
-    while (!take(end)) {
+    while (!accept(end)) {
       element();
-      if (take(',')) continue;
+      if (accept(',')) continue;
       expect(end);
       return;
     }
@@ -150,7 +150,7 @@ std::optional<NpyField> number_of(const Type& type, std::uint32_t offset) {
 
 /// Parses the name of a field, which a title may precede: 'x' or ('title', 'x').
 std::string_view read_name(Literal& literal) {
-  if (!literal.take('(')) return literal.string();
+  if (!literal.accept('(')) return literal.string();
   literal.string();
   literal.expect(',');
   const auto name = literal.string();
@@ -181,10 +181,10 @@ void read_fields(Literal& literal, NpyHeader& header) {
     const auto type = read_type(literal.string());
     std::uint64_t bytes = type.bytes;
     bool one = true;
-    if (literal.take(',') && literal.take('(')) {
+    if (literal.accept(',') && literal.accept('(')) {
       one = false;
       bytes = read_bytes(literal, bytes);
-      literal.take(',');
+      literal.accept(',');
     }
     literal.expect(')');
 
@@ -288,39 +288,38 @@ std::string npy_preamble(std::string_view dictionary) {
   return text;
 }
 
-std::optional<NpyHeader> NpyPreamble::take(std::span<const std::uint8_t>& bytes) {
+std::optional<NpyHeader> NpyPreamble::read(std::span<const std::uint8_t>& bytes) {
   constexpr std::size_t max_header = 65536;
   constexpr std::size_t version_end = npy_magic.size() + 2;
-  if (taken_.empty() && bytes.empty()) return std::nullopt;
+  if (read_.empty() && bytes.empty()) return std::nullopt;
   // Bytes needed to determine the next size.
   std::size_t needed = version_end;
-  const auto take = [&] {
-    if (needed > taken_.size()) {
-      const auto count = std::min(needed - taken_.size(), bytes.size());
-      taken_.insert(taken_.end(), bytes.begin(),
-                    bytes.begin() + static_cast<std::ptrdiff_t>(count));
+  const auto collect = [&] {
+    if (needed > read_.size()) {
+      const auto count = std::min(needed - read_.size(), bytes.size());
+      read_.insert(read_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count));
       bytes = bytes.subspan(count);
     }
-    return taken_.size() >= needed;
+    return read_.size() >= needed;
   };
-  const bool long_enough = take();
-  const auto known = std::min(taken_.size(), npy_magic.size());
-  if (std::memcmp(taken_.data(), npy_magic.data(), known) != 0)
+  const bool long_enough = collect();
+  const auto known = std::min(read_.size(), npy_magic.size());
+  if (std::memcmp(read_.data(), npy_magic.data(), known) != 0)
     throw UnsupportedFormat("not a NumPy file");
   if (!long_enough) return std::nullopt;
-  const int version = taken_[npy_magic.size()];
+  const int version = read_[npy_magic.size()];
   if (version < 1 || version > 3)
     throw UnsupportedFormat("unsupported NumPy version " + std::to_string(version));
   needed += version == 1 ? 2 : 4;
-  if (!take()) return std::nullopt;
+  if (!collect()) return std::nullopt;
   const std::size_t length = version == 1
-                                 ? little_endian<std::uint16_t>(taken_.data() + version_end)
-                                 : little_endian<std::uint32_t>(taken_.data() + version_end);
+                                 ? little_endian<std::uint16_t>(read_.data() + version_end)
+                                 : little_endian<std::uint32_t>(read_.data() + version_end);
   const auto header_begin = needed;
   if (length > max_header) throw UnsupportedFormat("NumPy header too long");
   needed += length;
-  if (!take()) return std::nullopt;
-  return read_npy_header({reinterpret_cast<const char*>(taken_.data()) + header_begin, length});
+  if (!collect()) return std::nullopt;
+  return read_npy_header({reinterpret_cast<const char*>(read_.data()) + header_begin, length});
 }
 
 }  // namespace eventcamera

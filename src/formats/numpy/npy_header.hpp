@@ -53,13 +53,13 @@ class NpyPreamble {
  public:
   /// Consumes the preamble from the front of `bytes`. Returns nothing until it is complete. Throws
   /// UnsupportedFormat.
-  std::optional<NpyHeader> take(std::span<const std::uint8_t>& bytes);
+  std::optional<NpyHeader> read(std::span<const std::uint8_t>& bytes);
 
   /// Bytes consumed so far.
-  std::size_t size() const { return taken_.size(); }
+  std::size_t size() const { return read_.size(); }
 
  private:
-  std::vector<std::uint8_t> taken_;
+  std::vector<std::uint8_t> read_;
 };
 
 }  // namespace eventcamera

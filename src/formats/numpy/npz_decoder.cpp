@@ -50,7 +50,7 @@ ArrayFile open_array(ZipArchive& archive, std::size_t index) {
     std::span<const std::uint8_t> bytes = std::span(block).first(count.value_or(0));
     if (bytes.empty())
       throw UnsupportedFormat(archive.names()[index] + " in the NumPy archive has no header");
-    if (auto header = preamble.take(bytes))
+    if (auto header = preamble.read(bytes))
       return {std::move(entry), *std::move(header), {bytes.begin(), bytes.end()}};
   }
 }
@@ -328,6 +328,8 @@ class NpzDecoder final : public Decoder {
     static const Corruption none;
     return archive_ ? archive_->corruption() : none;
   }
+
+  bool is_table() const override { return true; }
 
   /// Arrays can only be decompressed from their start.
   std::optional<SeekPoint> seek_point_before(Microseconds /*t*/) const override {

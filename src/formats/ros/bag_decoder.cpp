@@ -185,7 +185,7 @@ void BagDecoder::restart(const SeekPoint& seek_point) {
   file_->restart(seek_point);
   for (auto& topic : topics_) topic->restart();
   decoding_.reset();
-  events_due_ = finished_ = false;
+  events_due_ = false;
 }
 
 bool BagDecoder::knows_all_streams() const {
@@ -222,7 +222,7 @@ std::optional<Microseconds> BagDecoder::decoded_last_time() {
 
   std::vector<Chunker> times;  // reject erroneous times
   std::optional<Microseconds> last;
-  const auto take = [&] {
+  const auto read_items = [&] {
     while (const auto item = tail.next()) {
       const auto* const some = std::get_if<EventItem>(&*item);
       const auto* const frame = std::get_if<FrameItem>(&*item);
@@ -244,9 +244,9 @@ std::optional<Microseconds> BagDecoder::decoded_last_time() {
     if (!count || *count == 0) break;
     position += *count;
     tail.push(std::span(bytes).first(*count));
-    take();
+    read_items();
   }
-  if (reads_itself) take();
+  if (reads_itself) read_items();
   for (auto& stream : times) {
     stream.finish();
     if (stream.first()) last = std::max(last.value_or(stream.latest()), stream.latest());
@@ -254,9 +254,9 @@ std::optional<Microseconds> BagDecoder::decoded_last_time() {
   return last;
 }
 
-std::string BagDecoder::unread_topics() const {
+UnreadStreams BagDecoder::unread_streams() const {
   if (unread_.empty()) return {};
-  return "topics " + listed(unread_);
+  return {.names = "topics " + listed(unread_), .property = "topics"};
 }
 
 /// Throws UnsupportedFormat if the file ended without a topic to read.

@@ -37,7 +37,7 @@ class BagDecoder final : public Decoder {
   bool knows_all_streams() const override;
   std::optional<SeekPoint> first_of(std::size_t stream) const override;
   std::string format_name() const override { return format_name_; }
-  std::string unread_topics() const override;
+  UnreadStreams unread_streams() const override;
 
  private:
   void choose_format(std::span<const std::uint8_t> start);

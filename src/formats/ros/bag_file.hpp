@@ -79,7 +79,7 @@ class BagFile {
   static constexpr std::size_t max_name = 1024;
 
   /// `position`: of the record or row that states the topic.
-  std::optional<std::size_t> take(const BagTopic& topic, std::uint64_t position) {
+  std::optional<std::size_t> add(const BagTopic& topic, std::uint64_t position) {
     if (std::max(topic.name.size(), topic.type.size()) <= max_name) return add_topic_(topic);
     corruption_.note(position, "a topic with an overlong name");
     return std::nullopt;

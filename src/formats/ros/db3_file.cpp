@@ -51,7 +51,7 @@ void Db3File::read_topics() {
     BagTopic topic{rows.text(1), ros1_type(rows.text(2)), {}};
     if (rows.text(3) == "cdr") topic.serialization = RosSerialization::cdr;
     const auto id = rows.integer(0);
-    topics_[id] = take(topic, 0);
+    topics_[id] = add(topic, 0);
   }
   auto first = database_->query(message_after, before_all);
   if (first.next()) first_id_ = first.integer(0);

@@ -181,7 +181,7 @@ void McapFile::add_channel(ByteCursor content, std::uint64_t position) {
   if (schema != schemas_.end()) topic.type = ros1_type(schema->second);
   if (encoding == "cdr") topic.serialization = RosSerialization::cdr;
   if (encoding == "ros1") topic.serialization = RosSerialization::ros1;
-  channels_[id] = take(topic, position);
+  channels_[id] = add(topic, position);
 }
 
 std::optional<BagMessage> McapFile::message_of(ByteCursor content, std::uint64_t position) {

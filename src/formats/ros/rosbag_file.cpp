@@ -173,9 +173,9 @@ std::optional<BagMessage> RosbagFile::read_record(Bytes bytes, std::uint64_t pos
     if (known != connections_.end() || connections_.size() == max_topics) return std::nullopt;
     const HeaderFields of_connection(record.data);
     connections_[*connection] =
-        take({std::string(record.header.value("topic")),
-              ros1_type(std::string(of_connection.value("type"))), RosSerialization::ros1},
-             position);
+        add({std::string(record.header.value("topic")),
+             ros1_type(std::string(of_connection.value("type"))), RosSerialization::ros1},
+            position);
     return std::nullopt;
   }
   const auto logged = record.header.time("time");

@@ -42,7 +42,7 @@ std::unique_ptr<TopicDecoder> make_topic_decoder(const BagTopic& topic, Corrupti
 }
 
 void TopicDecoder::set_size(std::uint32_t width, std::uint32_t height) {
-  if (!std::exchange(size_taken_, true) && is_side(width) && is_side(height))
+  if (!std::exchange(size_known_, true) && is_side(width) && is_side(height))
     size_ = {static_cast<int>(width), static_cast<int>(height)};
 }
 

@@ -54,7 +54,7 @@ class TopicDecoder {
   SensorSize size_;
 
  private:
-  bool size_taken_ = false;
+  bool size_known_ = false;
 };
 
 /// Content of the messages of a type; `other` if it is not decoded.

@@ -156,7 +156,7 @@ std::size_t CsvDecoder::append_head(std::string_view text) {
 }
 
 /// Returns the fields of a line, without their quotes; none if there are too many. An empty last
-/// one is left out: some programs end lines with a separator.
+/// one is ignored: some programs end lines with a separator.
 std::size_t CsvDecoder::split(std::string_view line, bool are_names, Fields& fields) {
   std::size_t count = 0;
   line = trimmed(line);

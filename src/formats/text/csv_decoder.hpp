@@ -42,6 +42,7 @@ class CsvDecoder final : public EventDecoder {
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
   void finish(Decoded& out) override;
+  bool is_table() const override { return true; }
 
   /// True if the first line names the columns t, x, y and p.
   bool has_names() const { return has_names_; }

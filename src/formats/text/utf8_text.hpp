@@ -13,7 +13,7 @@ namespace eventcamera {
 /// other text is left as it is. Characters past U+FFFF become question marks.
 class Utf8Text {
  public:
-  /// Returns the text of `bytes`, which is in `converted` unless it is that of `bytes`.
+  /// Returns `bytes` as UTF-8; the text is valid as long as `bytes` and `converted`.
   std::string_view text_of(std::span<const std::uint8_t> bytes, std::string& converted) {
     if (encoding_ == Encoding::unknown) {
       start_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Frames without motion blur equal their plain reference, are closer to the light in the middle of
+// the exposure, and give the events of sharp frames.
+#include "src/dvs/motion_deblur.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <string>
+#include <tuple>
+
+#include "src/core/thread_pool.hpp"
+#include "src/dvs/dvs_settings.hpp"
+#include "tests/core/targets.hpp"
+#include "tests/dvs/playback.hpp"
+#include "tests/reference/dvs.hpp"
+#include "tests/simulate/scene.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+Image<Flow> flow_of(int width, int height, float length) {
+  Image<Flow> flow(width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      flow.at(x, y) = {length * std::sin(0.05F * static_cast<float>(x - y)),
+                       length * std::cos(0.03F * static_cast<float>(x + y))};
+  flow.at(width / 2, height / 2) = {std::numeric_limits<float>::quiet_NaN(), 1};
+  return flow;
+}
+
+template <class Pixel>
+void compare_to_reference(int width, int height, float length, int bits) {
+  const auto frame = scene::texture<Pixel>(width, height, bits, 3, 1);
+  const auto flow = flow_of(width, height, length);
+  const double white = (1 << bits) - 1;
+  ThreadPool threads;
+  MotionDeblur deblur(width, height);
+  for (const bool at_end : {false, true}) {
+    deblur.set_motion(flow.view(), 0.8, at_end, threads);
+    const auto expected = reference::deblurred(
+        frame, bits,
+        MotionDeblur::iterations, [&](int x, int y) -> auto& { return deblur.path(x, y); });
+    Image<Pixel> first;
+    targets::for_each([&](const char* target) {
+      SCOPED_TRACE(std::string(target) + " " + std::to_string(width) + " " +
+                   std::to_string(length));
+      for (const int count : {1, 3}) {
+        threads.set_threads(count);
+        auto sharp = frame;
+        deblur.sharpen(sharp, bits, threads);
+        if (first.width() == 0) first = sharp;
+        for (int y = 0; y < height; ++y)
+          for (int x = 0; x < width; ++x) {
+            ASSERT_EQ(sharp.at(x, y), first.at(x, y)) << x << " " << y;
+            ASSERT_NEAR(sharp.at(x, y), expected.at(x, y) / 255 * white, 0.5 + white / 10000)
+                << x << " " << y;
+          }
+      }
+    });
+  }
+}
+
+TEST(MotionDeblur, IsItsDefinitionOnAllTargets) {
+  for (const auto& [width, height, length] :
+       {std::tuple{1, 1, 3.0F}, {3, 5, 2.0F}, {17, 9, 5.0F}, {61, 33, 12.0F}, {40, 90, 100.0F}})
+    compare_to_reference<std::uint8_t>(width, height, length, 8);
+  compare_to_reference<std::uint16_t>(50, 21, 7, 12);
+}
+
+TEST(MotionDeblur, FollowsTheFlow) {
+  constexpr int width = 64;
+  constexpr int height = 20;
+  // The left half of the earlier frame moves right by 16, and covers the right one.
+  Image<Flow> flow(width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < 32; ++x) flow.at(x, y) = {16, -4};
+  ThreadPool threads;
+  MotionDeblur deblur(width, height);
+  const auto expect = [&](int x, float dx, float dy, float length) {
+    const auto& path = deblur.path(x, 10);
+    EXPECT_EQ(path.dx, dx) << x;
+    EXPECT_EQ(path.dy, dy) << x;
+    EXPECT_EQ(path.length, length) << x;
+  };
+  deblur.set_motion(flow.view(), 0.5, false, threads);
+  expect(25, 1, -0.25F, 8);
+  expect(33, 0, 0, 1);
+  deblur.set_motion(flow.view(), 0.5, true, threads);
+  expect(25, 1, -0.25F, 8);
+  expect(60, 0, 0, 1);
+  deblur.set_motion(flow.view(), 0.05, false, threads);
+  expect(25, 0, 0, 1);  // less than a pixel
+  flow.at(20, 10) = {0, -1000};
+  deblur.set_motion(flow.view(), 1, false, threads);
+  expect(20, 0, -1, MotionDeblur::max_length);
+}
+
+/// A texture that moves by (length, length / 3) during an exposure, in grey levels.
+Image<std::uint8_t> exposed(double left, double length) {
+  constexpr int samples = 41;
+  Image<double> sum(90, 60);
+  for (int i = 0; i < samples; ++i) {
+    const double moved = left + length * (i - samples / 2) / samples;
+    const auto sharp = scene::texture<std::uint8_t>(90, 60, 8, -moved, -moved / 3);
+    for (int y = 0; y < 60; ++y)
+      for (int x = 0; x < 90; ++x) sum.at(x, y) += sharp.at(x, y);
+  }
+  Image<std::uint8_t> frame(90, 60);
+  for (int y = 0; y < 60; ++y)
+    for (int x = 0; x < 90; ++x)
+      frame.at(x, y) = static_cast<std::uint8_t>(std::lround(sum.at(x, y) / samples));
+  return frame;
+}
+
+double distance(const Image<std::uint8_t>& a, const Image<std::uint8_t>& b) {
+  double sum = 0;
+  for (int y = 10; y < 50; ++y)
+    for (int x = 10; x < 80; ++x) sum += std::abs(a.at(x, y) - b.at(x, y));
+  return sum / (40 * 70);
+}
+
+TEST(MotionDeblur, FindsTheLightInTheMiddleOfTheExposure) {
+  const auto sharp = exposed(5, 0);
+  const auto blurred = exposed(5, 5);
+  Image<Flow> flow(90, 60);
+  for (int y = 0; y < 60; ++y)
+    for (int x = 0; x < 90; ++x) flow.at(x, y) = {10, 10.0F / 3};
+  ThreadPool threads;
+  MotionDeblur deblur(90, 60);
+  deblur.set_motion(flow.view(), 0.5, true, threads);
+  auto found = blurred;
+  deblur.sharpen(found, 8, threads);
+  EXPECT_GT(distance(blurred, sharp), 5);
+  EXPECT_LT(distance(found, sharp), 0.5 * distance(blurred, sharp));
+}
+
+/// The number of events of each pixel while the texture moves by 6 pixels an interval.
+Image<std::uint8_t> counts(double blur, Nanoseconds exposure) {
+  auto settings = settings_of(DvsPreset::standard);
+  settings.exposure_time = exposure;
+  Playback playback({90, 60, 8}, settings);
+  for (int i = 0; i < 5; ++i) playback.push(exposed(6 * i, blur), 8, i * 40'000'000);
+  Image<std::uint8_t> out(90, 60);
+  for (const auto& event : playback.events) ++out.at(event.x, event.y);
+  return out;
+}
+
+TEST(MotionDeblur, GivesTheEventsOfSharpFrames) {
+  const auto sharp = counts(0, 0);
+  const auto blurred = counts(5, 0);
+  const double loss = distance(blurred, sharp);
+  EXPECT_GT(loss, 1);
+  EXPECT_LT(distance(counts(5, 33'333'333), sharp), 0.6 * loss);
+  EXPECT_EQ(distance(counts(5, 1'000'000), blurred), 0);  // the blur is less than a pixel
+}
+
+}  // namespace
