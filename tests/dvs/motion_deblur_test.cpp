@@ -10,7 +10,6 @@
 #include <cstdlib>
 #include <limits>
 #include <string>
-#include <tuple>
 
 #include "src/core/thread_pool.hpp"
 #include "src/dvs/dvs_settings.hpp"
@@ -33,8 +32,16 @@ Image<Flow> flow_of(int width, int height, float length) {
   return flow;
 }
 
+struct Case {
+  int width, height;
+  float length;
+};
+
 template <class Pixel>
-void compare_to_reference(int width, int height, float length, int bits) {
+void compare_to_reference(const Case& size, int bits) {
+  const int width = size.width;
+  const int height = size.height;
+  const float length = size.length;
   const auto frame = scene::texture<Pixel>(width, height, bits, 3, 1);
   const auto flow = flow_of(width, height, length);
   const double white = (1 << bits) - 1;
@@ -66,10 +73,10 @@ void compare_to_reference(int width, int height, float length, int bits) {
 }
 
 TEST(MotionDeblur, IsItsDefinitionOnAllTargets) {
-  for (const auto& [width, height, length] :
-       {std::tuple{1, 1, 3.0F}, {3, 5, 2.0F}, {17, 9, 5.0F}, {61, 33, 12.0F}, {40, 90, 100.0F}})
-    compare_to_reference<std::uint8_t>(width, height, length, 8);
-  compare_to_reference<std::uint16_t>(50, 21, 7, 12);
+  for (const auto& size :
+       {Case{1, 1, 3}, Case{3, 5, 2}, Case{17, 9, 5}, Case{61, 33, 12}, Case{40, 90, 100}})
+    compare_to_reference<std::uint8_t>(size, 8);
+  compare_to_reference<std::uint16_t>({50, 21, 7}, 12);
 }
 
 TEST(MotionDeblur, FollowsTheFlow) {
