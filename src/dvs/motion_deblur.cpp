@@ -183,7 +183,7 @@ void MotionDeblur::sharpen(Image<Pixel>& frame, int bits, ThreadPool& threads) {
     if (!moves(y)) return;
     for (int x = 0; x < width; ++x) {
       const float grey = std::clamp(light_.row(y)[x] - offset, 0.0F, 255.0F);
-      frame.row(y)[x] = static_cast<Pixel>(grey / scale + 0.5F);
+      frame.row(y)[x] = static_cast<Pixel>(std::lrint(grey / scale));
     }
   });
 }
