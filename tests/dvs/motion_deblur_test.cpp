@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "src/core/thread_pool.hpp"
 #include "src/dvs/dvs_settings.hpp"
@@ -164,6 +165,33 @@ TEST(MotionDeblur, GivesTheEventsOfSharpFrames) {
   EXPECT_GT(loss, 1);
   EXPECT_LT(distance(counts(5, 33'333'333), sharp), 0.6 * loss);
   EXPECT_EQ(distance(counts(5, 1'000'000), blurred), 0);  // the blur is less than a pixel
+}
+
+TEST(MotionDeblur, IsSwitchedWhilePlaying) {
+  // The number of events of each interval, which ends with this exposure time.
+  const auto play = [](const std::vector<Nanoseconds>& exposures) {
+    auto settings = settings_of(DvsPreset::standard);
+    Playback playback({90, 60, 8}, settings);
+    std::vector<double> events;
+    for (std::size_t i = 0; i < exposures.size(); ++i) {
+      settings.exposure_time = exposures[i];
+      playback.set(settings);
+      const auto before = playback.events.size();
+      playback.push(exposed(6.0 * static_cast<double>(i), 5), 8,
+                    static_cast<Nanoseconds>(i) * 40'000'000);
+      events.push_back(static_cast<double>(playback.events.size() - before));
+    }
+    return events;
+  };
+  constexpr Nanoseconds on = 33'333'333;
+  const auto blurred = play({0, 0, 0, 0, 0, 0});
+  const auto sharp = play({on, on, on, on, on, on});
+  EXPECT_GT(sharp[1], 1.1 * blurred[1]);  // the first frame is sharp, too
+  const auto switched = play({on, on, on, 0, 0, on});
+  EXPECT_EQ(switched[2], sharp[2]);
+  EXPECT_NEAR(switched[4], blurred[4], 0.05 * blurred[4]);
+  const auto late = play({0, 0, 0, on, on, on});
+  EXPECT_NEAR(late[5], sharp[5], 0.05 * sharp[5]);
 }
 
 }  // namespace
