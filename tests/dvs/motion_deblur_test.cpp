@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -14,6 +15,7 @@
 
 #include "src/core/thread_pool.hpp"
 #include "src/dvs/dvs_settings.hpp"
+#include "src/dvs/dvs_simulator.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/dvs/playback.hpp"
 #include "tests/reference/dvs.hpp"
@@ -106,6 +108,15 @@ TEST(MotionDeblur, FollowsTheFlow) {
   flow.at(20, 10) = {0, -1000};
   deblur.set_motion(flow.view(), 1, false, threads);
   expect(20, 0, -1, MotionDeblur::max_length);
+  // What ends at 12 started near 8.
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) flow.at(x, y) = {0, static_cast<float>(y) / 2};
+  deblur.set_motion(flow.view(), 1, true, threads);
+  EXPECT_EQ(deblur.path(0, 12).length, 4);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) flow.at(x, y) = {static_cast<float>(x) / 2, 0};
+  deblur.set_motion(flow.view(), 1, true, threads);
+  EXPECT_EQ(deblur.path(12, 0).length, 4);
 }
 
 /// A texture that moves by (length, length / 3) during an exposure, in grey levels.
@@ -186,12 +197,38 @@ TEST(MotionDeblur, IsSwitchedWhilePlaying) {
   constexpr Nanoseconds on = 33'333'333;
   const auto blurred = play({0, 0, 0, 0, 0, 0});
   const auto sharp = play({on, on, on, on, on, on});
-  EXPECT_GT(sharp[1], 1.1 * blurred[1]);  // the first frame is sharp, too
+  EXPECT_GT(sharp[1], 1.3 * blurred[1]);  // the first frame is sharp, too
   const auto switched = play({on, on, on, 0, 0, on});
   EXPECT_EQ(switched[2], sharp[2]);
   EXPECT_NEAR(switched[4], blurred[4], 0.05 * blurred[4]);
   const auto late = play({0, 0, 0, on, on, on});
   EXPECT_NEAR(late[5], sharp[5], 0.05 * sharp[5]);
+}
+
+TEST(MotionDeblur, LeavesTheFlowOfTheFramesAsTheyAre) {
+  // The texture is in a part of the frame, whose flow is found from both frames each time.
+  constexpr int width = 320;
+  constexpr int height = 240;
+  const auto sharp = make_dvs_simulator({width, height, 8});
+  const auto blurred = make_dvs_simulator({width, height, 8});
+  auto settings = settings_of(DvsPreset::standard);
+  blurred->set(settings);
+  settings.exposure_time = 30'000'000;
+  sharp->set(settings);
+  for (int i = 0; i < 3; ++i) {
+    Image<std::uint8_t> frame(width, height);
+    const auto texture = exposed(6 * i, 5);
+    for (int y = 0; y < texture.height(); ++y)
+      std::copy_n(texture.row(y), texture.width(), frame.row(y + 90) + 110);
+    for (auto* simulator : {sharp.get(), blurred.get()})
+      simulator->push(scene::luma(frame.view(), 8), i * 40'000'000, {});
+    if (i == 0) continue;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        ASSERT_EQ(sharp->flow()->row(y)[x].x, blurred->flow()->row(y)[x].x) << x << " " << y;
+        ASSERT_EQ(sharp->flow()->row(y)[x].y, blurred->flow()->row(y)[x].y) << x << " " << y;
+      }
+  }
 }
 
 }  // namespace
