@@ -252,7 +252,7 @@ class PixelSimulator final : public DvsSimulator {
     if (blurred_last_)
       blurred_last_->assign(now_.view());
     else
-      blurred_last_ = now_;
+      blurred_last_.emplace(now_);
     deblur_->set_motion(*flow_, share, true, threads());
     deblur_->sharpen(now_, format().bits, threads());
   }
