@@ -3,7 +3,7 @@
 """Finds the contrast thresholds at which a simulator generates as many ON and OFF events from a
 video as a real camera recorded of the same scene. For eventsim-dvs it then tries changes one at a time:
 exposure compensation, refractory period, threshold jitter, upsampling, the offset of the logarithm,
-overexposed light, adaptation, denoising and exposure pulses, and keeps those that make the streams more
+overexposed light, adaptation, denoising, long exposures and exposure pulses, and keeps those that make the streams more
 similar by more than the noise of that figure. Balances the errors of mean and standard deviation over the
 pixels. Prints the settings, and how similar the two streams are. Overexposed parts of the frames are
 excluded.
@@ -48,6 +48,8 @@ CHANGES = [
     {"adaptation": 0.2},
     {"denoise": 0},
 ]
+# Share of a long exposure in the frame interval.
+LONG_EXPOSURE = 0.85
 PULSES = [0.04, 0.08, 0.12, 0.16]
 # Values of these are shares of the mean threshold.
 SHARES = {"threshold-jitter", "exposure-pulse"}
@@ -145,7 +147,7 @@ def changes_of(video, recorded, span, element):
     """The changes to try: those of properties that the element does not set."""
     if element.split()[0] != PROFILED:
         return []
-    changes = list(CHANGES)
+    changes = [{"exposure-time": exposure_of(video)}, *CHANGES]
     if not any(video.overexposed(frame).any() for frame in video.frames):
         changes = [change for change in changes if "overexposed-light" not in change]
     lead = find_exposure_lead(video, recorded, span)
@@ -189,6 +191,20 @@ def fit_thresholds(video, recorded, span, element, progress):
     setting = Setting(element)
     simulated_by = functools.partial(simulate, video)
     return setting.with_thresholds(find_thresholds(simulated_by, recorded, [span], setting, progress))
+
+
+def exposure_of(video):
+    """The median exposure of the frames, in nanoseconds, which AEDAT 4 files tell; otherwise most of the median
+    interval, a long exposure."""
+    exposures = []
+    for frame in video.frames:
+        meta = frame.buffer.get_custom_meta("GstEventCameraFrame")
+        if meta is not None:
+            begin, end = (meta.get_structure().get_int64(f"exposure-{name}") for name in ("begin", "end"))
+            exposures.append(1000 * (end.value - begin.value))
+    if exposures and np.median(exposures) > 0:
+        return min(int(np.median(exposures)), Gst.SECOND)
+    return min(int(LONG_EXPOSURE * np.median(np.diff([frame.time for frame in video.frames]))), Gst.SECOND)
 
 
 def find_exposure_lead(video, recorded, span):

@@ -72,7 +72,7 @@ class FileDecompressor::Gzip final : public Codec {
     if (may_end_ && in.empty()) return {};
     is_past_end_ |= may_end_ && in.front() != gzip_magic.front();
     if (is_past_end_) return {.used = in.size()};
-    if (std::exchange(may_end_, false)) inflateReset(&stream_);
+    if (may_end_) inflateReset(&stream_);
     constexpr std::size_t max_in = std::numeric_limits<uInt>::max();
     stream_.next_in = const_cast<Bytef*>(in.data());  // NOLINT: zlib does not change its input
     stream_.avail_in = static_cast<uInt>(std::min(in.size(), max_in));

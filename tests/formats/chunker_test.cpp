@@ -155,6 +155,16 @@ TEST(Chunker, DropsTheSameEventsHoweverTheyAreDivided) {
   }
 }
 
+TEST(Chunker, TellsDisorderFromOneEventInAHundredOn) {
+  for (const int period : {50, 90, 120, 1000}) {
+    std::vector<AbsoluteEvent> events;
+    for (int i = 1; i <= 30'000; ++i) events.push_back(at(i % period == 0 ? 0 : 100 * i));
+    Chunker chunker(length);
+    slice(chunker, events);
+    EXPECT_EQ(chunker.disorder().has_value(), period < 100) << period;
+  }
+}
+
 TEST(Chunker, IgnoresAClockThatJumpsAheadAndComesBack) {
   std::vector<AbsoluteEvent> events;
   for (Microseconds t = 0; t < 100'000; t += 100) {

@@ -52,6 +52,12 @@ calibrate scene.mkv recorded.raw --element "eventsim-dvs preset=ideal response=l
 awk '$1 == "mean" { mean = $4 / $2 } $1 == "std." { deviation = $5 / $3 } END { exit !(mean < 0.98 && deviation > 1.02 && mean * deviation > 0.96 && mean * deviation < 1.04) }' found ||
   fail "mean and standard deviation are not off by about the same factor"
 
+# Long exposures are found.
+"$GST_LAUNCH" -q videotestsrc pattern=zone-plate kx2=12 ky2=12 horizontal-speed=8 num-buffers=16 ! video/x-raw,format=I420,width=160,height=90,framerate=25/1 ! matroskamux ! filesink location=moving.mkv
+"$GST_LAUNCH" -q filesrc location=moving.mkv ! decodebin ! eventsim-dvs exposure-time=34000000 ! evtenc ! filesink location=recorded.raw
+calibrate moving.mkv recorded.raw --element "eventsim-dvs linear-light=false log-eps=0.05 exposure-compensation=true refractory-period=0 threshold-jitter=0 upsampling=motion overexposed-light=1.5 adaptation=0.05 denoise=-1 exposure-pulse=0" --lag 0 --to 0.3 | tee found
+grep -q "exposure-time=34000000" found || fail "the long exposure is not found"
+
 # Exposure pulses are found by their bursts of events.
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-dvs preset=ideal response=log log-eps=0.02 exposure-pulse=0.03 exposure-lead=9000000 ! evtenc ! filesink location=recorded.raw
 calibrate scene.mkv recorded.raw --element "eventsim-dvs preset=ideal response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0" --lag 0 --to 0.3 | tee found
@@ -68,7 +74,7 @@ done >pictures.txt
 calibrate pictures.txt recorded.csv --element eventsim-dense --to 0.3 --measure-from 0.3 --measure-to 0.5 --map map.png | tee found
 lag=$(sed -n 's/Frames show the scene \(-*[0-9.]*\) ms later.*/\1/p' found)
 awk -v lag="${lag:-0}" 'BEGIN { exit !(lag > -5 && lag < 0) }' || fail "the pictures are ${lag:-0} ms late"
-without_search="eventsim-dvs refractory-period=0 refractory-reset=level threshold-jitter=0 exposure-compensation=true upsampling=motion log-eps=0.05 overexposed-light=1 adaptation=0.05 denoise=-1 exposure-pulse=0"
+without_search="eventsim-dvs refractory-period=0 refractory-reset=level threshold-jitter=0 exposure-compensation=true upsampling=motion log-eps=0.05 overexposed-light=1 adaptation=0.05 denoise=-1 exposure-time=0 exposure-pulse=0"
 calibrate scene.mkv recorded.raw --element "$without_search" --to 0.04 | tee one
 grep -q "^The lag cannot be estimated from one frame interval" one || fail "a lag was estimated from one frame interval"
 
