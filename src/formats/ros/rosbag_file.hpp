@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "src/formats/compression/compressed_frames.hpp"
+#include "src/formats/expansion_limit.hpp"
 #include "src/formats/ros/chunked_bag_file.hpp"
 
 namespace eventcamera {
