@@ -22,25 +22,28 @@ using Floats = hn::CappedTag<float, MotionDeblur::block>;
 /// Mean of pixels from (x, y) on along a path.
 HWY_INLINE hn::Vec<Floats> mean_along(const Image<float>& image, const Path& path, int x, int y) {
   const Floats floats;
-  const float half = path.length / 2;
-  auto sum = hn::LoadU(floats, image.row(y) + x);
+  const float* centre = image.row(y) + x;
+  auto sum = hn::LoadU(floats, centre);
   if (path.length == 1) return sum;
-  const auto sample = [&](int j) HWY_ATTR {
-    const float px = static_cast<float>(j) * path.dx;
-    const float py = static_cast<float>(j) * path.dy;
-    const float left = std::floor(px);
-    const float top = std::floor(py);
-    // One of the two is 0.
-    const float right = px - left;
-    const float down = py - top;
-    const float* here = image.row(y + static_cast<int>(top)) + x + static_cast<int>(left);
-    const float* next = right > 0 ? here + 1 : here + (down > 0 ? image.stride() / 4 : 0);
-    const auto a = hn::LoadU(floats, here);
-    return hn::Add(a, hn::Mul(hn::Set(floats, right + down), hn::Sub(hn::LoadU(floats, next), a)));
-  };
+  const float half = path.length / 2;
+  const std::ptrdiff_t row = image.stride() / static_cast<std::ptrdiff_t>(sizeof(float));
+  const bool is_wide = std::abs(path.dx) == 1;
+  const std::ptrdiff_t along = is_wide ? (path.dx > 0 ? 1 : -1) : (path.dy > 0 ? row : -row);
+  const std::ptrdiff_t across = is_wide ? row : 1;
+  const float slope = is_wide ? path.dy : path.dx;
+  // Both samples at a distance of j lie between `near` and its neighbour across.
   for (int j = 1; static_cast<float>(j) < half + 0.5F; ++j) {
+    const float moved = static_cast<float>(j) * slope;
+    const float whole = std::floor(moved);
+    const auto near = j * along + static_cast<std::ptrdiff_t>(whole) * across;
+    const auto pair = [&](std::ptrdiff_t at) HWY_ATTR {
+      return hn::Add(hn::LoadU(floats, centre + at), hn::LoadU(floats, centre - at));
+    };
+    const auto first = pair(near);
+    const auto rise = hn::Sub(pair(near + across), first);
+    const auto samples = hn::Add(first, hn::Mul(hn::Set(floats, moved - whole), rise));
     const float weight = std::min(1.0F, half + 0.5F - static_cast<float>(j));
-    sum = hn::Add(sum, hn::Mul(hn::Set(floats, weight), hn::Add(sample(-j), sample(j))));
+    sum = hn::Add(sum, hn::Mul(hn::Set(floats, weight), samples));
   }
   return hn::Mul(sum, hn::Set(floats, 1 / path.length));
 }
@@ -180,7 +183,7 @@ void MotionDeblur::sharpen(Image<Pixel>& frame, int bits, ThreadPool& threads) {
     if (!moves(y)) return;
     for (int x = 0; x < width; ++x) {
       const float grey = std::clamp(light_.row(y)[x] - offset, 0.0F, 255.0F);
-      frame.row(y)[x] = static_cast<Pixel>(grey / scale + 0.5F);
+      frame.row(y)[x] = static_cast<Pixel>(std::lrint(grey / scale));
     }
   });
 }

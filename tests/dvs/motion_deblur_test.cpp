@@ -10,7 +10,7 @@
 #include <cstdlib>
 #include <limits>
 #include <string>
-#include <tuple>
+#include <vector>
 
 #include "src/core/thread_pool.hpp"
 #include "src/dvs/dvs_settings.hpp"
@@ -33,8 +33,16 @@ Image<Flow> flow_of(int width, int height, float length) {
   return flow;
 }
 
+struct Case {
+  int width, height;
+  float length;
+};
+
 template <class Pixel>
-void compare_to_reference(int width, int height, float length, int bits) {
+void compare_to_reference(const Case& size, int bits) {
+  const int width = size.width;
+  const int height = size.height;
+  const float length = size.length;
   const auto frame = scene::texture<Pixel>(width, height, bits, 3, 1);
   const auto flow = flow_of(width, height, length);
   const double white = (1 << bits) - 1;
@@ -66,10 +74,10 @@ void compare_to_reference(int width, int height, float length, int bits) {
 }
 
 TEST(MotionDeblur, IsItsDefinitionOnAllTargets) {
-  for (const auto& [width, height, length] :
-       {std::tuple{1, 1, 3.0F}, {3, 5, 2.0F}, {17, 9, 5.0F}, {61, 33, 12.0F}, {40, 90, 100.0F}})
-    compare_to_reference<std::uint8_t>(width, height, length, 8);
-  compare_to_reference<std::uint16_t>(50, 21, 7, 12);
+  for (const auto& size :
+       {Case{1, 1, 3}, Case{3, 5, 2}, Case{17, 9, 5}, Case{61, 33, 12}, Case{40, 90, 100}})
+    compare_to_reference<std::uint8_t>(size, 8);
+  compare_to_reference<std::uint16_t>({50, 21, 7}, 12);
 }
 
 TEST(MotionDeblur, FollowsTheFlow) {
@@ -157,6 +165,33 @@ TEST(MotionDeblur, GivesTheEventsOfSharpFrames) {
   EXPECT_GT(loss, 1);
   EXPECT_LT(distance(counts(5, 33'333'333), sharp), 0.6 * loss);
   EXPECT_EQ(distance(counts(5, 1'000'000), blurred), 0);  // the blur is less than a pixel
+}
+
+TEST(MotionDeblur, IsSwitchedWhilePlaying) {
+  // The number of events of each interval, which ends with this exposure time.
+  const auto play = [](const std::vector<Nanoseconds>& exposures) {
+    auto settings = settings_of(DvsPreset::standard);
+    Playback playback({90, 60, 8}, settings);
+    std::vector<double> events;
+    for (std::size_t i = 0; i < exposures.size(); ++i) {
+      settings.exposure_time = exposures[i];
+      playback.set(settings);
+      const auto before = playback.events.size();
+      playback.push(exposed(6.0 * static_cast<double>(i), 5), 8,
+                    static_cast<Nanoseconds>(i) * 40'000'000);
+      events.push_back(static_cast<double>(playback.events.size() - before));
+    }
+    return events;
+  };
+  constexpr Nanoseconds on = 33'333'333;
+  const auto blurred = play({0, 0, 0, 0, 0, 0});
+  const auto sharp = play({on, on, on, on, on, on});
+  EXPECT_GT(sharp[1], 1.1 * blurred[1]);  // the first frame is sharp, too
+  const auto switched = play({on, on, on, 0, 0, on});
+  EXPECT_EQ(switched[2], sharp[2]);
+  EXPECT_NEAR(switched[4], blurred[4], 0.05 * blurred[4]);
+  const auto late = play({0, 0, 0, on, on, on});
+  EXPECT_NEAR(late[5], sharp[5], 0.05 * sharp[5]);
 }
 
 }  // namespace
