@@ -34,15 +34,19 @@ void DelayedRows::set(const StepBuckets& events, Nanoseconds duration, Nanosecon
   sort();
 }
 
-/// Adds the events that the last interval deferred.
+/// Adds the rows that the last interval deferred.
 void DelayedRows::add_due() {
   std::swap(due_, deferred_);
-  std::swap(due_rows_, deferred_rows_);
-  deferred_.clear();
-  deferred_rows_.clear();
-  for (auto& [row, first] : due_rows_) {
-    row.events = std::span(due_).subspan(first, row.size);
-    row.pixels = {};
+  deferred_.rows.clear();
+  deferred_.events.clear();
+  deferred_.pixels.clear();
+  std::span<const Event> events = due_.events;
+  std::span<const FiredPixels::Group> pixels = due_.pixels;
+  for (auto& row : due_.rows) {
+    row.events = events.first(row.events.size());
+    row.pixels = pixels.first(row.pixels.size());
+    events = events.subspan(row.events.size());
+    pixels = pixels.subspan(row.pixels.size());
     add(row);
   }
 }
@@ -60,16 +64,16 @@ void DelayedRows::add_list(std::span<const Event> events) {
   }
 }
 
-void DelayedRows::add(const Row& row) {
+/// Adds a row to the interval, or copies it for the next one.
+void DelayedRows::add(Row row) {
   if (row.t <= end_) {
     rows_.push_back(row);
     return;
   }
-  const std::size_t first = deferred_.size();
-  deferred_.resize(first + row.size);
-  deferred_rows_.push_back({row, first});
-  deferred_rows_.back().row.t -= next_start_;
-  write(deferred_rows_.back().row, deferred_.data() + first);
+  row.t -= next_start_;
+  deferred_.rows.push_back(row);
+  deferred_.events.insert(deferred_.events.end(), row.events.begin(), row.events.end());
+  deferred_.pixels.insert(deferred_.pixels.end(), row.pixels.begin(), row.pixels.end());
 }
 
 void DelayedRows::sort() {
@@ -101,8 +105,8 @@ void DelayedRows::visit_band(int /*band*/, const Visit& visit) const {
 
 std::optional<Nanoseconds> DelayedRows::latest() const {
   std::optional<Nanoseconds> latest;
-  for (const auto& deferred : deferred_rows_)
-    latest = std::max(latest, std::optional(static_cast<Nanoseconds>(deferred.row.t) * 1000));
+  for (const auto& row : deferred_.rows)
+    latest = std::max(latest, std::optional(static_cast<Nanoseconds>(row.t) * 1000));
   return latest;
 }
 

@@ -20,7 +20,7 @@ std::vector<std::uint32_t> row_delays(Nanoseconds readout, int height);
 /// Events of an interval between two frames of a camera with a rolling shutter: those of
 /// StepBuckets, delayed by row. Events past the end of the interval are deferred to the next one.
 ///
-/// The events of a row in a step have the same time. So rows are sorted, events only written.
+/// All events of a row and step have the same time, so it sorts rows, not events.
 class DelayedRows final : public EventBuckets {
  public:
   explicit DelayedRows(int height) : height_(height) {}
@@ -33,7 +33,7 @@ class DelayedRows final : public EventBuckets {
   std::optional<Nanoseconds> latest() const;
 
   /// Drops the deferred events.
-  void restart() { deferred_rows_.clear(); }
+  void restart() { deferred_ = {}; }
 
   std::size_t size() const override { return size_; }
   void visit_band(int band, const Visit& visit) const override;
@@ -47,9 +47,11 @@ class DelayedRows final : public EventBuckets {
     std::span<const Event> events;
     std::span<const FiredPixels::Group> pixels;
   };
-  struct DeferredRow {
-    Row row;            ///< its time is relative to the next interval
-    std::size_t first;  ///< index of its first event in deferred_
+  /// Rows and copies of their events. Their times are relative to the next interval.
+  struct Deferred {
+    std::vector<Row> rows;
+    std::vector<Event> events;
+    std::vector<FiredPixels::Group> pixels;
   };
   struct SortedRow {
     std::uint64_t time_and_y;
@@ -61,7 +63,7 @@ class DelayedRows final : public EventBuckets {
   void write_part(std::size_t first, std::size_t last, Event* out) const override;
   void add_due();
   void add_list(std::span<const Event> events);
-  void add(const Row& row);
+  void add(Row row);
   void sort();
 
   int height_;
@@ -72,10 +74,8 @@ class DelayedRows final : public EventBuckets {
   std::vector<Row> rows_;
   std::vector<SortedRow> sorted_;
   std::size_t size_ = 0;
-  std::vector<Event> deferred_;
-  std::vector<DeferredRow> deferred_rows_;
-  std::vector<Event> due_;  ///< deferred_ of the last interval
-  std::vector<DeferredRow> due_rows_;
+  Deferred deferred_;
+  Deferred due_;  ///< deferred by the last interval
 };
 
 }  // namespace eventcamera

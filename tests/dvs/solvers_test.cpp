@@ -171,7 +171,7 @@ Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
     for (const auto& [column, value] : values) candidates.column(column)[i] = value;
   }
   IntervalEvents events(width, 1);
-  events.begin(sub_interval.duration, 0);
+  events.begin(sub_interval.duration, 0, 0);
   row.events.begin(events, 0);
   solve(row);
   row.events.end();

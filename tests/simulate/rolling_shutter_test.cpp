@@ -198,6 +198,19 @@ TEST(RollingShutter, MayChangeBetweenFrames) {
   EXPECT_EQ(recording.events, expected);
 }
 
+/// So that two events of a pixel, in different intervals, cannot get the same time.
+TEST(RollingShutter, RoundsTheTimesOfDeferredEventsDown) {
+  Recording recording(make_frame_simulator({1, 2, 8}));
+  const std::pair<int, Nanoseconds> frames[] = {{50, 0}, {200, 10'000'700}, {200, 20'000'000}};
+  for (const auto& [grey, time] : frames)
+    recording.push(scene::luma(scene::flat<std::uint8_t>(1, 2, grey)), time,
+                   {.rolling_shutter = 4'000'000});
+  // The second one is at 14,000 us, 3,999.3 us after the frame before.
+  const std::vector expected = {AbsoluteEvent::at(0, 0, 10'000, Polarity::on),
+                                AbsoluteEvent::at(0, 1, 10'000 + 3'999, Polarity::on)};
+  EXPECT_EQ(recording.events, expected);
+}
+
 TEST(RollingShutter, DelaysNothingInASingleRow) {
   Recording recording(make_frame_simulator({4, 1, 8}));
   for (const int grey : {50, 200})
