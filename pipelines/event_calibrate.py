@@ -299,8 +299,7 @@ def describe(name, figures):
         " simulated",
         f"  share of ON      {real['on-share']:>12.3f} recorded {ours['on-share']:>12.3f}"
         " simulated",
-        f"  map correlation  {figures['map-correlation']:>12.3f}   noise ceiling"
-        f" {ceiling['map-correlation']:.3f}",
+        f"  map correlation  {figures['map-correlation']:>12.3f}",
         f"  rate correlation {figures['rate-correlation']:>12.3f}   in bins of 1 ms; noise ceiling"
         f" {ceiling['rate-correlation']:.3f}",
         f"  interval distance{figures['interval-distance']:>12.3f}   decades",

@@ -83,10 +83,12 @@ def table_of(sensor, real, simulated):
         rows.append(Row(title, f"{first['reference'][field]:.3f}",
                         [f"{stream.figures['candidate'][field]:.3f}" for stream in simulated],
                         [False] * len(simulated)))
-    for field, title in (("map-correlation", "map correlation"), ("rate-correlation", "rate correlation, 1 ms")):
-        values = [stream.figures[field] for stream in simulated]
-        rows.append(Row(title, f"{ceiling[field]:.3f}", [f"{value:.3f}" for value in values],
-                        [value < ceiling[field] - TOLERANCE for value in values]))
+    rows.append(Row("map correlation", "—", [f"{stream.figures['map-correlation']:.3f}" for stream in simulated],
+                    [False] * len(simulated)))
+    values = [stream.figures["rate-correlation"] for stream in simulated]
+    rows.append(Row("rate correlation, 1 ms", f"{ceiling['rate-correlation']:.3f}",
+                    [f"{value:.3f}" for value in values],
+                    [value < ceiling["rate-correlation"] - TOLERANCE for value in values]))
     values = [stream.figures["interval-distance"] for stream in simulated]
     rows.append(Row("interval distance, decades", f"{ceiling['interval-distance']:.3f}",
                     [f"{value:.3f}" for value in values],

@@ -39,8 +39,7 @@ double spearman_brown(double halves) {
 
 CeilingFigures NoiseCeiling::figures() const {
   const auto halves = halves_.figures();
-  CeilingFigures ceiling{.map_correlation = spearman_brown(halves.map_correlation),
-                         .rate_correlation = spearman_brown(halves.rate_correlation),
+  CeilingFigures ceiling{.rate_correlation = spearman_brown(halves.rate_correlation),
                          .interval_distance = halves.interval_distance,
                          .matches = {}};
   const auto& first = halves.matches[StreamRole::reference];

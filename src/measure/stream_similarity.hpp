@@ -47,7 +47,6 @@ class StreamSimilarity {
 
 /// How similar a recording would be to another one of the same scene by the same camera.
 struct CeilingFigures {
-  double map_correlation = 0;
   double rate_correlation = 0;
   double interval_distance = 0;  ///< decades
   MatchFigures matches;
@@ -56,9 +55,11 @@ struct CeilingFigures {
 /// Estimates how similar a second recording of the same scene could be, from two halves of the
 /// first: each event belongs to either half at random.
 ///
-/// Correlations are extrapolated from the halves to the whole by the Spearman-Brown formula, shares
-/// of matched events and nearest distances as if twice as many independent events had fired. Real
-/// events are more regular than chance, so a good simulator can exceed the ceiling slightly.
+/// The correlation of rates is extrapolated from the halves to the whole by the Spearman-Brown
+/// formula, shares of matched events and nearest distances as if twice as many independent events
+/// had fired. Real events are more regular than chance, so a good simulator can exceed the ceiling
+/// slightly. The map has no ceiling: how much more regular the few events of a pixel are cannot be
+/// known from one recording.
 class NoiseCeiling {
  public:
   /// Throws std::bad_alloc, as does add().

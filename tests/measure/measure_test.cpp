@@ -189,8 +189,6 @@ void expect_ceiling(const CeilingFigures& figures, Extent extent, const Stream& 
   for (const auto& event : stream) halves[random() % 2].push_back(event);
   const auto& [a, b] = halves;
   const auto of_wholes = [](double r) { return r < 0 ? 0 : 2 * r / (1 + r); };
-  EXPECT_NEAR(figures.map_correlation,
-              of_wholes(correlation_plainly(map_plainly(extent, a), map_plainly(extent, b))), 1e-9);
   EXPECT_NEAR(
       figures.rate_correlation,
       of_wholes(correlation_plainly(rates_plainly(a, start, bins), rates_plainly(b, start, bins))),

@@ -30,7 +30,8 @@ column() { # NUMBER TITLE: the cell of a row, with its mark
 [ "$(column 2 "real events matched within 1 ms")" = 1.000 ] || fail "a recording does not match itself"
 [ "$(column 2 "nearest match of real events, ms")" = 0.00 ] || fail "a recording is far from itself"
 [ "$(grep -c '^[a-z].* \*$' table)" -ge 10 ] || fail "dense interpolation is within the noise ceiling"
-for title in "standard deviation" "map correlation" "rate correlation, 1 ms" "interval distance, decades" \
+grep -qF "<th>map correlation</th>" page.html || fail "the page has no map correlation"
+for title in "standard deviation" "rate correlation, 1 ms" "interval distance, decades" \
   "real events matched within 10 ms" "simulated events matched within 10 ms"; do
   [[ $(column 3 "$title") != *\** ]] || fail "$title of a second recording is beyond the noise ceiling"
   [[ $(column 4 "$title") == *\* ]] || fail "$title of dense interpolation is within the noise ceiling"

@@ -21,10 +21,10 @@
  *   stream that have a match in the other, of the same polarity, at the same pixel or next to it
  *   (#gdouble, `within-1ms`, `within-5ms`, `within-10ms`), and `nearest-distance` (#guint64): the
  * mean time to the nearest such event, in ns; events without one count as 10 ms;
- * - `noise-ceiling` (#GstStructure): `map-correlation`, `rate-correlation`, `interval-distance` and
- *   `matches` of a second recording of the reference's scene, estimated from two halves of its
- *   events, chosen by chance (split halves, Spearman-Brown); a good simulator can come out slightly
- *   above, since a camera's events are more regular than chance;
+ * - `noise-ceiling` (#GstStructure): `rate-correlation`, `interval-distance` and `matches` of a
+ *   second recording of the reference's scene, estimated from two halves of its events, chosen by
+ *   chance (split halves, Spearman-Brown); a good simulator can come out slightly above, since a
+ *   camera's events are more regular than chance;
  * - `rate-curve` (#GstStructure): event counts in bins of `bin` ns (#guint64), as two arrays,
  *   `reference` and `candidate`;
  * - `classification` (#GstStructure), if the events of both are labelled (#GstEventSimDvs:label):
@@ -134,14 +134,6 @@ GstStructure* matches_of(const eventcamera::MatchFigures& matches) {
                            static_cast<guint64>(matches.nearest_distance * GST_USECOND), nullptr);
 }
 
-/// Sets the fields of a similarity, or of the ceiling of one.
-template <class Figures>
-void put_similarity(GstStructure* structure, const Figures& figures) {
-  gst_structure_set(structure, "map-correlation", G_TYPE_DOUBLE, figures.map_correlation,
-                    "rate-correlation", G_TYPE_DOUBLE, figures.rate_correlation,
-                    "interval-distance", G_TYPE_DOUBLE, figures.interval_distance, nullptr);
-}
-
 GstStructure* curve_of(const eventcamera::RateCurve& rates) {
   GstStructure* curve =
       gst_structure_new("rate-curve", "bin", G_TYPE_UINT64,
@@ -183,13 +175,16 @@ GstStructure* structure_of(const StreamComparison& comparison) {
     put_structure(structure, name_of(role), stream);
   }
   const auto& similarity = figures.similarity;
-  put_similarity(structure, similarity);
+  gst_structure_set(structure, "map-correlation", G_TYPE_DOUBLE, similarity.map_correlation,
+                    "rate-correlation", G_TYPE_DOUBLE, similarity.rate_correlation,
+                    "interval-distance", G_TYPE_DOUBLE, similarity.interval_distance, nullptr);
   put_structure(structure, "reference-matches",
                 matches_of(similarity.matches[StreamRole::reference]));
   put_structure(structure, "candidate-matches",
                 matches_of(similarity.matches[StreamRole::candidate]));
-  GstStructure* ceiling = gst_structure_new_empty("noise-ceiling");
-  put_similarity(ceiling, figures.ceiling);
+  GstStructure* ceiling = gst_structure_new(
+      "noise-ceiling", "rate-correlation", G_TYPE_DOUBLE, figures.ceiling.rate_correlation,
+      "interval-distance", G_TYPE_DOUBLE, figures.ceiling.interval_distance, nullptr);
   put_structure(ceiling, "matches", matches_of(figures.ceiling.matches));
   put_structure(structure, "noise-ceiling", ceiling);
   put_structure(structure, "rate-curve", curve_of(comparison.rates()));
