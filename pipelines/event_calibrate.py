@@ -22,7 +22,7 @@ import time
 from statistics import harmonic_mean
 
 # Imported first: it reports missing packages.
-from event_streams import (GLib, Gst, Span, compare, delayed, expect_writable, read_mask, read_recording,
+from event_streams import (GLib, Gst, Span, compare, delayed, expect_writable, png_of, read_mask, read_recording,
                            read_video, seconds, simulate, until)
 import numpy as np
 from plugins import find_plugins
@@ -59,6 +59,10 @@ MIN_GAIN = 0.003
 MAX_BALANCE = 1.1
 # The element that has profiles.
 PROFILED = "eventsim-dvs"
+# Frames explain the events in blocks of this size, and next to them, where even this threshold is reached.
+BLOCK, LOW_THRESHOLD = 8, 0.1
+# Share of pixels without events, among those whose neighbours have this many, that a camera does not reach.
+MAX_SILENT, BUSY_EVENTS = 0.05, 24
 # Seconds between two lines of progress where there is no terminal.
 PROGRESS_INTERVAL = 60
 
@@ -101,12 +105,42 @@ class Progress:
             print(file=sys.stderr)
 
 
+def explained(video, recorded):
+    """Whether the frames explain each recorded event: some light changes near it, in its frame interval. Splashes,
+    flickering lamps and the noise of the camera are not in the frames."""
+    times = [frame.time // 1000 for frame in video.frames]
+
+    def place(events):
+        return np.searchsorted(times, events["t"]), events["y"] // BLOCK + 1, events["x"] // BLOCK + 1
+
+    changes = np.zeros((len(times) + 1, video.height // BLOCK + 3, video.width // BLOCK + 3), bool)
+    changes[place(simulate(video, f"{PROFILED} positive-threshold={LOW_THRESHOLD}"
+                                  f" negative-threshold={LOW_THRESHOLD}"))] = True
+    near = np.zeros_like(changes)
+    for down in (-1, 0, 1):
+        for right in (-1, 0, 1):
+            near |= np.roll(changes, (down, right), axis=(1, 2))
+    return near[place(recorded)]
+
+
+def silent_pixels(sensor, recorded):
+    """Which pixels never fire although their eight neighbours do, and the share of pixels with such neighbours that
+    they are."""
+    count = np.bincount(sensor.pixels_of(recorded), minlength=sensor.width * sensor.height)
+    padded = np.pad(count.reshape(sensor.height, sensor.width), 1)
+    around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).sum(axis=(2, 3)) - padded[1:-1, 1:-1]
+    busy = around >= BUSY_EVENTS
+    silent = busy & (padded[1:-1, 1:-1] == 0)
+    return silent, silent.sum() / max(busy.sum(), 1)
+
+
 class Search:
-    """Rates settings by cross-validation: each part of the time is simulated with thresholds that fit the other
-    parts, and rated by its likeness."""
+    """Rates settings by cross-validation: each part of the time is simulated with thresholds that fit the explained
+    events of the other parts, and rated by its likeness."""
 
     def __init__(self, video, recorded, span, progress):
         self.video, self.recorded, self.span, self.progress = video, recorded, span, progress
+        self.explained = recorded[explained(video, recorded)]
         self.parts = parts_of(video, span)
         # The last stream of a threshold search is rated.
         self.simulated_by = functools.lru_cache(maxsize=4)(functools.partial(simulate, video))
@@ -114,7 +148,7 @@ class Search:
 
     def fit(self, setting, spans, precision=PRECISION, share=1.0):
         """The element with thresholds that fit this share of the events of the spans."""
-        self.thresholds = find_thresholds(self.simulated_by, self.recorded, spans, setting, self.progress,
+        self.thresholds = find_thresholds(self.simulated_by, self.explained, spans, setting, self.progress,
                                           self.thresholds, precision, share)
         return setting.with_thresholds(self.thresholds)
 
@@ -130,7 +164,7 @@ class Search:
     def balanced(self, setting):
         """The element with thresholds that balance the errors of the mean event rate and of its standard deviation
         over the pixels: one is too small by the factor that the other is too large."""
-        figures = compare(self.video, self.recorded, self.simulated_by(self.fit(setting, self.parts)), self.span)
+        figures = compare(self.video, self.explained, self.simulated_by(self.fit(setting, self.parts)), self.span)
         mean, deviation = (figures["candidate"][field] / figures["reference"][field] for field in ("mean", "std-dev"))
         return self.fit(setting, self.parts, share=np.clip(np.sqrt(mean / deviation), 1 / MAX_BALANCE, MAX_BALANCE))
 
@@ -190,7 +224,8 @@ def fit_thresholds(video, recorded, span, element, progress):
     """The element with calibrated thresholds, and otherwise unchanged."""
     setting = Setting(element)
     simulated_by = functools.partial(simulate, video)
-    return setting.with_thresholds(find_thresholds(simulated_by, recorded, [span], setting, progress))
+    return setting.with_thresholds(
+        find_thresholds(simulated_by, recorded[explained(video, recorded)], [span], setting, progress))
 
 
 def exposure_of(video):
@@ -337,6 +372,8 @@ def options():
     parser.add_argument("--mask", metavar="PICTURE",
                         help="a picture that is white where pixels of the camera can fire; events elsewhere"
                         " are excluded from both streams")
+    parser.add_argument("--make-mask", metavar="PNG",
+                        help="write a picture for --mask: black where pixels never fire although their neighbours do")
     parser.add_argument("--profile", metavar="FILE",
                         help="write the settings of eventsim-dvs, for its property profile")
     parser.add_argument("--map", metavar="PNG", help="write a picture of the event counts per pixel")
@@ -393,7 +430,7 @@ def main():
     find_plugins()
     if args.profile and args.element.split()[:1] != [PROFILED]:
         raise RuntimeError(f"only {PROFILED} has profiles, {args.element.split()[0]} has none; leave out --profile")
-    for path in filter(None, (args.profile, args.map)):
+    for path in filter(None, (args.profile, args.map, args.make_mask)):
         expect_writable(path, filter(None, (args.video, args.recording, args.mask)))
     progress = Progress()
     start = getattr(args, "from")
@@ -422,6 +459,9 @@ def main():
     visible = video.visible(recorded)
     hidden = 1 - len(measured.of(visible)) / max(len(measured.of(recorded)), 1)
     recorded = visible
+    silent, silent_share = silent_pixels(video, recorded)
+    calibrated = span.of(recorded)
+    unexplained = 1 - np.mean(explained(until(video, span.end), calibrated)) if len(calibrated) else 0
     element = calibrate(until(video, span.end), recorded, span, args.element, progress)
     progress.end()
     simulated = simulate(video, element)
@@ -432,12 +472,21 @@ def main():
         print(f"Frames show the scene {lag * 1000:.1f} ms later than their timestamps.")
     if hidden >= 0.005:
         print(f"{100 * hidden:.0f} % of the recorded events are excluded: the frames are overexposed there.")
+    if unexplained >= 0.005:
+        print(f"{100 * unexplained:.0f} % of the recorded events are where the frames do not change, such as noise,"
+              " flicker and splashes; the thresholds are fitted to the others.")
+    if silent_share > MAX_SILENT and video.mask is None and not args.make_mask:
+        print(f"{100 * silent_share:.0f} % of the pixels never fire although their neighbours do, as if the events were"
+              " warped to the frames; exclude them: write a mask with --make-mask, and use it with --mask.")
     print(describe(element, figures), flush=True)
     # After the result, which is then not lost if a disk is full.
     if args.profile:
         write_profile(args.profile, element, args.video, args.recording)
     if args.map:
         compare(video, recorded, simulated, measured, args.map)
+    if args.make_mask:
+        with open(args.make_mask, "wb") as file:
+            file.write(png_of(np.where(silent if video.mask is None else silent | ~video.mask, 0, 255)))
 
 
 if __name__ == "__main__":

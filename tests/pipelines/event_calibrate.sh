@@ -102,6 +102,27 @@ timeout 60 "$GST_LAUNCH" -q filesrc location=half.pgm ! decodebin ! videoconvert
 calibrate pictures.txt half.csv --element eventsim-dense --lag 0 --to 0.5 --mask half.png | tee found
 awk '/map correlation/ { exit !($3 > 0.9) }' found || fail "events outside the mask are compared"
 
+# Noise does not count where the frames do not change.
+"$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! videocrop right=81 ! videobox right=-80 ! matroskamux ! filesink location=still.mkv
+"$GST_LAUNCH" -q filesrc location=still.mkv ! decodebin ! eventsim-frame positive-threshold=12.5 negative-threshold=8.5 ! eventcsvenc ! filesink location=left.csv
+{
+  echo t,x,y,p
+  { tail -n +2 left.csv && awk -F, -v OFS=, 'NR > 1 && $2 >= 24 { $2 += 80; print }' noise.csv; } | sort -t, -k 1,1n
+} >noisy.csv
+calibrate still.mkv noisy.csv --element eventsim-frame --lag 0 --to 0.3 | tee found
+grep -q "^[1-9][0-9]* % of the recorded events are where the frames do not change" found || fail "no share of noise is printed"
+read -r positive negative < <(sed -n 's/.* positive-threshold=\([0-9.]*\) negative-threshold=\([0-9.]*\)$/\1 \2/p' found)
+awk -v p="$positive" -v n="$negative" 'BEGIN { exit !(p > 11.2 && p < 13.8 && n > 7.6 && n < 9.4) }' || fail "thresholds of $positive and $negative fit noise"
+
+# A recording that was warped to the frames has pixels that never fire.
+awk -F, 'NR == 1 || $2 % 3' recorded.csv >warped.csv
+calibrate pictures.txt warped.csv --element eventsim-dense --lag 0 --to 0.5 --make-mask warped.png | tee found
+! grep -q "never fire" found || fail "a mask is asked for although one is written"
+calibrate pictures.txt warped.csv --element eventsim-dense --lag 0 --to 0.5 | tee found
+grep -q "^[1-9][0-9]* % of the pixels never fire although their neighbours do" found || fail "silent pixels are not told"
+calibrate pictures.txt warped.csv --element eventsim-dense --lag 0 --to 0.5 --mask warped.png | tee found
+! grep -q "never fire" found || fail "pixels outside the mask are told"
+
 # Where the video is overexposed, events of the recording are left out.
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-frame positive-threshold=12.5 negative-threshold=8.5 ! evtenc ! filesink location=recorded.raw
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! videobalance brightness=0.4 ! matroskamux ! filesink location=bright.mkv
