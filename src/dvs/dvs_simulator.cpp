@@ -74,12 +74,10 @@ class PixelSimulator final : public DvsSimulator {
       frame_flow_.forget();  // its copy has the old exposure
     }
     if (moves) find_flow();
-    if (moves && settings_.exposure_time > 0) {
+    if (moves && settings_.exposure_time > 0)
       sharpen(interval.duration());
-    } else if (blurred_last_) {
+    else
       blurred_last_.reset();
-      frame_flow_.forget();
-    }
     begin(interval, true, settings);
     if (moves)
       advance_along_motion();
