@@ -32,19 +32,21 @@ using Bytes = std::vector<std::uint8_t>;
 constexpr SensorSize size{1280, 720};
 constexpr std::size_t count = 1 << 20;
 
-/// Ten events per microsecond: some in runs along rows, some at random pixels.
+/// Ten events per microsecond, from one second on: some in runs along rows, some at random pixels.
 Events make_events() {
   std::mt19937 random(1);
   const auto below = [&](int end) {
     return static_cast<int>(random() % static_cast<unsigned>(end));
   };
   Events events;
+  constexpr Microseconds start = 1'000'000;  // from 0 on, these times would be frame numbers
   while (events.size() < count) {
     const int y = below(size.height);
     int x = below(size.width);
     for (int run = below(2) == 0 ? 1 : below(30); run > 0 && x < size.width;
          --run, x += 1 + below(2))
-      events.push_back(AbsoluteEvent::at(x, y, static_cast<Microseconds>(events.size() / 10),
+      events.push_back(AbsoluteEvent::at(x, y,
+                                         start + static_cast<Microseconds>(events.size() / 10),
                                          below(2) == 0 ? Polarity::off : Polarity::on));
   }
   events.resize(count);
