@@ -182,8 +182,8 @@ void expect_matches(const MatchFigures& figures, const MatchFigures& expected) {
   EXPECT_NEAR(figures.nearest_distance, expected.nearest_distance, 1e-6);
 }
 
-void expect_ceiling(const CeilingFigures& figures, Extent extent, const Stream& stream,
-                    Microseconds start, std::size_t bins) {
+void expect_ceiling(const CeilingFigures& figures, const Stream& stream, Microseconds start,
+                    std::size_t bins) {
   std::array<Stream, 2> halves;
   std::mt19937 random;
   for (const auto& event : stream) halves[random() % 2].push_back(event);
@@ -354,7 +354,7 @@ TEST_P(ComparisonTest, IsThatOfAllEventsAtOnce) {
               correlation_plainly(rates_plainly(covered_reference, start, bins),
                                   rates_plainly(covered_candidate, start, bins)),
               1e-9);
-  expect_ceiling(figures.ceiling, scene.extent, covered_reference, start, bins);
+  expect_ceiling(figures.ceiling, covered_reference, start, bins);
 
   const auto whole = static_cast<std::size_t>((reference_end - start + 999) / 1000);
   EXPECT_GE(curve.bins().size(), whole);
