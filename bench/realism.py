@@ -15,7 +15,8 @@ import re
 import shutil
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from statistics import harmonic_mean
 
 import matplotlib
 import numpy as np
@@ -26,36 +27,51 @@ import matplotlib.pyplot as plt  # noqa: E402
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "pipelines"))
 from event_calibrate import Progress, calibrate, find_lag, fit_thresholds  # noqa: E402
 from event_streams import (  # noqa: E402
-    Gst, Span, compare, delayed, read_mask, read_recording, read_video, simulate, until)
+    Gst, Span, Video, compare, delayed, read_mask, read_recording, read_video, samples_of, simulate, until)
+from gst_eventcamera.pipeline import quoted  # noqa: E402
 from page import replace_tables  # noqa: E402
 
-# The name of each row, and its element.
+# The name of each row, and its element, whose thresholds are fitted.
 ROWS = {
     "frame": "eventsim-frame",
-    "dense, `dis-lq`, `forward`": "eventsim-dense flow=dis-lq interpolation=forward",
     "dense, `dis-lq`, `blend`": "eventsim-dense flow=dis-lq interpolation=blend",
-    "dense, `dis-hq`, `forward`": "eventsim-dense flow=dis-hq interpolation=forward",
-    "dense, `dis-hq`, `blend`": "eventsim-dense flow=dis-hq interpolation=blend",
     "dense, `farneback`, `forward`": "eventsim-dense flow=farneback interpolation=forward",
-    "dense, `farneback`, `blend`": "eventsim-dense flow=farneback interpolation=blend",
     "sparse": "eventsim-sparse",
     "diff": "eventsim-diff",
+    "`preset=esim`": "eventsim-dvs preset=esim",
+    "`preset=v2e-noisy`": "eventsim-dvs preset=v2e-noisy",
+    "`upsampling=linear`": "eventsim-dvs upsampling=linear",
     "`eventsim-dvs`": "eventsim-dvs",
 }
-# Of these, only the thresholds are fitted.
-PRESETS = {f"`{element}`": element for element in ("eventsim-dvs preset=esim", "eventsim-dvs preset=v2e-noisy")} | {
-    "`eventsim-dvs`, thresholds only": "eventsim-dvs",
-    "`eventsim-dvs`, thresholds only, straight lines": "eventsim-dvs upsampling=linear",
+CALIBRATED = "`event-calibrate`"
+LAG_IGNORED = f"{CALIBRATED}, lag ignored"
+# Rows of the table without calibration.
+UNCALIBRATED = ["eventsim-dvs"] + [f"eventsim-dvs preset={preset}" for preset in (
+    "davis240c", "davis346", "gen4", "hs-ergb", "ideal", "esim", "icns", "v2e-clean", "v2e-noisy")]
+# The methods of the paper, with its thresholds for much motion and for little, and its real events and peers.
+PAPER = {
+    "eventsim-dense flow=dis-lq": ((3, 56.3079, 58.9868), (13, 0.0472, 1.165)),
+    "eventsim-dense flow=dis-hq": ((3, 65.6304, 66.793), (35, 0.0462, 0.8783)),
+    "eventsim-dense flow=farneback": ((3, 65.999, 67.4279), (19, 0.0445, 0.574)),
+    "eventsim-sparse": ((6, 59.3083, 52.3827), (27, 0.0467, 0.439)),
+    "eventsim-diff": ((19, 59.3034, 55.0075), (112, 0.0461, 0.8785)),
 }
-CALIBRATED = "`eventsim-dvs`"
+PAPER_REAL = "| real events | ? | 62.79, 82.71 | | 43 / −17 | 0.046, 1.023 | |"
+# Video, its size, and interpolated frames.
+PAPER_VIDEOS = (("driving-1280x720-25fps.mp4", 640, 480, 20), ("cars-768x432-12fps.mp4", 768, 432, 10))
 # Fields of matches.
 WITHIN = ("within-1ms", "within-5ms", "within-10ms")
-# What each stage of the calibrated element contributes: the same without it, with thresholds that fit again.
-WITHOUT = {
-    f"{CALIBRATED}, `{change}`": change
-    for change in ("response=linear", "upsampling=linear", "upsampling=motion", "denoise=0", "adaptation=0",
-                   "threshold-jitter=0", "exposure-pulse=0")
-}
+
+
+@dataclass
+class ExposedVideo(Video):
+    """A video whose recording has events only during exposures."""
+
+    exposures: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # starts and ends, seconds
+
+    def of_camera(self, events):
+        before = np.searchsorted(self.exposures[:, 0] * 1e6, events["t"], side="right") - 1
+        return events[(before >= 0) & (events["t"] < self.exposures[before, 1] * 1e6)]
 
 
 @dataclass
@@ -69,6 +85,7 @@ class Scene:
     calibrated: int  # frame intervals to calibrate on
     measured: int  # frame intervals after them to measure
     mask: str = ""  # picture that is white where pixels of the camera can fire
+    exposures: str = ""  # text file of the times of which events are known
 
 
 SCENES = {
@@ -76,10 +93,10 @@ SCENES = {
                     "events-t-x-y-p.txt.gz", 2, 2),
     "cradle": Scene("dark-cradle, a DAVIS346 in front of Newton's cradle in the dark, 346x260", "dark-cradle",
                     "davis346.aedat4", "davis346.aedat4", 4, 8),
-    "balloon": Scene("balloon, an event camera beside a frame camera at 160 frames per second, 957x856", "balloon",
-                     "images.txt", "events.raw", 10, 14, "reachable.png"),
-    "davis": Scene("a DAVIS346 in front of a workbench, 346x260", "events",
-                   "davis346-frames-events-imu.aedat4", "davis346-frames-events-imu.aedat4", 1, 1),
+    "balloon": Scene("balloon, a Prophesee Gen4 beside a frame camera at 160 frames per second, 957x856", "balloon",
+                     "images.txt", "events.raw", 10, 14, mask="reachable.png"),
+    "cups": Scene("blurred-cups, a DAVIS346 with exposures of 104 ms, 346x260", "blurred-cups", "images.txt",
+                  "events.raw", 6, 9, exposures="exposures.txt"),
 }
 
 
@@ -101,7 +118,12 @@ def read(scene, data):
         recorded = read_recording(unpacked(os.path.join(folder, scene.recording), scratch), video)
     if scene.mask:
         video.mask = read_mask(os.path.join(folder, scene.mask), video)
+    if scene.exposures:
+        video = ExposedVideo(**vars(video), exposures=np.loadtxt(os.path.join(folder, scene.exposures)))
     return video, video.of_camera(recorded)
+
+
+# tables
 
 
 def measure(scene, data, progress):
@@ -116,33 +138,29 @@ def measure(scene, data, progress):
         return (Span(times[past], times[scene.calibrated]),
                 Span(times[scene.calibrated], times[last]))
 
-    lag = 0.0
-    if past > 0:
-        training, _ = spans(video)
-        lag = find_lag(until(video, training.end), recorded, training, ROWS[CALIBRATED], progress)
+    training, _ = spans(video)
+    lag = find_lag(until(video, training.end), recorded, training, "eventsim-dvs", progress)
 
     def measured(video, element, fit):
         """A row of the table, of an element that was fitted to the first intervals."""
         training, test = spans(video)
         visible = video.visible(recorded)
-        element = fit(until(video, training.end), visible, training, element, progress)
+        if fit:
+            element = fit(until(video, training.end), visible, training, element, progress)
         progress.tell(f"measured: {element}")
         return {"element": element} | compare(video, visible, simulate(video, element), test)
 
     on_time = delayed(video, lag)
-    rows = {name: measured(on_time, element, calibrate) for name, element in ROWS.items()}
-    rows |= {name: measured(on_time, element, fit_thresholds) for name, element in PRESETS.items()}
-    calibrated = rows[CALIBRATED]["element"]
-    for name, change in WITHOUT.items():
-        if change not in calibrated.split() and f" {change.split('=')[0]}=" in calibrated:
-            rows[name] = measured(on_time, f"{calibrated} {change}", fit_thresholds)
+    rows = {name: measured(on_time, element, fit_thresholds) for name, element in ROWS.items()}
+    rows[CALIBRATED] = measured(on_time, "eventsim-dvs", calibrate)
     if lag != 0:
-        rows[f"{CALIBRATED}, lag ignored"] = measured(video, calibrated, fit_thresholds)
+        rows[LAG_IGNORED] = measured(video, rows[CALIBRATED]["element"], fit_thresholds)
+    uncalibrated = {element: measured(on_time, element, None) for element in UNCALIBRATED}
     progress.end()
     _, test = spans(on_time)
     hidden = 1 - len(test.of(on_time.visible(recorded))) / len(test.of(recorded))
     return {"title": scene.title, "lag": lag, "calibrated": scene.calibrated,
-            "measured": scene.measured, "overexposed": hidden, "rows": rows}
+            "measured": scene.measured, "overexposed": hidden, "rows": rows, "uncalibrated": uncalibrated}
 
 
 def thresholds_of(element):
@@ -154,94 +172,130 @@ def bold_where(best, text):
     return f"**{text}**" if best else text
 
 
+def deviation(row, name):
+    """The deviation of a figure from the camera's, as a factor minus 1."""
+    return row["candidate"][name] / row["reference"][name] - 1
+
+
+def both_shares(row, within):
+    return harmonic_mean([row[f"{side}-matches"][within] for side in ("reference", "candidate")])
+
+
 def table(result):
     """A row per simulator; the values closest to the real camera are bold."""
     rows = result["rows"]
-    first = next(iter(rows.values()))
-    real, ceiling = first["reference"], first["noise-ceiling"]
-    matches = ", ".join(f"{ceiling['matches'][within]:.2f}" for within in WITHIN)
-    shares = [(side, within) for side in ("reference", "candidate") for within in WITHIN]
 
-    def off(row, field):
-        return abs(np.log(max(row["candidate"][field], 1e-9) / real[field]))
+    def best(value_of, among=rows.values()):
+        return max(value_of(row) for row in among)
 
-    nearest = {field: min(off(row, field) for row in rows.values())
-               for field in ("mean", "std-dev")}
-    best_map = max(row["map-correlation"] for row in rows.values())
-    best_intervals = min(row["interval-distance"] for row in rows.values()
-                         if row["interval-distance"] > 0)
-    best_share = {share: max(row[f"{share[0]}-matches"][share[1]] for row in rows.values())
-                  for share in shares}
+    def nearness(name):
+        return lambda row: -abs(np.log(max(1 + deviation(row, name), 1e-9)))
+
+    real = next(iter(rows.values()))["reference"]
     lines = [
         "| | C+ / C− | mean | std. dev. | map correlation | interval distance"
-        " | real events matched within 1, 5, 10 ms | simulated events matched |",
+        " | matches within 1, 5, 10 ms | of real / simulated events |",
         "|---|---|---|---|---|---|---|---|",
         f"| real events | | {real['mean']:.3f} | {real['std-dev']:.3f} | | | | |",
-        f"| noise ceiling | | | | {ceiling['map-correlation']:.3f} | {ceiling['interval-distance']:.2f}"
-        f" | {matches} | {matches} |",
     ]
     for name, row in rows.items():
         cells = [name, thresholds_of(row["element"])]
-        for field in ("mean", "std-dev"):
-            value = row["candidate"][field]
-            cells.append(bold_where(
-                off(row, field) == nearest[field],
-                f"{value:.3f} ({100 * (value / real[field] - 1):+.0f} %)"))
-        cells.append(bold_where(row["map-correlation"] == best_map,
+        for figure in ("mean", "std-dev"):
+            cells.append(bold_where(nearness(figure)(row) == best(nearness(figure)),
+                                    f"{100 * deviation(row, figure):+.0f} %"))
+        cells.append(bold_where(row["map-correlation"] == best(lambda row: row["map-correlation"]),
                                 f"{row['map-correlation']:.3f}"))
-        cells.append(bold_where(row["interval-distance"] == best_intervals,
+        cells.append(bold_where(row["interval-distance"] == -best(lambda row: -row["interval-distance"]),
                                 f"{row['interval-distance']:.2f}"))
-        for side in ("reference", "candidate"):
-            values = []
-            for within in WITHIN:
-                value = row[f"{side}-matches"][within]
-                values.append(bold_where(value == best_share[side, within], f"{value:.2f}"))
-            cells.append(", ".join(values))
+        cells.append(", ".join(
+            bold_where(both_shares(row, within) == best(lambda row, within=within: both_shares(row, within)),
+                       f"{both_shares(row, within):.2f}") for within in WITHIN))
+        cells.append(" / ".join(", ".join(f"{row[f'{side}-matches'][within]:.2f}" for within in WITHIN)
+                                for side in ("reference", "candidate")))
         lines.append("| " + " | ".join(cells) + " |")
-    calibrated = rows[CALIBRATED]["element"]
-    lag = f"{1000 * result['lag']:.1f} ms" if result["lag"] != 0 else "not estimated"
-    lines += ["", f"Frame intervals: {result['calibrated']} for calibration, the next {result['measured']} for measurement.",
-              f"Frame lag: {lag}.", f"Events where the frames are overexposed: {100 * result['overexposed']:.0f} %.",
-              "Calibrated element:", "", "```", calibrated, "```", ""]
+    lines += ["", f"Frame intervals: {result['calibrated']} for calibration, the next {result['measured']} for"
+              " measurement.", f"Frame lag: {1000 * result['lag']:.1f} ms.",
+              f"Events where the frames are overexposed: {100 * result['overexposed']:.0f} %.", "",
+              "```", rows[CALIBRATED]["element"], "```", ""]
     return "\n".join([f"### {result['title'][0].upper()}{result['title'][1:]}", ""] + lines)
 
 
-def plot(path, rows):
+def uncalibrated_table(results):
+    """The error of the mean of elements that are not calibrated, and their map correlation."""
+    lines = ["### Without calibration", "",
+             "Error of the mean event rate, and map correlation.", "",
+             "| | " + " | ".join(result["title"].split(",")[0] for result in results.values()) + " |",
+             "|---|" + "---|" * len(results)]
+    for element in UNCALIBRATED:
+        cells = []
+        for result in results.values():
+            row = result["uncalibrated"][element]
+            cells.append(f"{100 * deviation(row, 'mean'):+.0f} %, {row['map-correlation']:.2f}")
+        lines.append(f"| `{element}` | " + " | ".join(cells) + " |")
+    return "\n".join(lines + [""])
+
+
+def paper_table(data):
+    """Mean and standard deviation of the event rate with the paper's thresholds, its own and those here."""
+    lines = ["### The paper's thresholds", "",
+             "Mean and standard deviation of the event rate per pixel, in Hz.", "",
+             "| | driving: C+, C− | paper's video | here | table tennis: C+, C− | paper's video | car park, here |",
+             "|---|---|---|---|---|---|---|", PAPER_REAL]
+    for element, scenes in PAPER.items():
+        cells = [f"`{element}`"]
+        for (threshold, mean, deviation), (name, width, height, frames) in zip(scenes, PAPER_VIDEOS):
+            with tempfile.TemporaryDirectory() as folder:
+                path = os.path.join(folder, "figures.json")
+                for _ in samples_of(
+                        f"filesrc location={quoted(os.path.join(data, 'video', name))} ! decodebin ! videoscale"
+                        f" ! video/x-raw,width={width},height={height} ! {element} positive-threshold={threshold}"
+                        f" negative-threshold={threshold} interpolated-frames={frames}"
+                        f" ! eventstats location={quoted(path)} ! appsink name=out sync=false"):
+                    pass
+                with open(path, encoding="utf-8") as file:
+                    figures = json.load(file)
+            cells += [str(threshold), f"{mean:.4g}, {deviation:.4g}",
+                      f"{figures['mean']:.4g}, {figures['std-dev']:.4g}"]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines + [""])
+
+
+def plot(path, results):
     """Bar charts of how close each simulator is to the camera."""
-    real = next(iter(rows.values()))["reference"]
-    names = [name.replace("`", "") for name in rows][::-1]
-    panels = {
-        "standard deviation, relative to the camera": (
-            [row["candidate"]["std-dev"] / real["std-dev"] for row in rows.values()], 1),
-        "map correlation": ([row["map-correlation"] for row in rows.values()], None),
-        "real events matched within 5 ms": (
-            [row["reference-matches"]["within-5ms"] for row in rows.values()], None),
-        "simulated events matched": (
-            [row["candidate-matches"]["within-5ms"] for row in rows.values()], None),
-    }
-    figure, axes = plt.subplots(1, len(panels), figsize=(15, 4.6), sharey=True, dpi=90)
-    for axis, (title, (values, goal)) in zip(axes, panels.items()):
-        axis.barh(names, values[::-1], color="#4080d0")
-        axis.set_title(title, fontsize=10)
-        if goal is not None:
-            axis.axvline(goal, color="#1c2230", linewidth=1)
+    figure, axes = plt.subplots(1, len(results), figsize=(15, 4.2), sharey=True, dpi=90)
+    for axis, result in zip(axes, results.values()):
+        rows = result["rows"]
+        names = [name.replace("`", "") for name in rows if name != LAG_IGNORED][::-1]
+        places = np.arange(len(names))
+        for offset, (label, colour, value_of) in zip((0.3, 0, -0.3), (
+                ("map correlation", "#4080d0", lambda row: row["map-correlation"]),
+                ("matches within 5 ms", "#40a070", lambda row: both_shares(row, "within-5ms")),
+                ("matches within 1 ms", "#e0a030", lambda row: both_shares(row, "within-1ms")))):
+            values = [value_of(row) for name, row in rows.items() if name != LAG_IGNORED][::-1]
+            axis.barh(places + offset, values, 0.28, color=colour, label=label)
+        axis.set_yticks(places, names)
+        axis.set_xlim(0, 1)
+        axis.set_title(result["title"].split(",")[0], fontsize=10)
         axis.spines[["top", "right"]].set_visible(False)
+    axes[0].legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, -0.28), ncols=3)
     figure.tight_layout()
     figure.savefig(path)
 
 
-def draw(path, scene, data, elements):
+def draw(path, scene, data, result):
     """Draws the events of the last interval, side by side: ON blue, OFF dark, both dark blue."""
     colours = np.array([[255, 255, 255], [28, 34, 48], [64, 128, 208], [46, 81, 128]], np.uint8)
     video, recorded = read(scene, data)
+    video = delayed(video, result["lag"])
     span = Span(video.frames[-2].time // 1000, video.frames[-1].time // 1000)
     streams = {"real events": span.of(recorded)} | {
-        name: span.of(simulate(video, element)) for name, element in elements.items()}
+        name: span.of(simulate(video, row["element"]))
+        for name, row in result["rows"].items() if name != LAG_IGNORED}
     tiles = {"camera, before": video.luma(video.frames[-2])} | {
         name.replace("`", ""): events for name, events in streams.items()}
-    columns = 5
+    columns = 4
     rows = (len(tiles) + columns - 1) // columns
-    figure, axes = plt.subplots(rows, columns, figsize=(columns * 3.5, rows * 2.9), dpi=60)
+    figure, axes = plt.subplots(rows, columns, figsize=(columns * 4, rows * 3.2), dpi=60)
     for axis in axes.flat:
         axis.axis("off")
     for axis, (name, tile) in zip(axes.flat, tiles.items()):
@@ -275,14 +329,14 @@ def main():
     if os.path.isdir("bench-output"):
         with open(os.path.join("bench-output", "realism.json"), "w", encoding="utf-8") as file:
             json.dump(results, file, indent=1)
-    text = "\n".join(table(result) for result in results.values())
+    text = "\n".join([uncalibrated_table(results)] + [table(result) for result in results.values()]
+                     + [paper_table(data)])
     print(text)
     if len(sys.argv) > 1 and len(results) == len(SCENES):
         replace_tables(os.path.join(sys.argv[1], "realism.md"), "bench/realism", text)
-        plot(os.path.join(sys.argv[1], "realism-figures.png"), results["slider"]["rows"])
-        # The licence of the other recording allows measuring only.
-        draw(os.path.join(sys.argv[1], "realism.png"), SCENES["davis"], data,
-             {name: row["element"] for name, row in results["davis"]["rows"].items()})
+        plot(os.path.join(sys.argv[1], "realism-figures.png"), results)
+        # The licence of the other recordings allows measuring only.
+        draw(os.path.join(sys.argv[1], "realism.png"), SCENES["cradle"], data, results["cradle"])
 
 
 if __name__ == "__main__":
