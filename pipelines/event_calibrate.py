@@ -61,8 +61,8 @@ MAX_BALANCE = 1.1
 PROFILED = "eventsim-dvs"
 # Frames explain the events in blocks of this size, and next to them, where even this threshold is reached.
 BLOCK, LOW_THRESHOLD = 8, 0.1
-# Share of pixels without events, among those whose neighbours have this many, that a camera does not reach.
-MAX_SILENT, BUSY_EVENTS = 0.05, 24
+# Largest share of pixels without events among those of which so many neighbours have events, and so many of them.
+MAX_SILENT, BUSY_NEIGHBOURS, BUSY_EVENTS = 0.05, 5, 24
 # Seconds between two lines of progress where there is no terminal.
 PROGRESS_INTERVAL = 60
 
@@ -128,8 +128,11 @@ def silent_pixels(sensor, recorded):
     they are."""
     count = np.bincount(sensor.pixels_of(recorded), minlength=sensor.width * sensor.height)
     padded = np.pad(count.reshape(sensor.height, sensor.width), 1)
-    around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).sum(axis=(2, 3)) - padded[1:-1, 1:-1]
-    busy = around >= BUSY_EVENTS
+
+    def around(values):
+        return np.lib.stride_tricks.sliding_window_view(values, (3, 3)).sum(axis=(2, 3)) - values[1:-1, 1:-1]
+
+    busy = (around(padded) >= BUSY_EVENTS) & (around((padded > 0).astype(int)) >= BUSY_NEIGHBOURS)
     silent = busy & (padded[1:-1, 1:-1] == 0)
     return silent, silent.sum() / max(busy.sum(), 1)
 
