@@ -30,17 +30,34 @@ using enum RefractoryReset;
 //   1.066 Gev/s of readout, latency below 220 us at 5 lux and about 100 us in office light.
 //
 // The fractions of hot pixels are guesses.
+constexpr DvsSettings standard = {.denoise = automatic_denoise,
+                                  .exposure_compensation = true,
+                                  .response = log,
+                                  .log_eps = 0.05,
+                                  .overexposed_light = 1.5,
+                                  .upsampling = Upsampling::motion,
+                                  .positive_threshold = 0.26,
+                                  .negative_threshold = 0.26,
+                                  .adaptation = 0.05};
+
+constexpr DvsSettings gen4 = [] {
+  auto settings = standard;
+  settings.cutoff_frequency = 450;
+  settings.threshold_sigma = 0.005;
+  settings.leak_rate = 0.1;
+  settings.leak_spread = 0.1;
+  settings.shot_noise_rate = 0.1;
+  settings.hot_pixels = 1e-5;
+  settings.refractory_period = 100'000;
+  settings.refractory_reset = signal;
+  settings.pixel_latency = 100'000;
+  settings.pixel_latency_jitter = 20'000;
+  settings.max_rate = 1.066e9;
+  return settings;
+}();
+
 constexpr std::pair<DvsPreset, DvsSettings> table[] = {
-    {DvsPreset::standard,
-     {.denoise = automatic_denoise,
-      .exposure_compensation = true,
-      .response = log,
-      .log_eps = 0.05,
-      .overexposed_light = 1.5,
-      .upsampling = Upsampling::motion,
-      .positive_threshold = 0.26,
-      .negative_threshold = 0.26,
-      .adaptation = 0.05}},
+    {DvsPreset::standard, standard},
     {DvsPreset::ideal, {}},
     {DvsPreset::esim, {.response = log}},
     {DvsPreset::v2e_clean, {.threshold_sigma = 0.02}},
@@ -91,27 +108,7 @@ constexpr std::pair<DvsPreset, DvsSettings> table[] = {
       .hot_pixels = 1e-4,
       .adaptation = 0.05,
       .max_rate = 12e6}},
-    {DvsPreset::gen4,
-     {.denoise = automatic_denoise,
-      .exposure_compensation = true,
-      .response = log,
-      .log_eps = 0.05,
-      .overexposed_light = 1.5,
-      .upsampling = Upsampling::motion,
-      .cutoff_frequency = 450,
-      .positive_threshold = 0.26,
-      .negative_threshold = 0.26,
-      .threshold_sigma = 0.005,
-      .leak_rate = 0.1,
-      .leak_spread = 0.1,
-      .shot_noise_rate = 0.1,
-      .hot_pixels = 1e-5,
-      .adaptation = 0.05,
-      .refractory_period = 100'000,
-      .refractory_reset = signal,
-      .pixel_latency = 100'000,
-      .pixel_latency_jitter = 20'000,
-      .max_rate = 1.066e9}},
+    {DvsPreset::gen4, gen4},
     {DvsPreset::hs_ergb,
      {.denoise = 8,
       .linear_light = true,
