@@ -97,9 +97,7 @@ void describe_channels(const GstVideoInfo& video, eventcamera::gl::TextureFrame&
   const auto channel = [&](guint component) -> int& {
     return frame.weights[GST_VIDEO_INFO_COMP_POFFSET(&video, component)];
   };
-  const bool is_narrow =
-      !GST_VIDEO_INFO_IS_RGB(&video) && video.colorimetry.range == GST_VIDEO_COLOR_RANGE_16_235;
-  frame.black = is_narrow ? 16 : 0;
+  frame.black = has_narrow_luma(video) ? 16 : 0;
   frame.alpha =
       GST_VIDEO_INFO_HAS_ALPHA(&video) ? GST_VIDEO_INFO_COMP_POFFSET(&video, GST_VIDEO_COMP_A) : -1;
   std::fill(std::begin(frame.weights), std::end(frame.weights), 0);

@@ -33,6 +33,10 @@ LumaWeights luma_weights_of(const GstVideoInfo& video) {
   return LumaWeights::of(kr, kb);
 }
 
+bool has_narrow_luma(const GstVideoInfo& video) {
+  return !GST_VIDEO_INFO_IS_RGB(&video) && video.colorimetry.range == GST_VIDEO_COLOR_RANGE_16_235;
+}
+
 namespace {
 
 /// True for RGB16 and similar formats with one word per pixel.
@@ -69,8 +73,7 @@ FrameLuma::FrameLuma(const GstVideoInfo& video)
       layout_(layout_of(video)),
       has_alpha_(GST_VIDEO_INFO_HAS_ALPHA(&video)),
       format_(format_of(video)),
-      is_narrow_(!GST_VIDEO_INFO_IS_RGB(&video) &&
-                 video.colorimetry.range == GST_VIDEO_COLOR_RANGE_16_235),
+      is_narrow_(has_narrow_luma(video)),
       weights_(luma_weights_of(video)) {
   if (layout_ == Layout::plane && !has_alpha_) return;
   if (format_.bits == 8)

@@ -13,6 +13,9 @@
 /// derived from the primaries.
 eventcamera::LumaWeights luma_weights_of(const GstVideoInfo& video);
 
+/// True if the luma of the video has limited range: black is 16, and white 235, of 255.
+bool has_narrow_luma(const GstVideoInfo& video);
+
 /// Luma of video of EVENT_SIMULATOR_INPUT_FORMATS: read in place if it is a plane, copied if it is
 /// interleaved with chroma or byte-swapped, or computed from RGB. Transparent video is composited
 /// on black.
