@@ -25,7 +25,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "pipelines"))
-from event_calibrate import Progress, calibrate, find_lag, fit_thresholds  # noqa: E402
+from event_calibrate import Progress, Search, calibrate, find_lag, fit_thresholds  # noqa: E402
 from event_streams import (  # noqa: E402
     Gst, Span, Video, compare, delayed, read_mask, read_recording, read_video, samples_of, simulate, until)
 from gst_eventcamera.pipeline import quoted  # noqa: E402
@@ -126,6 +126,10 @@ def read(scene, data):
 # tables
 
 
+def calibrated(video, recorded, span, element, progress):
+    return calibrate(Search(video, recorded, span, progress), element)
+
+
 def measure(scene, data, progress):
     """The rows of a scene. With several intervals to calibrate on, the first only gives the pixels a
     history."""
@@ -152,7 +156,7 @@ def measure(scene, data, progress):
 
     on_time = delayed(video, lag)
     rows = {name: measured(on_time, element, fit_thresholds) for name, element in ROWS.items()}
-    rows[CALIBRATED] = measured(on_time, "eventsim-dvs", calibrate)
+    rows[CALIBRATED] = measured(on_time, "eventsim-dvs", calibrated)
     if lag != 0:
         rows[LAG_IGNORED] = measured(video, rows[CALIBRATED]["element"], fit_thresholds)
     uncalibrated = {element: measured(on_time, element, None) for element in UNCALIBRATED}

@@ -143,7 +143,10 @@ class Search:
 
     def __init__(self, video, recorded, span, progress):
         self.video, self.recorded, self.span, self.progress = video, recorded, span, progress
-        self.explained = recorded[explained(video, recorded)]
+        is_explained = explained(video, recorded)
+        self.explained = recorded[is_explained]
+        in_span = is_explained[(recorded["t"] > span.start) & (recorded["t"] <= span.end)]
+        self.unexplained_share = 1 - in_span.mean() if len(in_span) else 0
         self.parts = parts_of(video, span)
         # The last stream of a threshold search is rated.
         self.simulated_by = functools.lru_cache(maxsize=4)(functools.partial(simulate, video))
@@ -199,12 +202,12 @@ def changed(element, change):
     return Setting(" ".join([element, *values]), shares)
 
 
-def calibrate(video, recorded, span, element, progress):
+def calibrate(search, element):
     """The element with calibrated thresholds, and with those of its changes that gain more than their noise."""
-    search = Search(video, recorded, span, progress)
+    progress = search.progress
     began = time.monotonic()
     progress.say(f"calibrated thresholds: {search.fit(Setting(element), search.parts)}")
-    changes = changes_of(video, recorded, span, element)
+    changes = changes_of(search.video, search.recorded, search.span, element)
     if not changes:
         return search.balanced(Setting(element))
     kept = {}
@@ -463,9 +466,8 @@ def main():
     hidden = 1 - len(measured.of(visible)) / max(len(measured.of(recorded)), 1)
     recorded = visible
     silent, silent_share = silent_pixels(video, recorded)
-    calibrated = span.of(recorded)
-    unexplained = 1 - np.mean(explained(until(video, span.end), calibrated)) if len(calibrated) else 0
-    element = calibrate(until(video, span.end), recorded, span, args.element, progress)
+    search = Search(until(video, span.end), recorded, span, progress)
+    element = calibrate(search, args.element)
     progress.end()
     simulated = simulate(video, element)
     figures = compare(video, recorded, simulated, measured)
@@ -475,8 +477,8 @@ def main():
         print(f"Frames show the scene {lag * 1000:.1f} ms later than their timestamps.")
     if hidden >= 0.005:
         print(f"{100 * hidden:.0f} % of the recorded events are excluded: the frames are overexposed there.")
-    if unexplained >= 0.005:
-        print(f"{100 * unexplained:.0f} % of the recorded events are where the frames do not change, such as noise,"
+    if search.unexplained_share >= 0.005:
+        print(f"{100 * search.unexplained_share:.0f} % of the recorded events are where the frames do not change, such as noise,"
               " flicker and splashes; the thresholds are fitted to the others.")
     if silent_share > MAX_SILENT and video.mask is None and not args.make_mask:
         print(f"{100 * silent_share:.0f} % of the pixels never fire although their neighbours do, as if the events were"
