@@ -155,7 +155,7 @@ PLAYED int open(const char* path, int flags, ...) {
   const auto mode = (flags & O_CREAT) != 0 ? va_arg(rest, mode_t) : 0;
   va_end(rest);
   const auto device = played(path);
-  const int descriptor = next("open", open)(device ? "/dev/null" : path, flags, mode);
+  const int descriptor = next("open", open)(device ? "/dev/zero" : path, flags, mode);
   if (device) open_devices[descriptor] = *device;
   return descriptor;
 }

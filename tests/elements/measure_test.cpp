@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // eventstats and eventcompare: which events count, when statistics are posted, and what is written.
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -275,7 +278,7 @@ TEST_F(StatsTest, GoesOnWhereTimeGoesBackAndWherePtsAreMissing) {
   EXPECT_NEAR(number_in(structure_of(message), "rate"), 100, 1e-9);
 }
 
-TEST_F(StatsTest, WritesToALinkAndADevice) {
+TEST_F(StatsTest, WritesToALinkAPipeAndADevice) {
   const auto measure = [](const std::string& location) {
     Harness h("eventstats location=" + in_quotes(location));
     h.caps(small_sensor);
@@ -290,9 +293,18 @@ TEST_F(StatsTest, WritesToALinkAndADevice) {
     EXPECT_TRUE(std::filesystem::is_symlink(path("link")));
     EXPECT_TRUE(std::filesystem::remove(file));
   }
-  EXPECT_EQ(measure("/dev/null"), "");
-  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+  const auto pipe = path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  ASSERT_GE(reader, 0);
+  EXPECT_EQ(measure(pipe), "");
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+  char first = 0;
+  EXPECT_EQ(read(reader, &first, 1), 1);
+  EXPECT_EQ(first, '{');
+  close(reader);
   EXPECT_NE(measure("/dev/full"), "");
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
 }
 
 TEST_F(StatsTest, RefusesEventsWithoutTimes) {

@@ -395,7 +395,7 @@ cmp ball.raw rest.raw.part || fail "the input rest.raw.part was written to"
 [ ! -e rest.raw.part2 ] || fail "rest.raw.part2 is left"
 # Pipes and devices are neither read in part nor replaced.
 mkfifo pipe.raw
-ln -s /dev/null device.dat
+ln -s /dev/full device.dat
 refused "pipe.raw is not a regular file; save it to a file first" pipe.raw out.dat
 refused "is not a regular file; save it to a file first" <(cat ball.raw) out.dat
 refused "pipe.raw is not a regular file, and would be replaced" ball.raw pipe.raw
