@@ -435,7 +435,7 @@ static gboolean decide_allocation(GstAggregator*, GstQuery* query) {
 }
 
 static void gst_event_render_class_init(GstEventRenderClass* klass) {
-  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  Properties<aggregator_settings<EventRender>> properties(G_OBJECT_CLASS(klass));
   add_render_properties(properties);
 
   auto* const aggregator = GST_EVENT_AGGREGATOR_CLASS(klass);
