@@ -64,11 +64,11 @@ HWY_EXPORT(smooth);
 namespace {
 
 /// Right half of a Gaussian whose sum over both halves is 1.
-std::vector<float> gaussian(float deviation) {
+std::vector<float> gaussian(double deviation) {
   std::vector<double> half{1};
   double sum = 1;
-  for (int i = 1; i <= std::ceil(2.5F * deviation); ++i) {
-    half.push_back(std::exp(-i * i / (2.0 * deviation * deviation)));
+  for (int i = 1; i <= std::ceil(2.5 * deviation); ++i) {
+    half.push_back(std::exp(-i * i / (2 * deviation * deviation)));
     sum += 2 * half.back();
   }
   std::vector<float> weights(half.size());

@@ -15,13 +15,13 @@ namespace eventcamera {
 class Reconstruction {
  public:
   struct Settings {
-    float cutoff = 40;    ///< period of the temporal high pass, events of a pixel; above 4
-    float smoothing = 1;  ///< standard deviation of the picture's low pass, pixels; 0 = none
+    double cutoff = 40;    ///< period of the temporal high pass, events of a pixel; above 4
+    double smoothing = 1;  ///< standard deviation of the picture's low pass, pixels; 0 = none
 
     friend bool operator==(const Settings&, const Settings&) = default;
   };
-  static constexpr float min_cutoff = 5;
-  static constexpr float max_smoothing = 5;
+  static constexpr double min_cutoff = 5;
+  static constexpr double max_smoothing = 5;
 
   /// Throws std::bad_alloc.
   Reconstruction(int width, int height, const Settings& settings);
