@@ -23,6 +23,9 @@
  * pause of more than a minute there are pictures for a second only, with one warning. At framerate
  * 0/1 each buffer of events becomes one picture.
  *
+ * Played slower, at a rate below 1, there are as many pictures a second as before, each of a
+ * shorter interval. Events cannot be drawn backwards: a seek at a negative rate is refused.
+ *
  * ## Example launch line
  * |[
  * gst-launch-1.0 videotestsrc pattern=ball ! eventsim-diff ! eventrender mode=decay !
@@ -102,6 +105,9 @@ class EventRender final : public EventAggregator {
                   std::optional<GstClockTime> end, GstBuffer* buffer);
   GstFlowReturn handle_buffer(GstBuffer* buffer);
   void drop_buffer();
+  void begin_pictures(GstClockTime start) {
+    times_.emplace(start, *state_->video, segment_of(main_pad()).rate);
+  }
   void begin_now();
   bool skip(const EventInterval& picture);
   bool has_begun_picture() const;
@@ -161,7 +167,7 @@ bool EventRender::approach(GstBuffer* buffer, const EventInterval& interval) {
   const GstClockTime segment_start = segment_of(main_pad()).start;
   if (!times_ && state_->has_framerate() &&
       (interval.end > segment_start || interval.start >= segment_start))
-    times_.emplace(std::max(interval.start, segment_start), *state_->video);
+    begin_pictures(std::max(interval.start, segment_start));
   return times_ && interval.start >= times_->events().end;
 }
 
@@ -213,7 +219,7 @@ void EventRender::begin_now() {
   if (!GST_CLOCK_TIME_IS_VALID(position) || !state_->has_framerate()) return;
   GST_DEBUG_OBJECT(element(), "no events yet: first picture at %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(position));
-  times_.emplace(position, *state_->video);
+  begin_pictures(position);
 }
 
 GstFlowReturn EventRender::aggregate(bool timed_out) {
@@ -356,7 +362,7 @@ bool EventRender::set_video(const GstCaps* caps) {
   if (times_) {
     const GstClockTime start = times_->picture().start;
     times_.reset();
-    if (state_->has_framerate()) times_.emplace(start, video);
+    if (state_->has_framerate()) begin_pictures(start);
   }
   const GstClockTime latency = frame_duration(video);
   GST_DEBUG_OBJECT(element(), "drawing %" GST_PTR_FORMAT ", latency %" GST_TIME_FORMAT, caps,
