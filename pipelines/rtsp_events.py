@@ -30,7 +30,8 @@ except (ImportError, ValueError) as missing:
 
 from capture import Capture, Source, described, find_elements, host_of, option_parser  # noqa: E402
 
-ELEMENTS = ["vp8enc", "rtpvp8pay", "x264enc", "rtph264pay"]
+ELEMENTS = ["vp8enc", "rtpvp8pay",
+            "x264enc", "rtph264pay"]
 
 EVENTS_CAPTURED = "application/x-event-camera"
 # A format that every simulator and the encoder support.
