@@ -168,6 +168,12 @@ GstStructure* structure_of(const StreamComparison& comparison) {
   GstStructure* structure =
       gst_structure_new("eventcompare", "start", G_TYPE_INT64, gint64{figures.start}, "end",
                         G_TYPE_INT64, gint64{figures.end}, nullptr);
+  const auto& reference = comparison.causes(StreamRole::reference);
+  const auto& candidate = comparison.causes(StreamRole::candidate);
+  const bool is_all_dropped = figures.streams[StreamRole::candidate].events == 0;
+  if (reference.all() > 0 && (candidate.all() > 0 || is_all_dropped))
+    put_structure(structure, "classification",
+                  structure_of(Classification::of(reference, candidate)));
   for (const auto role : both_roles) {
     GstStructure* stream = gst_structure_new_empty(name_of(role));
     put_figures(stream, figures.streams[role]);
@@ -188,12 +194,6 @@ GstStructure* structure_of(const StreamComparison& comparison) {
   put_structure(ceiling, "matches", matches_of(figures.ceiling.matches));
   put_structure(structure, "noise-ceiling", ceiling);
   put_structure(structure, "rate-curve", curve_of(comparison.rates()));
-  const auto& reference = comparison.causes(StreamRole::reference);
-  const auto& candidate = comparison.causes(StreamRole::candidate);
-  const bool is_all_dropped = figures.streams[StreamRole::candidate].events == 0;
-  if (reference.all() > 0 && (candidate.all() > 0 || is_all_dropped))
-    put_structure(structure, "classification",
-                  structure_of(Classification::of(reference, candidate)));
   return structure;
 }
 
