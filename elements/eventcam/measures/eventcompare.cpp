@@ -363,9 +363,11 @@ DEFINE_EVENT_AGGREGATOR(GstEventCompare, gst_event_compare, EVENT_COMPARE, Event
 
 static void gst_event_compare_class_init(GstEventCompareClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  add_report_properties(properties,
-                        "PNG file of the events per pixel, of both streams and of their "
-                        "difference, written at EOS, at the end of a segment or on stop");
+  add_report_properties(
+      properties,
+      "PNG file of the events per pixel, of both streams and of their "
+      "difference, with bars of the counts, written at EOS, at the end of a segment "
+      "or on stop");
 
   auto* const aggregator = GST_EVENT_AGGREGATOR_CLASS(klass);
   add_aggregator_pad_template(aggregator, "reference", GST_PAD_SINK, EVENT_CAPS);
