@@ -318,6 +318,19 @@ TEST_F(Render, ShowsAnEventAtTheVeryStart) {
   expect(finish(), {{0, 40 * ms, accumulated(first)}, {40 * ms, 40 * ms, accumulated(column(1))}});
 }
 
+TEST_F(Render, DrawsShorterIntervalsWhenPlayedSlower) {
+  begin(grey_at("25/1"));
+  GstSegment slow;
+  gst_segment_init(&slow, GST_FORMAT_TIME);
+  slow.rate = 0.1;
+  gst_harness_push_event(h.get(), gst_event_new_segment(&slow));
+  push(0, column(5));  // at 20 ms
+  std::vector<Picture> pictures;
+  for (int i = 0; i < 10; ++i)
+    pictures.push_back({i * 4 * ms, 4 * ms, i == 4 ? accumulated(column(5)) : blank});
+  expect(finish(), pictures);
+}
+
 TEST_F(Render, RefusesToRunBackwards) {
   begin(grey_at("25/1"));
   play_backwards(h);

@@ -73,7 +73,7 @@ bool EventPictures::approach(GstBuffer* buffer, const EventInterval& interval) {
   const GstClockTime segment_start = segment_of(main_pad()).start;
   if (!times_ && state_->has_framerate() &&
       (interval.end > segment_start || interval.start >= segment_start))
-    times_.emplace(std::max(interval.start, segment_start), *state_->video);
+    begin_pictures(std::max(interval.start, segment_start));
   return times_ && interval.start >= times_->events().end;
 }
 
@@ -125,7 +125,7 @@ void EventPictures::begin_now() {
   if (!GST_CLOCK_TIME_IS_VALID(position) || !state_->has_framerate()) return;
   GST_DEBUG_OBJECT(element(), "no events yet: first picture at %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(position));
-  times_.emplace(position, *state_->video);
+  begin_pictures(position);
 }
 
 GstFlowReturn EventPictures::aggregate(bool timed_out) {
@@ -268,7 +268,7 @@ bool EventPictures::set_video(const GstCaps* caps) {
   if (times_) {
     const GstClockTime start = times_->picture().start;
     times_.reset();
-    if (state_->has_framerate()) times_.emplace(start, video);
+    if (state_->has_framerate()) begin_pictures(start);
   }
   const GstClockTime latency = frame_duration(video);
   GST_DEBUG_OBJECT(element(), "drawing %" GST_PTR_FORMAT ", latency %" GST_TIME_FORMAT, caps,

@@ -57,6 +57,9 @@ class EventPictures : public EventAggregator {
                   std::optional<GstClockTime> end, GstBuffer* buffer);
   GstFlowReturn handle_buffer(GstBuffer* buffer);
   void drop_buffer();
+  void begin_pictures(GstClockTime start) {
+    times_.emplace(start, *state_->video, segment_of(main_pad()).rate);
+  }
   void begin_now();
   bool skip(const EventInterval& picture);
   bool has_begun_picture() const;

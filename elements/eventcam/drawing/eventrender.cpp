@@ -23,6 +23,9 @@
  * pause of more than a minute there are pictures for a second only, with one warning. At framerate
  * 0/1 each buffer of events becomes one picture.
  *
+ * Played slower, at a rate below 1, there are as many pictures a second as before, each of a
+ * shorter interval. Events cannot be drawn backwards: a seek at a negative rate is refused.
+ *
  * ## Example launch line
  * |[
  * gst-launch-1.0 videotestsrc pattern=ball ! eventsim-diff ! eventrender mode=decay !
