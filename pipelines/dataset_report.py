@@ -13,7 +13,7 @@ STYLE = """:root { color-scheme: light dark; font: 14px sans-serif }
 body { max-width: 75rem; margin: 1.5rem auto; padding: 0 1rem }
 .videos { display: grid; grid-template-columns: repeat(auto-fill, minmax(11rem, 1fr)); gap: 1rem }
 figure { margin: 0 } img { display: block; width: 100% } figcaption { overflow-wrap: anywhere; font-size: 12px }
-table { border-collapse: collapse } td, th { text-align: right; padding: .2rem .8rem }
+table { border-collapse: collapse } td, th { text-align: right; padding: .2rem .8rem } td { white-space: nowrap }
 th:first-child { text-align: left } tr:nth-child(even) { background: #8882 }"""
 # Columns of the page's table, and their text from the statistics of a part.
 COLUMNS = {
@@ -23,8 +23,8 @@ COLUMNS = {
     "million events": lambda part: f"{part['events'] / 1e6:,.2f}",
     "ON": lambda part: "" if part["on-share"] is None else f"{100 * part['on-share']:.0f} %",
     "MB": lambda part: f"{part['bytes'] / 1e6:,.1f}",
-    **{f"{name}, Mev/s": lambda part, key=key: "" if part[key] is None else f"{part[key] / 1e6:.3f}"
-       for name, key in {"5 % are below": "rate-p5", "median event rate": "rate-p50", "95 % are below": "rate-p95"}.items()},
+    **{f"event rate, {name} (Mev/s)": lambda part, key=key: "" if part[key] is None else f"{part[key] / 1e6:.3f}"
+       for name, key in {"5th percentile": "rate-p5", "median": "rate-p50", "95th percentile": "rate-p95"}.items()},
 }
 
 
