@@ -4,17 +4,16 @@
 video as a real camera recorded of the same scene, and prints how similar the two streams are.
 For eventsim-dvs it then tries changes one at a time: exposure compensation, refractory period, threshold jitter,
 the offset of the logarithm, overexposed light, adaptation, denoising, long exposures and exposure pulses, and keeps
-those that make the streams clearly more similar, also in parts that they were not chosen on. Balances the errors of mean
-and standard deviation over the pixels. Prints the settings. Overexposed parts of the frames are excluded.
+those that make the streams clearly more similar, also in parts that they were not chosen on. Balances the errors of
+mean and standard deviation over the pixels. Prints the settings. Overexposed parts of the frames are excluded.
 
     event-calibrate drive.mp4 drive.raw --profile camera.profile --to 2
     event-calibrate davis.aedat4
 
 VIDEO is anything that GStreamer decodes, or a text file of lines "seconds picture"; RECORDING is
 any event file that this project reads. Both need the same pixels and the same clock; a file that has both, such as
-AEDAT 4, is given once. --from and
---to are in seconds after the first frame; the default is the time that both cover. --measure-from
-and --measure-to select another time for the comparison."""
+AEDAT 4, is given once. --from and --to are in seconds after the first frame; the default is the time that both cover.
+--measure-from and --measure-to select another time for the comparison."""
 import argparse
 import functools
 import os
@@ -70,21 +69,21 @@ PROGRESS_INTERVAL = 60
 
 
 def ratings_of(figures):
-    """Similarity of two streams, from 0 to 1: their likeness, map correlation, and the mean of the harmonic means of the
-    shares of recorded and of simulated events that have a match within 1, 5 and 10 ms. A harmonic mean is close to the
-    smaller share, so a simulator cannot trade one share for the other. The likeness is a mean of both, the ratio of the
-    variances over the pixels, and the ratio between the times from event to event; each harmonic mean counts twice."""
-    both = np.mean([harmonic_mean([figures[f"{side}-matches"][f"within-{limit}ms"] for side in ("reference", "candidate")])
-                    for limit in (1, 5, 10)])
+    """Similarity of two streams, from 0 to 1: their likeness, map correlation, and the mean of the harmonic means of
+    the shares of recorded and of simulated events that have a match within 1, 5 and 10 ms. A harmonic mean is close to
+    the smaller share, so a simulator cannot trade one share for the other. The likeness is a mean of these, the ratio of
+    the variances over the pixels, and the ratio between the times from event to event; matches count six times."""
+    sides = figures["reference-matches"], figures["candidate-matches"]
+    matches = np.mean([harmonic_mean([side[f"within-{limit}ms"] for side in sides]) for limit in (1, 5, 10)])
     deviations = sorted(figures[side]["std-dev"] for side in ("reference", "candidate"))
     variances = (deviations[0] / deviations[1]) ** 2 if deviations[1] > 0 else 0
-    likeness = np.average([figures["map-correlation"], both, variances, 10 ** -figures["interval-distance"]],
+    likeness = np.average([figures["map-correlation"], matches, variances, 10 ** -figures["interval-distance"]],
                           weights=[1, 6, 1, 1])
-    return np.array([likeness, figures["map-correlation"], both])
+    return np.array([likeness, figures["map-correlation"], matches])
 
 
 class Progress:
-    """Prints progress: one line, rewritten, on a terminal; elsewhere a line a minute. Results are printed in any case."""
+    """Prints progress: one line, rewritten, on a terminal; elsewhere a line a minute, and every result."""
 
     def __init__(self):
         self.on_terminal = sys.stderr.isatty()
@@ -93,7 +92,7 @@ class Progress:
 
     def tell(self, text):
         if self.on_terminal:
-            width = os.get_terminal_size(sys.stderr.fileno()).columns - 1
+            width = (os.get_terminal_size(sys.stderr.fileno()).columns or 80) - 1
             print(f"\r{(self.left + text)[:width]:<{width}}", end="", file=sys.stderr, flush=True)
         elif time.monotonic() > self.told + PROGRESS_INTERVAL:
             self.say(self.left + text)
@@ -431,10 +430,12 @@ def span_of(video, recorded, lag, start, end):
     latest_start = max(video.frames[0].time // 1000, int(recorded["t"][0]) - 1)
     earliest_end = min(video.frames[-1].time // 1000, int(recorded["t"][-1]))
     if latest_start >= earliest_end:
+        frames = [video.frames[i].time / 1e9 for i in (0, -1)]
+        events = recorded["t"][[0, -1]] / 1e6
         raise RuntimeError(
-            f"the clocks differ: the frames are from {video.frames[0].time / 1e9:.3f} to {video.frames[-1].time / 1e9:.3f} s,"
-            f" the events from {recorded['t'][0] / 1e6:.3f} to {recorded['t'][-1] / 1e6:.3f} s. Converted files may start at"
-            " 0; give a file that has both, such as AEDAT 4, once and unconverted")
+            f"the clocks differ: the frames are from {frames[0]:.3f} to {frames[1]:.3f} s, the events from"
+            f" {events[0]:.3f} to {events[1]:.3f} s. Converted files may start at 0; give a file that has both, such as"
+            " AEDAT 4, once and unconverted")
     origin = video.origin // 1000
     end = earliest_end if end is None else origin + round((end + lag) * 1e6)
     if start is not None:
