@@ -184,8 +184,8 @@ def expect_slurm(folder):
     """Raises RuntimeError if a profile submits jobs with sbatch, which refuses them."""
     try:
         with open(os.path.join(folder, "config.yaml"), encoding="utf-8") as file:
-            words = shlex.split(yaml.safe_load(file).get("cluster", ""))
-    except FileNotFoundError:  # Snakemake looks elsewhere, too
+            words = shlex.split((yaml.safe_load(file) or {}).get("cluster", ""))
+    except (FileNotFoundError, NotADirectoryError, yaml.YAMLError):  # Snakemake tells, or looks elsewhere
         return
     if words[:1] != ["sbatch"]:
         return
