@@ -224,6 +224,9 @@ def decode(path, start, end):
         for sample in pipeline.samples():
             buffer = sample.get_buffer()
             if not video.frames:
+                source = pipeline.element("decoded").get_static_pad("sink").get_peer().get_target()
+                if source.get_parent_element().get_factory().get_name() == "eventrender":
+                    raise RuntimeError(f"{path}: events without frames; give the video of the scene, too")
                 video.caps = sample.get_caps().to_string()
                 info = sample.get_caps().get_structure(0)
                 video.width, video.height = info.get_value("width"), info.get_value("height")
