@@ -630,6 +630,27 @@ TEST(RenderPipeline, SaysWhatToDoIfDownstreamWantsAnotherSize) {
       << pipeline.error;
 }
 
+class Reconstruct : public Render {
+ protected:
+  Reconstruct() : Render("eventreconstruct smoothing=0") {}
+};
+
+TEST_F(Reconstruct, ShowsBrightnessInGrey) {
+  begin("video/x-raw, framerate=25/1");
+  push(0, {Event::at(1, 1, 0, Polarity::on), Event::at(2, 1, 1, Polarity::off)});
+  const auto picture = wait_for_picture();
+  ASSERT_TRUE(picture);
+  const Owned<GstCaps> caps(gst_pad_get_current_caps(h->sinkpad));
+  EXPECT_STREQ(gst_structure_get_string(gst_caps_get_structure(caps.get(), 0), "format"), "GRAY8");
+  const auto bytes = bytes_of(picture.get());
+  const auto grey = [&bytes](int x) {
+    return static_cast<unsigned char>(bytes[static_cast<std::size_t>(width + x)]);
+  };
+  EXPECT_EQ(grey(0), 128);
+  EXPECT_GT(grey(1), 160);
+  EXPECT_LT(grey(2), 96);
+}
+
 /// Players autoplug it.
 TEST_F(Render, IsADecoderOfVideo) {
   GstElementFactory* factory = gst_element_get_factory(h.element());
