@@ -83,7 +83,7 @@ TEST(Choices, AreNamedIfAValueIsNoneOfThem) {
     return preset;
   };
   const gint esim = set("esim");
-  g_test_expect_message(nullptr, G_LOG_LEVEL_WARNING,
+  g_test_expect_message(nullptr, G_LOG_LEVEL_MESSAGE,
                         "preset=davis999: choose one of standard, ideal, *, gen4, hs-ergb");
   EXPECT_EQ(set("davis999"), esim);
   g_test_assert_expected_messages();
