@@ -142,13 +142,6 @@ TEST_F(Tensor, EndsWithAShortWindow) {
   EXPECT_FALSE(h->pull());
 }
 
-TEST_F(Tensor, EndsWithTheSegment) {
-  begin("accumulation-time=25000000");
-  push_columns(0, 0);
-  gst_harness_push_event(h->get(), gst_event_new_segment_done(GST_FORMAT_TIME, 10 * ms));
-  expect_tensor(0, 10 * ms, 0, 2);
-}
-
 TEST_F(Tensor, IsNotMovedByEventsPastTheEndOfTheirBuffer) {
   begin("accumulation-time=20000000");
   events = {{3'333, 0, Event::at(0, 1, 0, Polarity::on).y_p}};
@@ -158,16 +151,6 @@ TEST_F(Tensor, IsNotMovedByEventsPastTheEndOfTheirBuffer) {
   push_columns(1, 3);
   expect_tensor(0, 20 * ms, 0, 3);
   expect_tensor(20 * ms, 20 * ms, 3, 7);
-}
-
-TEST_F(Tensor, IsDiscontinuousWhereItsEventsAre) {
-  begin("");
-  for (const GstClockTime start : {0, 10, 20}) {
-    GstBuffer* buffer = buffer_of(start * ms, column(0), 10 * ms);
-    if (start == 10) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
-    h->push(buffer);
-    EXPECT_EQ(GST_BUFFER_IS_DISCONT(h->pull().get()) != FALSE, start < 20) << start;
-  }
 }
 
 TEST_F(Tensor, GoesOnThroughGaps) {
@@ -198,23 +181,6 @@ TEST_F(Tensor, IsNotMadeOfLongPauses) {
   EXPECT_EQ(h->warning(), "");
 }
 
-TEST_F(Tensor, PassesGapsOnBetweenWindowsByCount) {
-  begin("event-count=2");
-  push_columns(0, 0);
-  gst_harness_push_event(h->get(), gst_event_new_gap(10 * ms, 20 * ms));
-  EXPECT_TRUE(h->pull_event(GST_EVENT_GAP));
-}
-
-TEST_F(Tensor, ComesAfterNoGapThatIsLater) {
-  begin("event-count=3");
-  push_columns(0, 0);
-  for (const GstClockTime start : {10, 20, 30})
-    gst_harness_push_event(h->get(), gst_event_new_gap(start * ms, 10 * ms));
-  push_columns(4, 4);
-  expect_tensor(3'333'000, 40 * ms, 0, 3);
-  EXPECT_FALSE(h->pull_event(GST_EVENT_GAP));
-}
-
 TEST_F(Tensor, ComesAfterNoLaterGapOfUnknownLength) {
   begin("accumulation-time=20000000");
   push_columns(0, 0);
@@ -229,17 +195,6 @@ TEST_F(Tensor, IsOneOfAGapWhereWindowsAreBuffers) {
   push_columns(0, 0);
   gst_harness_push_event(h->get(), gst_event_new_gap(10 * ms, 10 * ms));
   expect_tensor(0, 20 * ms, 0, 2);
-}
-
-TEST_F(Tensor, ForgetsAtAFlush) {
-  begin("accumulation-time=20000000");
-  push_columns(0, 0);
-  flush({h->get()});
-  push_segment(h->get());
-  events.clear();
-  push_columns(1, 2);
-  expect_tensor(10 * ms, 20 * ms, 0, 4);
-  EXPECT_FALSE(h->pull());
 }
 
 TEST_F(Tensor, StartsAtTheSegment) {
@@ -314,16 +269,6 @@ TEST_F(Tensor, RefusesToBeHuge) {
   EXPECT_NE(h->push(buffer_of(0, column(0), 10 * ms)), GST_FLOW_OK);
   EXPECT_EQ(h->error(),
             "Cannot make tensors that take more than 1 GiB; lower bins or the resolution.");
-}
-
-/// What a time surface is made from counts, too: 13 bytes for each number.
-TEST_F(Tensor, RefusesToNeedHugeMemory) {
-  h.emplace("eventtensor representation=time-surface data-type=uint8");
-  gst_harness_set_src_caps_str(
-      h->get(),
-      "application/x-event-camera, format=XYTP, width=8192, height=8192, framerate=100/1");
-  EXPECT_NE(h->push(buffer_of(0, column(0), 10 * ms)), GST_FLOW_OK);
-  EXPECT_NE(h->error().find("1 GiB"), std::string::npos);
 }
 
 TEST_F(Tensor, RefusesToRunBackwards) {
