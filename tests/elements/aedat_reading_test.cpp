@@ -160,4 +160,16 @@ TEST(AedatDemux, TellsDecodebinOfErrors) {
   EXPECT_EQ(pipeline.end, GST_MESSAGE_ERROR);
 }
 
+TEST(AedatDemux, SaysWhereAFileHasNoEvents) {
+  const TemporaryFile empty(aedat_files::aedat4_header(""));
+  AedatPlayer player(empty.source());
+  EXPECT_FALSE(player.play());
+  EXPECT_NE(player.error.find("neither events nor frames"), std::string::npos) << player.error;
+  // There is a stream of events here, though it is empty.
+  const TemporaryFile silent(aedat4_file({}));
+  AedatPlayer other(silent.source());
+  EXPECT_TRUE(other.play()) << other.error;
+  EXPECT_EQ(other.track("events_0").eos, 1U);
+}
+
 }  // namespace

@@ -325,6 +325,14 @@ TEST(Payloader, SendsBeforeANewSegment) {
   EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 1);
 }
 
+TEST(Payloader, SendsBeforeTheEndOfASegment) {
+  Harness h(patient);
+  h.caps(events_caps, "application/x-event-datagram");
+  h.push(ten_events(0));
+  end_segment(h.get());
+  EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 1);
+}
+
 TEST(Payloader, ForgetsEventsThatAreFlushed) {
   Harness h(patient);
   h.caps(events_caps, "application/x-event-datagram");

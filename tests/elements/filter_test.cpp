@@ -165,6 +165,13 @@ TEST_F(FilterTest, RemembersThroughGapsSegmentsAndDiscont) {
   EXPECT_TRUE(passes(10 * ms));
 }
 
+TEST_F(FilterTest, ForgetsAfterAFlush) {
+  EXPECT_TRUE(passes(0));
+  flush({h.get()});
+  push_segment(h.get());
+  EXPECT_TRUE(passes(5 * ms));
+}
+
 TEST_F(FilterTest, ForgetsWhereTimeGoesBack) {
   EXPECT_TRUE(passes(100 * ms));
   EXPECT_TRUE(passes(95 * ms));

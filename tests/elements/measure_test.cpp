@@ -167,6 +167,20 @@ TEST_F(StatsTest, CountsASilenceBetweenBuffersAsTime) {
   EXPECT_NEAR(number_in(structure_of(message), "rate"), 20, 1e-9);
 }
 
+TEST_F(StatsTest, ForgetsWhatLiesBeforeAFlush) {
+  Harness h("eventstats");
+  h.caps(small_sensor);
+  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
+  flush({h.get()});
+  push_segment(h.get());
+  h.push(buffer_of(0, {Event::at(2, 0, 5, Polarity::off)}, 10 * ms));
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  const auto message = h.message(GST_MESSAGE_ELEMENT);
+  ASSERT_TRUE(message);
+  EXPECT_EQ(count_in(structure_of(message)), 1U);
+  EXPECT_EQ(number_in(structure_of(message), "on-share"), 0);
+}
+
 TEST_F(StatsTest, MeasuresEachSegment) {
   Harness h("eventstats location=" + in_quotes(path("f.json")));
   h.caps(small_sensor);
@@ -608,6 +622,24 @@ TEST_F(CompareTest, ReportsAndRefusesAChangeOfSize) {
       gst_bus_timed_pop_filtered(compare->bus.get(), 5 * GST_SECOND, GST_MESSAGE_ERROR));
   ASSERT_TRUE(error);
   EXPECT_NE(text_of(error.get()).find("9 x 4 pixels, the candidate 8 x 4"), std::string::npos);
+}
+
+TEST_F(CompareTest, BeginsAnewAfterAFlush) {
+  make();
+  begin();
+  for (auto* h : {reference, candidate})
+    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
+  flush({reference, candidate});
+  for (auto* h : {reference, candidate}) {
+    push_segment(h);
+    gst_harness_push(h, buffer_of(0, {Event::at(2, 1, 5, Polarity::on)}, 10 * ms));
+  }
+  end(reference);
+  end(candidate);
+  const auto* figures = conclude();
+  ASSERT_TRUE(figures);
+  EXPECT_EQ(count_in(within(figures, "candidate")), 1U);
+  EXPECT_EQ(count_in(within(figures, "reference")), 1U);
 }
 
 }  // namespace

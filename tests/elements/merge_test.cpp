@@ -389,6 +389,19 @@ TEST_F(MergeTest, PassesCustomEventsOnInTheirPlace) {
                                       "second", "buffer", "last", "eos"}));
 }
 
+TEST_F(MergeTest, PassesCustomEventsOnWhereThereIsNothingElse) {
+  const OutputOrder output(a());
+  begin();
+  push_custom(a(), "triggers");
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), Events{});
+  const auto& names = output.names();
+  ASSERT_GE(names.size(), 3U);
+  EXPECT_EQ(std::vector(names.end() - 3, names.end()),
+            (std::vector<std::string>{"segment", "triggers", "eos"}));
+}
+
 TEST_F(MergeTest, FollowsCapsThatChange) {
   begin();
   push(a(), 0, {on(7, 3, 1)});
@@ -467,6 +480,27 @@ TEST_F(MergeTest, StartsOverOnceAllStreamsGoBackWithNewSegments) {
                                                       {110, {on_at(6, 0, 10'006)}},
                                                       {200, {on_at(7, 0, 7)}}}));
   EXPECT_EQ(stat_of(element(), "late-events"), 0U);
+}
+
+/// Two recordings, of which the second one starts earlier.
+TEST_F(MergeTest, MergesByTimestamps) {
+  begin();
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = 20 * ms;
+  gst_harness_push_event(a(), gst_event_new_segment(&segment));
+  segment.start = 10 * ms;
+  segment.stop = 40 * ms;
+  gst_harness_push_event(b(), gst_event_new_segment(&segment));
+  push(a(), 20 * ms, {on(1, 0, 1)});
+  push(b(), 10 * ms, {on(2, 0, 3)}, 20 * ms);
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), (Events{on_at(2, 0, 10'003), on_at(1, 0, 20'001)}));
+  const Owned<GstEvent> event(gst_pad_get_sticky_event(a()->sinkpad, GST_EVENT_SEGMENT, 0));
+  gst_event_copy_segment(event.get(), &segment);
+  EXPECT_EQ(segment.start, 10 * ms);
+  EXPECT_EQ(segment.stop, GST_CLOCK_TIME_NONE);
 }
 
 /// A GAP cannot tell it.
@@ -636,6 +670,13 @@ TEST(Merge, WaitsForTheSecondStreamWhereTheFirstIsEmpty) {
   gst_harness_push_event(second.get(), gst_event_new_eos());
   EXPECT_TRUE(next_event(first.get(), GST_EVENT_EOS));
   EXPECT_EQ(gst_harness_buffers_in_queue(first.get()), 1U);
+}
+
+TEST(Merge, EndsWithALiveStreamAloneThatIsEmpty) {
+  Player player(
+      "videotestsrc is-live=true num-buffers=0 ! video/x-raw, width=64, height=48 ! eventsim-frame "
+      "! queue ! m.sink_0  eventmerge name=m");
+  EXPECT_TRUE(player.play()) << player.error;
 }
 
 TEST(Merge, GoesOnWithALiveStreamAlone) {

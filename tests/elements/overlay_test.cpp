@@ -158,6 +158,19 @@ TEST_F(OverlayTest, LetsTheVideoUseTheMemoryOfDownstream) {
   gst_query_unref(query);
 }
 
+TEST_F(OverlayTest, LetsDownstreamChangeTheFormatOfTheVideo) {
+  begin("width=8, height=4");
+  push_frame(0);
+  push_events(0, {});
+  EXPECT_EQ(drawn(), Places{});
+  while (const Owned<GstEvent> event{gst_harness_try_pull_upstream_event(video.get())}) continue;
+  gst_harness_push_upstream_event(video.get(), gst_event_new_reconfigure());
+  bool is_passed = false;
+  while (const Owned<GstEvent> event{gst_harness_try_pull_upstream_event(video.get())})
+    is_passed = is_passed || GST_EVENT_TYPE(event.get()) == GST_EVENT_RECONFIGURE;
+  EXPECT_TRUE(is_passed);
+}
+
 TEST_F(OverlayTest, DrawsInColourOverGreyVideo) {
   g_object_set(overlay.element.get(), "palette", 3, nullptr);  // red-blue
   begin("width=8, height=4", "GRAY8", "25/1", "{ RGB, GRAY8 }");
@@ -211,6 +224,26 @@ TEST_F(OverlayTest, GoesOnThroughGapsAndPastTheEndOfEvents) {
   GstBuffer* rest = nullptr;
   EXPECT_TRUE(gst_harness_pull_until_eos(video.get(), &rest));
   EXPECT_EQ(rest, nullptr);
+}
+
+TEST_F(OverlayTest, PassesGapsInTheVideoOn) {
+  begin("width=8, height=4");
+  gst_harness_push_event(video.get(), gst_event_new_gap(0, 40 * ms));  // before any frame
+  push_events(0, {});
+  push_frame(40 * ms);
+  push_events(40 * ms, {});
+  EXPECT_EQ(drawn(), Places{});
+  gst_harness_push_event(video.get(), gst_event_new_gap(80 * ms, 40 * ms));
+  push_events(80 * ms, {Event::at(1, 0, 5, Polarity::on)});
+  push_frame(120 * ms);
+  push_events(120 * ms, {});
+  EXPECT_EQ(drawn(), Places{});
+  EXPECT_EQ(last_pts, 120 * ms);
+  GstClockTime start = GST_CLOCK_TIME_NONE;
+  while (const Owned<GstEvent> event{gst_harness_try_pull_event(video.get())})
+    if (GST_EVENT_TYPE(event.get()) == GST_EVENT_GAP)
+      gst_event_parse_gap(event.get(), &start, nullptr);
+  EXPECT_EQ(start, 80 * ms);
 }
 
 TEST_F(OverlayTest, PassesTheCustomEventsOfTheVideoOn) {

@@ -224,6 +224,51 @@ TEST_F(Render, DrawsWhatThereIsAtTheEnd) {
   expect(finish(), {{0, 100 * ms, accumulated(column(1))}});
 }
 
+TEST_F(Render, DrawsWhatThereIsAtTheEndOfASegment) {
+  begin(grey_at("10/1"));
+  push(0, column(1));
+  gst_harness_push_event(h.get(), gst_event_new_segment_done(GST_FORMAT_TIME, 40 * ms));
+  const Buffer picture(gst_harness_pull(h.get()));
+  ASSERT_TRUE(picture);
+  EXPECT_TRUE(bytes_of(picture.get()) == accumulated(column(1)));
+  EXPECT_TRUE(finish().empty());
+}
+
+TEST_F(Render, TakesBuffersWithoutDuration) {
+  begin(grey_at("50/1"));
+  push(0, column(1), GST_CLOCK_TIME_NONE);
+  push(40 * ms, column(2), GST_CLOCK_TIME_NONE);
+  expect(finish(), {{0, 20 * ms, accumulated(column(1))},
+                    {20 * ms, 20 * ms, blank},
+                    {40 * ms, 20 * ms, accumulated(column(2))}});
+}
+
+TEST_F(Render, IsDiscontinuousAfterTwoFlushes) {
+  begin(grey_at("25/1"));
+  push(0, column(1));
+  wait_for_picture();
+  for (int i = 0; i < 2; ++i) flush({h.get()});
+  segment(0);
+  push(0, column(2));
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(wait_for_picture().get()));
+}
+
+TEST_F(Render, PassesTags) {
+  begin(grey_at("25/1"));
+  gst_harness_push_event(
+      h.get(), gst_event_new_tag(gst_tag_list_new(GST_TAG_CONTAINER_FORMAT, "AEDAT", nullptr)));
+  push(0, column(1));
+  wait_for_picture();
+  const auto event = h.pull_event(GST_EVENT_TAG);
+  ASSERT_TRUE(event);
+  GstTagList* tags = nullptr;
+  gst_event_parse_tag(event.get(), &tags);
+  gchar* format = nullptr;
+  EXPECT_TRUE(gst_tag_list_get_string(tags, GST_TAG_CONTAINER_FORMAT, &format));
+  EXPECT_STREQ(format, "AEDAT");
+  g_free(format);
+}
+
 TEST_F(Render, DrainsAndBeginsAnewInAnotherSegment) {
   begin(grey_at("10/1"));
   push(0, column(1));

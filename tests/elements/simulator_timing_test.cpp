@@ -188,6 +188,21 @@ TEST_P(EverySimulator, TimesFramesWithoutPtsByTheFramerate) {
   EXPECT_EQ(h.warning(), "");
 }
 
+TEST_P(EverySimulator, TimesFramesWithoutPtsByTheSegmentAfterASeek) {
+  gst_harness_set_live(h.get(), FALSE);
+  h.caps(video);
+  flash(GST_CLOCK_TIME_NONE);
+  flush({h.get()});
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = 5 * GST_SECOND;
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  flash(GST_CLOCK_TIME_NONE);
+  flash(GST_CLOCK_TIME_NONE);
+  h.wait_for_events();
+  expect_interval(5 * GST_SECOND, 5 * GST_SECOND + 40 * GST_MSECOND);
+}
+
 TEST_P(EverySimulator, TimesFramesOfALiveSourceWithoutPtsByTheClock) {
   h.caps(uneven);
   for (const auto now : {7, 50, 81}) {
@@ -410,6 +425,17 @@ TEST_P(EverySimulator, GoesOnInASegmentOfTheSameRunningTimes) {
   EXPECT_FALSE(h.pull());
 }
 
+TEST_P(EverySimulator, GoesOnAfterAGapInVideoOfAnyFramerate) {
+  h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=0/1");
+  flash(0);
+  gst_harness_push_event(h.get(), gst_event_new_gap(40 * GST_MSECOND, 80 * GST_MSECOND));
+  flash(120 * GST_MSECOND);
+  EXPECT_EQ(h.warning(), "");
+  const auto events = h.pull();
+  ASSERT_TRUE(events);
+  EXPECT_EQ(GST_BUFFER_PTS(events.get()) + GST_BUFFER_DURATION(events.get()), 120 * GST_MSECOND);
+}
+
 TEST_P(EverySimulator, RefusesToRunBackwards) {
   h.caps(video);
   flash(0);
@@ -554,6 +580,13 @@ TEST_P(EverySimulator, DrawsTheRowsOfItsFramesWhateverTheShutter) {
   EXPECT_EQ(pictures_with(23 * GST_MSECOND), pictures_with(0));
 }
 
+TEST_P(EverySimulator, IsNotLaterWithARollingShutter) {
+  g_object_set(h.element(), "rolling-shutter", gint64{23 * GST_MSECOND}, nullptr);
+  h.caps(video);
+  gst_harness_set_upstream_latency(h.get(), 5 * GST_MSECOND);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 45 * GST_MSECOND);
+}
+
 TEST_P(EverySimulator, IsOneFrameLate) {
   h.caps(video);
   EXPECT_TRUE(h.message(GST_MESSAGE_LATENCY));
@@ -640,6 +673,20 @@ TEST(Dvs, SendsTheNoiseOfAGap) {
   ASSERT_TRUE(next);
   EXPECT_EQ(GST_BUFFER_PTS(next.get()), 100 * GST_MSECOND);
   EXPECT_EQ(GST_BUFFER_DURATION(next.get()), 40 * GST_MSECOND);
+}
+
+TEST(Dvs, SendsTheNoiseOfAPictureThatIsRepeated) {
+  Harness h("eventsim-dvs leak-rate=100");
+  h.caps(video);
+  for (int i = 0; i <= 50; ++i) {
+    GstBuffer* frame = h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, 90);
+    GST_BUFFER_FLAG_SET(frame, i % 10 > 0 ? GST_BUFFER_FLAG_GAP : 0);
+    h.push(frame);
+  }
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  std::size_t events = 0;
+  while (const auto interval = h.pull()) events += events_of(interval.get()).size();
+  EXPECT_NEAR(static_cast<double>(events), 32 * 24 * 200.0, 32 * 24);
 }
 
 TEST(Dvs, SendsTheNoiseOfTheFirstMinuteOfAGap) {

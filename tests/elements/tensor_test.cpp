@@ -142,6 +142,13 @@ TEST_F(Tensor, EndsWithAShortWindow) {
   EXPECT_FALSE(h->pull());
 }
 
+TEST_F(Tensor, EndsWithTheSegment) {
+  begin("accumulation-time=25000000");
+  push_columns(0, 0);
+  gst_harness_push_event(h->get(), gst_event_new_segment_done(GST_FORMAT_TIME, 10 * ms));
+  expect_tensor(0, 10 * ms, 0, 2);
+}
+
 TEST_F(Tensor, IsNotMovedByEventsPastTheEndOfTheirBuffer) {
   begin("accumulation-time=20000000");
   events = {{3'333, 0, Event::at(0, 1, 0, Polarity::on).y_p}};
@@ -195,6 +202,17 @@ TEST_F(Tensor, IsOneOfAGapWhereWindowsAreBuffers) {
   push_columns(0, 0);
   gst_harness_push_event(h->get(), gst_event_new_gap(10 * ms, 10 * ms));
   expect_tensor(0, 20 * ms, 0, 2);
+}
+
+TEST_F(Tensor, ForgetsAtAFlush) {
+  begin("accumulation-time=20000000");
+  push_columns(0, 0);
+  flush({h->get()});
+  push_segment(h->get());
+  events.clear();
+  push_columns(1, 2);
+  expect_tensor(10 * ms, 20 * ms, 0, 4);
+  EXPECT_FALSE(h->pull());
 }
 
 TEST_F(Tensor, StartsAtTheSegment) {

@@ -485,6 +485,22 @@ TEST_F(Hdf5, CommitsDoNotChangeTheFile) {
   }
 }
 
+TEST_F(Hdf5, WithoutCommitsTheSameEventsMakeTheSameBytes) {
+  const auto events = random_events(50'000, {640, 480}, 24, 1'000'000);
+  const auto written = [&] {
+    std::vector<Bytes> files;
+    for (auto settings : all_settings({640, 480})) {
+      settings.commit_interval = {};
+      files.push_back(contents(write(events, settings)));
+    }
+    return files;
+  };
+  const auto first = written();
+  // HDF5 stores times in whole seconds.
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+  EXPECT_TRUE(written() == first);
+}
+
 TEST_F(Hdf5, WhatIsNoFileOfEventsIsRefused) {
   EXPECT_THROW(Hdf5Reader reader(in_memory(bytes_of("t,x,y,p\n"))), UnsupportedFormat);
   EXPECT_THROW(Hdf5Reader reader(in_memory(bytes_of("\x89HDF\r\n\x1a\n"))), UnsupportedFormat);
