@@ -255,6 +255,9 @@ class Conversion:
         self._writer = writer_of(out) if not self._film else None
         self._readers = []
         self._progress = Progress()
+        is_drawing = options.scale != 1 or options.sheet != (1, 1) or options.render or options.over_frames
+        if self._writer and is_drawing:
+            raise Misuse(f"--scale, --sheet, --render and --over-frames apply only to {' '.join(FILMS)} files")
         self._pipeline = self._make()
         self._set_up()
 
@@ -303,9 +306,6 @@ class Conversion:
         return self._retimed(self._video)
 
     def _simulation(self):
-        for option in READER_OPTIONS:
-            if getattr(self._options, option) is not None:
-                raise Misuse(f"--{option} applies only to reading {READER_OPTIONS[option]}")
         simulator = self._options.simulator
         events = f"{simulator} ! application/x-event-camera ! queue name=events0 {BOTH} !"
         if self._options.over_frames:
@@ -335,22 +335,28 @@ class Conversion:
         film = (f"identity name=drawn ! capssetter caps=video/x-raw,framerate={framerate}/1"
                 f" ! videoscale name=scale method=nearest-neighbour ! capsfilter name=size ! videoconvert ! {encoder}")
         if options.over_frames:
+            if not frames.startswith("t.") and not any(reader.has_pads("video_%u") for reader in self._readers):
+                raise Failure(f"{self._inputs[0]} has no frames to draw over; leave out --over-frames")
             return (f"{crop}overlay.event_sink {frames} videoconvert ! videorate ! {rate} ! overlay.video_sink"
                     f" {options.render or 'eventoverlay'} name=overlay ! {film}")
         return f"{crop}{options.render or 'eventrender'} ! {rate} ! {film}"
 
     def _set_up(self):
         options, pipeline = self._options, self._pipeline
+        for name, files in READER_OPTIONS.items():
+            value = getattr(options, name)
+            if value is None:
+                continue
+            elements = [pipeline.get_by_name(f"reader{i}") for i in range(len(self._readers))]
+            if not elements or not all(reader.find_property(name) for reader in elements):
+                raise Misuse(f"--{name} applies only to reading {files}")
+            for reader in elements:
+                set_option(reader, name, value)
         for i in range(len(self._readers)):
             pipeline.get_by_name(f"in{i}").set_property("location", utf8_path(self._inputs[i]))
             reader = pipeline.get_by_name(f"reader{i}")
             if self._readers[i].has_pads("events_%u"):
                 reader.connect("no-more-pads", self._link_streams, i)
-            for name in READER_OPTIONS:
-                if (value := getattr(options, name)) is not None:
-                    if not reader.find_property(name):
-                        raise Misuse(f"--{name} applies only to reading {READER_OPTIONS[name]}")
-                    set_option(reader, name, value)
         for name in WRITER_OPTIONS:
             if (value := getattr(options, name)) is not None:
                 writer = pipeline.get_by_name("writer")
@@ -469,11 +475,12 @@ class Conversion:
         self._count += 1
 
     def _summary(self, is_part):
-        names = ", ".join(self._inputs)
+        options = self._options
         if self._film:
-            return f"{self._count} pictures"
+            cells = options.sheet[0] * options.sheet[1]
+            return f"{cells if self._out.lower().endswith('.png') else self._count} pictures"
         events = self._events()
-        if events == 0 and (is_part or self._options.crop) and not self._interrupt:
+        if events == 0 and (is_part or options.crop) and not self._interrupt:
             place = self._position()
             self._tell("warning: no events in this part" + (f"; the recording lasts {place[1]:.6g} s" if place else ""))
         written = self._pipeline.get_by_name("writer").get_property("stats")
