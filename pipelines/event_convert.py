@@ -36,7 +36,6 @@ FILMS = {
     ".gif": (25, "video/x-raw,format=RGB ! appsink name=file sync=false"),
     ".png": (30, "video/x-raw,format=RGB ! appsink name=file sync=false"),
 }
-FILM_PACKAGES = "gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-ugly"
 # Events and frames may be apart by half a second, and a muxer waits for the later of both, for a silent stream until
 # it lags by half a second or more. Only files whose times do not go on reach the limit of bytes.
 BOTH = "max-size-buffers=0 max-size-bytes=1073741824 max-size-time=2000000000"
@@ -78,12 +77,15 @@ def pictures_of(path, options):
     return entries or None
 
 
-def feed(pipeline, caps, buffers):
-    """Makes the appsrc `source` push buffers when it needs data; an exception ends the pipeline with an error."""
+def feed(pipeline, caps, buffers, seconds):
+    """Makes the appsrc `source` push buffers of so many seconds when it needs data; an exception ends the pipeline with
+    an error. Returns a list of the seconds pushed, which changes, and of all."""
     source = pipeline.get_by_name("source")
     source.set_property("caps", caps)
+    place, first = [0, seconds], None
 
     def push(_, __):
+        nonlocal first
         try:
             buffer = next(buffers, None)
         except (OSError, RuntimeError) as failure:
@@ -92,9 +94,12 @@ def feed(pipeline, caps, buffers):
         if buffer is None:
             source.emit("end-of-stream")
         else:
+            first = buffer.pts if first is None else first
+            place[0] = (buffer.pts - first) / Gst.SECOND
             source.emit("push-buffer", buffer)
 
     source.connect("need-data", push)
+    return place
 
 
 def buffers_of(pictures, speed):
@@ -105,40 +110,46 @@ def buffers_of(pictures, speed):
         yield buffer
 
 
-def retime(pad, speed, count=lambda: None):
-    """Makes the frames that leave a pad `speed` times as fast, from time 0 on, and counts them."""
-    start = 0
+def retime(pad, speed, tell=lambda count: None):
+    """Makes the frames that leave a pad `speed` times as fast, from time 0 on. tell(count) gets their number so far."""
+    start, count = None, 0
 
     def push(pad, info):
-        nonlocal start
+        nonlocal start, count
         if info.type & Gst.PadProbeType.BUFFER:
             frame = info.get_buffer()
             timed = frame.copy()  # refers to the same memory
             timed.pts = round((frame.pts - start) / speed)
             if frame.duration != Gst.CLOCK_TIME_NONE:
                 timed.duration = round(frame.duration / speed)
-            count()
+            count += 1
+            tell(count)
             pad.get_peer().chain(timed)
             return Gst.PadProbeReturn.DROP
-        if info.get_event().type != Gst.EventType.SEGMENT:
+        event = info.get_event()
+        if event.type == Gst.EventType.FLUSH_STOP:
+            start, count = None, 0
+        if event.type != Gst.EventType.SEGMENT:
             return Gst.PadProbeReturn.OK
-        start = info.get_event().parse_segment().start
-        segment = Gst.Segment()
-        segment.init(Gst.Format.TIME)
-        pad.get_peer().send_event(Gst.Event.new_segment(segment))
+        if start is None:  # a later one only has another end
+            start = event.parse_segment().start
+            segment = Gst.Segment()
+            segment.init(Gst.Format.TIME)
+            pad.get_peer().send_event(Gst.Event.new_segment(segment))
         return Gst.PadProbeReturn.DROP
 
-    pad.add_probe(Gst.PadProbeType.BUFFER | Gst.PadProbeType.EVENT_DOWNSTREAM, push)
+    pad.add_probe(Gst.PadProbeType.BUFFER | Gst.PadProbeType.EVENT_DOWNSTREAM | Gst.PadProbeType.EVENT_FLUSH, push)
 
 
 def recorded(paths, options):
-    """Yields the size of the sensor, and then the buffers of recordings: one after the other in time, or of one
-    backwards with inverted polarity."""
+    """Yields the size of the sensor and the seconds of recordings, and then their buffers: one after the other in time,
+    or of one backwards with inverted polarity."""
     import gst_eventcamera as ec  # only here, since it takes a quarter of a second
     from gst_eventcamera.recordings import buffer_of
 
     streams = [ec.stream(path, window=0.1).between(options.start, options.to) for path in paths]
-    yield max(stream.width for stream in streams), max(stream.height for stream in streams)
+    sizes = [(stream.width, stream.height) for stream in streams]
+    yield *map(max, zip(*sizes)), sum(stream.duration for stream in streams)
     end = None
     for stream in streams:
         length = round(stream.duration * 1e6)
@@ -178,29 +189,28 @@ class Pictures:
     """Pictures that are drawn, for a GIF or a sheet."""
 
     def __init__(self, cells):
+        try:
+            from PIL import Image  # only here, since few conversions need it
+        except ImportError:
+            raise Failure("pictures need Pillow; on Debian, install: python3-pil") from None
+        self._image = Image
         self._cells = cells  # columns and rows of a sheet; None for a GIF
         self._kept, self._spacing, self._count = [], 1, 0
 
     def add(self, sink):
         """Keeps a picture; of those for a sheet, a few evenly spaced ones."""
-        from PIL import Image
-
         sample = sink.emit("pull-sample")
         caps = sample.get_caps().get_structure(0)
         size = caps.get_value("width"), caps.get_value("height")
         buffer = sample.get_buffer()
         if self._count % self._spacing == 0:
             data = buffer.extract_dup(0, buffer.get_size())
-            self._kept.append(Image.frombytes("RGB", size, data, "raw", "RGB", len(data) // size[1]))
+            self._kept.append(self._image.frombytes("RGB", size, data, "raw", "RGB", len(data) // size[1]))
         self._count += 1
         if self._cells and len(self._kept) > 8 * self._cells[0] * self._cells[1]:
             del self._kept[1::2]
             self._spacing *= 2
         return Gst.FlowReturn.OK
-
-    def forget(self):
-        self._kept.clear()
-        self._spacing, self._count = 1, 0
 
     def save(self, path):
         if not self._kept:
@@ -208,18 +218,15 @@ class Pictures:
         if self._cells:
             self._sheet().save(path, "PNG")
             return
-        first, *others = (picture.quantize(256, dither=0) if picture.getcolors(256) is None else
-                          picture.convert("P", palette=1, colors=256) for picture in self._kept)
+        first, *others = (picture.quantize(256, dither=self._image.Dither.NONE) for picture in self._kept)
         first.save(path, "GIF", save_all=True, append_images=others, duration=40, loop=0)
 
     def _sheet(self):
         """The pictures in the middle of as many parts of equal length."""
-        from PIL import Image
-
         columns, rows = self._cells
         width, height = self._kept[0].size
         gap = 0 if self._cells == (1, 1) else max(width // 80, 2)
-        sheet = Image.new("RGB", (columns * (width + gap) - gap, rows * (height + gap) - gap), "white")
+        sheet = self._image.new("RGB", (columns * (width + gap) - gap, rows * (height + gap) - gap), "white")
         for i in range(columns * rows):
             picture = self._kept[(2 * i + 1) * len(self._kept) // (2 * columns * rows)]
             sheet.paste(picture, (i % columns * (width + gap), i // columns * (height + gap)))
@@ -254,10 +261,16 @@ class Conversion:
         self._film = next((film for ending, film in FILMS.items() if out.lower().endswith(ending)), None)
         self._writer = writer_of(out) if not self._film else None
         self._readers = []
+        self._fed = None
         self._progress = Progress()
         is_drawing = options.scale != 1 or options.sheet != (1, 1) or options.render or options.over_frames
         if self._writer and is_drawing:
             raise Misuse(f"--scale, --sheet, --render and --over-frames apply only to {' '.join(FILMS)} files")
+        names = re.findall(r"! (\w+)(?![/\w])", self._film[1]) if self._film else []
+        if missing := [name for name in names if not Gst.ElementFactory.find(name)]:
+            raise Failure(f"GStreamer has no {', '.join(missing)}; on Debian, install: gstreamer1.0-plugins-base"
+                          " gstreamer1.0-plugins-good gstreamer1.0-plugins-ugly")
+        self._is_still = out.lower().endswith(".png")
         self._pipeline = self._make()
         self._set_up()
 
@@ -270,10 +283,10 @@ class Conversion:
             for each in self._inputs:
                 reader_or_fail(each)
             buffers = recorded(self._inputs, options)
-            width, height = next(buffers)
+            width, height, length = next(buffers)
             pipeline = parse(f"appsrc name=source format=time ! queue name=events0 ! {self._rest()}")
-            feed(pipeline, Gst.Caps.from_string(
-                f"application/x-event-camera,format=XYTP,width={width},height={height},framerate=0/1"), buffers)
+            self._fed = feed(pipeline, Gst.Caps.from_string(
+                f"application/x-event-camera,format=XYTP,width={width},height={height},framerate=0/1"), buffers, length)
             return pipeline
         if options.merge:
             self._readers = [reader_or_fail(each) for each in self._inputs]
@@ -284,39 +297,37 @@ class Conversion:
         start, caps = (b"", None) if is_pattern(path) else content_of(path)
         if pictures := pictures_of(path, options):
             pipeline = self._simulated("appsrc name=source format=time ! decodebin")
-            feed(pipeline, content_of(pictures[0][1])[1], buffers_of(pictures, options.speed if self._writer else 1))
+            speed = options.speed if self._writer else 1
+            self._fed = feed(pipeline, content_of(pictures[0][1])[1], buffers_of(pictures, speed),
+                             (pictures[-1][0] - pictures[0][0]) / Gst.SECOND / float(speed))
             return pipeline
         reader = reader_of(path, caps)
         if reader:
-            if self._writer and options.speed != 1:
-                raise Misuse("--speed applies to films, and to videos whose events are simulated")
             self._readers = [reader]
             return parse(self._branch(0, self._rest()))
         if start.startswith(b"MATLAB 5.0 MAT-file"):
             raise Failure(f"{path}: files of MATLAB are not read; docs/formats.md has a line that exports them")
         if not caps or not caps.get_structure(0).get_name().startswith(("video/", "image/", "application/")):
             raise Failure(f"{path}: neither its content nor its extension matches a known format; see --help")
-        from gst_eventcamera.video import VideoFile  # only here, since it takes a quarter of a second
-        self._video = VideoFile(path, self._simulation())
-        return self._retimed(self._video)
+        return self._simulated()
 
-    def _simulated(self, source):
-        from gst_eventcamera.video import VideoPipeline
-        self._video = VideoPipeline(source, self._simulation())
-        return self._retimed(self._video)
+    def _simulated(self, source=None):
+        """A pipeline that simulates the events of `source`, by default of the video file."""
+        from gst_eventcamera.pipeline import expect_limits  # only here, since it takes a quarter of a second
+        from gst_eventcamera.video import VideoFile, VideoPipeline
 
-    def _simulation(self):
-        simulator = self._options.simulator
-        events = f"{simulator} ! application/x-event-camera ! queue name=events0 {BOTH} !"
-        if self._options.over_frames:
-            return f"tee name=t ! queue ! {events} {self._rest('t. ! queue name=overlaid ' + BOTH + ' !')}"
-        return f"{events} {self._rest()}"
-
-    def _retimed(self, video):
-        pipeline = video.element("frames").get_parent()
-        if self._writer and self._options.speed != 1 and not pipeline.get_by_name("source"):
-            retime(pipeline.get_by_name("frames").get_static_pad("src"), self._options.speed)
-        return pipeline
+        options = self._options
+        expect_limits(options.simulator)
+        rest = f"{options.simulator} ! application/x-event-camera ! queue name=events0 {BOTH} ! "
+        if options.over_frames:
+            rest = f"tee name=t ! queue ! {rest}{self._rest(f't. ! queue name=overlaid {BOTH} !')}"
+        else:
+            rest += self._rest()
+        self._video = VideoPipeline(source, rest) if source else VideoFile(self._inputs[0], rest)
+        frames = self._video.element("frames")
+        if self._writer and options.speed != 1 and not self._video.element("source"):
+            retime(frames.get_static_pad("src"), options.speed)
+        return frames.get_parent()
 
     def _branch(self, i, rest):
         link = "" if self._readers[i].has_pads("events_%u") else "!"
@@ -343,6 +354,8 @@ class Conversion:
 
     def _set_up(self):
         options, pipeline = self._options, self._pipeline
+        if self._writer and options.speed != 1 and not pipeline.get_by_name("frames"):
+            raise Misuse("--speed applies to films, and to videos whose events are simulated")
         for name, files in READER_OPTIONS.items():
             value = getattr(options, name)
             if value is None:
@@ -367,12 +380,12 @@ class Conversion:
             pipeline.get_by_name("crop").get_static_pad("sink").add_probe(
                 Gst.PadProbeType.EVENT_DOWNSTREAM, set_crop, options.crop)
         if self._film:
-            retime(pipeline.get_by_name("drawn").get_static_pad("src"), options.speed, self._add_picture)
+            retime(pipeline.get_by_name("drawn").get_static_pad("src"), options.speed, self._note_count)
             pipeline.get_by_name("scale").get_static_pad("sink").add_probe(
                 Gst.PadProbeType.EVENT_DOWNSTREAM, set_size, options.scale)
-            if self._out.lower().endswith((".gif", ".png")):
-                self._pictures = Pictures(None if self._out.lower().endswith(".gif") else options.sheet)
-                sink = pipeline.get_by_name("file")
+            sink = pipeline.get_by_name("file")
+            if sink.find_property("emit-signals"):
+                self._pictures = Pictures(options.sheet if self._is_still else None)
                 sink.set_property("emit-signals", True)
                 sink.connect("new-sample", self._pictures.add)
         else:
@@ -417,10 +430,9 @@ class Conversion:
         is_file = not pipeline.get_by_name("source") and not is_pipeline(self._inputs[0])
         if is_part and not (is_file or options.join or options.reverse):
             raise Misuse(f"{self._inputs[0]} cannot be sought, so --from and --to do not apply")
-        draws_still = self._pictures and self._out.lower().endswith(".png")
         try:
             play(pipeline, self._show, self._tell, self._interrupt,
-                 self._seek if is_file and (is_part or draws_still) else None)
+                 self._seek if is_file and (is_part or self._is_still) else None)
             if self._pictures:
                 self._pictures.save(path)
             return self._summary(is_part)
@@ -435,7 +447,7 @@ class Conversion:
         options, pipeline = self._options, self._pipeline
         known, duration = pipeline.query_duration(Gst.Format.TIME)
         end = Gst.SECOND * options.to if options.to is not None else None
-        if self._pictures and known:
+        if self._is_still and known:
             span = max(min(end or duration, duration) - Gst.SECOND * options.start, 1)
             cells = options.sheet[0] * options.sheet[1]
             rate = max(Fraction(2 * cells * Gst.SECOND, round(span)), FILMS[".png"][0] / options.speed)
@@ -450,6 +462,8 @@ class Conversion:
 
     def _position(self):
         """Seconds of the inputs that have been read, and their duration; None if unknown."""
+        if self._fed:
+            return self._fed
         element = self._pipeline.get_by_name("events0")
         is_at, at = element.query_position(Gst.Format.TIME)
         is_known, duration = element.query_duration(Gst.Format.TIME)
@@ -462,23 +476,24 @@ class Conversion:
         place = self._position()
         start, to = self._options.start, self._options.to
         share = None
-        if place:
-            end = min(place[1], to or MAX_SECONDS)
-            share = (place[0] - start) / (end - start) if end > start else None
+        if self._fed and place[1] > 0:
+            share = place[0] / place[1]
+        elif place and (end := min(place[1], to or MAX_SECONDS)) > start:
+            share = (place[0] - start) / (end - start)
         self._progress.show(share, f"{self._count} pictures" if self._film else f"{self._events()} events")
 
     def _tell(self, text):
         self._progress.clear()
         print(f"{', '.join(self._inputs)}: {text}", file=sys.stderr)
 
-    def _add_picture(self):
-        self._count += 1
+    def _note_count(self, count):
+        self._count = count
 
     def _summary(self, is_part):
         options = self._options
         if self._film:
             cells = options.sheet[0] * options.sheet[1]
-            return f"{cells if self._out.lower().endswith('.png') else self._count} pictures"
+            return f"{cells if self._is_still else self._count} pictures"
         events = self._events()
         if events == 0 and (is_part or options.crop) and not self._interrupt:
             place = self._position()

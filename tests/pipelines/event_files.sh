@@ -374,6 +374,8 @@ cmp expected.csv piped.csv || fail "the events of a pipeline are others"
 convert --crop=251x201+20+20 ball.raw odd.raw
 convert odd.raw film.mp4 --speed 0.5
 convert odd.raw film.webm --scale 2
+convert ball.raw part.mp4 --from 0.5 --to 1 --speed 0.5 | grep -q "^30 pictures" || fail "part.mp4 has other pictures"
+timeout 60 gst-discoverer-1.0 part.mp4 | grep -q "Duration: 0:00:01.000" || fail "part.mp4: $(timeout 60 gst-discoverer-1.0 part.mp4)"
 timeout 60 gst-discoverer-1.0 -v film.mp4 >discovered
 for found in "profile=(string)high" "chroma-format=(string)4:2:0" "Width: 252" "Height: 202" "Frame rate: 30/1" "Duration: 0:00:02.5"; do
   grep -q "$found" discovered || fail "film.mp4 lacks $found: $(cat discovered)"
