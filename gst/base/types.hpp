@@ -7,7 +7,7 @@
 
 /// GObject types made from tables, which must have static storage duration.
 
-/// Parses the value of an enum property as GStreamer does, but warns with the choices if there is
+/// Parses the value of an enum property as GStreamer does, but prints the choices if there is
 /// none such: gst-launch-1.0 only says that it could not set the property.
 inline gboolean parse_choice(GValue* value, const gchar* text, GParamSpec* property) {
   auto* const type = static_cast<GEnumClass*>(g_type_class_ref(G_VALUE_TYPE(value)));
@@ -22,7 +22,7 @@ inline gboolean parse_choice(GValue* value, const gchar* text, GParamSpec* prope
     std::string choices;
     for (guint i = 0; i < type->n_values; ++i)
       choices += std::string(i == 0 ? "" : ", ") + type->values[i].value_nick;
-    g_warning("%s=%s: choose one of %s", property->name, text, choices.c_str());
+    g_message("%s=%s: choose one of %s", property->name, text, choices.c_str());
   }
   g_type_class_unref(type);
   return choice != nullptr;
