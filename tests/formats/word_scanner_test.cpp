@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <string>
 
-#include "src/formats/event_decoder.hpp"
+#include "src/formats/decoder.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {

@@ -43,7 +43,8 @@ done
   printf '\x19\xe0'
 } >camera.grey
 truncate -s $((4096 * 391)) camera.grey
-mkdir videos recordings arrays
+mkdir videos recordings arrays pictures
+eval "$GST_LAUNCH -q $ball ! videoconvert ! pngenc snapshot=false ! multifilesink location=pictures/%d.png"
 cp drive.mp4 videos/first.mp4
 cp drive.mp4 "videos/second one.mp4"
 cp drive.raw recordings/first.raw
@@ -62,6 +63,7 @@ done
 [ $count -ge 60 ] || fail "found only $count lines"
 for file in events.webm events.mp4 ball.npz recording.h5 figures.json map.png maps.png out.raw events.npy received.raw \
   webcam.npz "videos/second one.h5" filtered.raw cropped.raw beside.raw quarter.raw turned.raw flat.raw both.raw both.webm rate.png part.raw "arrays/second one.npz" \
+  phone.raw pictures.raw talk.mp4 talk.gif sheet.png over.mp4 joined.raw backwards.raw drive.h5 \
   recipe/manifest.json "recipe/data/second one.npy"; do
   [ -s "$file" ] || fail "$file is missing or empty"
 done
