@@ -9,12 +9,23 @@ import numpy as np
 
 # Fields of a record that go to the manifest: all that do not depend on the machine's file system.
 PUBLISHED = ("name", "split", "input", "making", "parameters", "written", "figures", "warnings", "versions")
-STYLE = """body { font: 14px sans-serif; margin: 2em; background: #fff; color: #222 }
-.videos { display: flex; flex-wrap: wrap; gap: 1em }
-figure { margin: 0; width: 160px }
-img { display: block; width: 160px; border: 1px solid #ccc; image-rendering: pixelated }
-figcaption { overflow-wrap: anywhere; font-size: 12px } small { color: #666 }
-td, th { text-align: right; padding: 0 1em 0 0 } th:first-child, td:first-child { text-align: left }"""
+STYLE = """:root { color-scheme: light dark; font: 14px sans-serif }
+body { max-width: 75rem; margin: 1.5rem auto; padding: 0 1rem }
+.videos { display: grid; grid-template-columns: repeat(auto-fill, minmax(11rem, 1fr)); gap: 1rem }
+figure { margin: 0 } img { display: block; width: 100% } figcaption { overflow-wrap: anywhere; font-size: 12px }
+table { border-collapse: collapse } td, th { text-align: right; padding: .2rem .8rem } td { white-space: nowrap }
+th:first-child { text-align: left } tr:nth-child(even) { background: #8882 }"""
+# Columns of the page's table, and their text from the statistics of a part.
+COLUMNS = {
+    "videos": lambda part: f"{part['videos']:,}",
+    "frames": lambda part: f"{part['frames']:,}",
+    "duration": lambda part: duration_text(part["duration"]),
+    "million events": lambda part: f"{part['events'] / 1e6:,.2f}",
+    "ON": lambda part: "" if part["on-share"] is None else f"{100 * part['on-share']:.0f} %",
+    "MB": lambda part: f"{part['bytes'] / 1e6:,.1f}",
+    **{f"event rate, {name} (Mev/s)": lambda part, key=key: "" if part[key] is None else f"{part[key] / 1e6:.3f}"
+       for name, key in {"5th percentile": "rate-p5", "median": "rate-p50", "95th percentile": "rate-p95"}.items()},
+}
 
 
 def write_json(path, content):
@@ -37,11 +48,17 @@ def write_reports(output, recipe, records):
         "recipe": text, "seed": recipe.seed, "refused": refused,
         "videos": [{key: record[key] for key in PUBLISHED} for record in made]})
     for part in recipe.split:
-        paths = [record["written"]["path"] + "\n" for record in made if record["split"] == part]
-        write_text(os.path.join(output, f"{part}.txt"), "".join(paths))
+        lines = [line_of(record) + "\n" for record in made if record["split"] == part]
+        write_text(os.path.join(output, f"{part}.txt"), "".join(lines))
     statistics = statistics_of(made)
     write_json(os.path.join(output, "statistics.json"), statistics)
     write_text(os.path.join(output, "preview.html"), page_of(recipe, made, statistics))
+
+
+def line_of(record):
+    """A line of a part's list: the paths of a video's files, and its class, the folder of the video."""
+    paths = [file["path"] for file in record["written"].values()]
+    return "\t".join(filter(None, [*paths, os.path.dirname(record["name"])]))
 
 
 def statistics_of(made):
@@ -59,27 +76,37 @@ def statistics_of(made):
             "videos": len(records), "frames": sum(one["frames"] for one in figures),
             "duration": round(sum(one["duration"] for one in figures), 6), "events": events,
             "on-share": round(on / events, 4) if events > 0 else None,
-            "bytes": sum(record["written"]["size"] for record in records),
+            "bytes": sum(file["size"] for record in records for file in record["written"].values()),
             **{f"rate-p{p}": round(float(np.percentile(rates, p))) if rates else None for p in (5, 50, 95)}}
     return statistics
 
 
+def duration_text(seconds):
+    if seconds < 120:
+        return f"{seconds:.1f} s"
+    return f"{seconds / 60:.1f} min" if seconds < 7200 else f"{seconds / 3600:,.1f} h"
+
+
 def page_of(recipe, made, statistics):
     """An offline page; its pictures lie beside it."""
-    header = "".join(f"<th>{key}</th>" for key in statistics["all"])
-    rows = "".join(f"<tr><td>{html.escape(part)}</td>" + "".join(f"<td>{value}</td>" for value in figures.values())
-                   + "</tr>" for part, figures in statistics.items())
-    return (f'<!DOCTYPE html><html lang="en"><meta charset="utf-8"><title>{html.escape(os.path.basename(recipe.path))}'
-            f"</title><style>{STYLE}</style><h1>{html.escape(os.path.basename(recipe.path))}</h1>"
+    title = html.escape(os.path.basename(recipe.path))
+    header = "".join(f"<th>{name}</th>" for name in COLUMNS)
+    rows = "".join(f"<tr><th>{html.escape(part)}</th>"
+                   + "".join(f"<td>{text_of(figures)}</td>" for text_of in COLUMNS.values()) + "</tr>"
+                   for part, figures in statistics.items())
+    return (f'<!DOCTYPE html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+            f"<title>{title}</title><style>{STYLE}</style><h1>{title}</h1>"
             f"<table><tr><th></th>{header}</tr>{rows}</table>"
-            "<p>For each video, the busiest of a few frame intervals; ON blue, OFF red.</p>"
+            "<p>For each video, the busiest of a few frame intervals: ON white, OFF blue. Click to enlarge.</p>"
             f'<div class="videos">{"".join(map(figure_of, made))}</div>\n')
 
 
 def figure_of(record):
     figures = record["figures"]
-    parameters = " ".join(f"{name}={value}" for name, value in record["parameters"].items())
-    picture = "previews/" + urllib.parse.quote(record["name"]) + ".png"
-    return (f'<figure><img loading="lazy" src="{html.escape(picture)}" alt="" title="{html.escape(parameters)}">'
-            f"<figcaption>{html.escape(record['name'])}<br><small>{record['split']} {figures['frames']} frames,"
-            f" {figures['mean-rate'] / 1e6:.3f} Mev/s</small></figcaption></figure>")
+    parts = [record["split"], f"{figures['width']} × {figures['height']} pixels", f"{figures['frames']} frames",
+             duration_text(figures["duration"]), f"{figures['mean-rate'] / 1e6:.3f} Mev/s",
+             *(f"{name} {value}" for name, value in record["parameters"].items())]
+    picture = html.escape("previews/" + urllib.parse.quote(record["name"]) + ".png")
+    return (f'<figure><a href="{picture}"><img loading="lazy" src="{picture}" alt="events"></a>'
+            f"<figcaption><b>{html.escape(record['name'])}</b><br>{html.escape(', '.join(filter(None, parts)))}"
+            "</figcaption></figure>")

@@ -8,18 +8,17 @@ import tempfile
 
 import gst_eventcamera as ec
 import numpy as np
-from event_streams import png_of
+from event_streams import samples_of
 from gst_eventcamera.dataset import duration_of, pictures_of
 from gst_eventcamera.frames import Frames
-from gst_eventcamera.pipeline import Gst, events_of, utf8_path
-from gst_eventcamera.recipe import TENSORS
-from gst_eventcamera.recordings import WRITERS
+from gst_eventcamera.pipeline import EVENT_CAPS, Gst, events_of, utf8_path
+from gst_eventcamera.recipe import OUTPUTS, TENSORS
+from gst_eventcamera.recordings import WRITERS, buffer_of
 from gst_eventcamera.sources import SINK
 from gst_eventcamera.tensors import TENSOR_CAPS, tensor_of
 
 # Settings of writers without which the same events give other bytes.
 SAME_BYTES = {"h5": "commit-interval=0", "hdf5": "commit-interval=0"}
-PREVIEW_SIDE = 160  # pixels
 MAX_KEPT = 16  # arrays of events
 # Failures of the machine in any element, such as a full disk; a writer may keep events in TMPDIR.
 MACHINE_ERRORS = Gst.ResourceError.NO_SPACE_LEFT, Gst.ResourceError.WRITE, Gst.ResourceError.OPEN_WRITE
@@ -113,8 +112,8 @@ def state_of(path):
 def making_of(video):
     """All that determines the output besides the input."""
     recipe = video.recipe
-    making = {"line": video.line, "output": recipe.output}
-    if recipe.output == TENSORS:
+    making = {"line": video.line, "outputs": list(recipe.outputs)}
+    if TENSORS in recipe.outputs:
         making["tensors"] = recipe.tensors
     if recipe.framerate:
         making["framerate"] = str(recipe.framerate)
@@ -123,51 +122,53 @@ def making_of(video):
     return making
 
 
-def extension_of(recipe):
-    return "npy" if recipe.output == TENSORS else recipe.output
+def file_of(name, output):
+    """Path of a video's file of events or tensors in a data set."""
+    return f"data/{name}.{'npy' if output == TENSORS else output}"
 
 
-def path_in(output, folder, name, extension):
+def path_in(folder, file):
     """Path of a file of a data set; creates its folders."""
-    path = os.path.join(output, folder, f"{name}.{extension}")
+    path = os.path.join(folder, file)
     os.makedirs(os.path.dirname(path), exist_ok=True)
     return path
 
 
-def record_of(video, output, scratch, keep=True):
-    """Simulates a video, and returns its record. Its file of events is either complete or missing, even if the process
-    is killed; without `keep`, only its hash is recorded. The folder `scratch` is on the same file system as the
-    output."""
+def record_of(video, folder, scratch, keep=True):
+    """Simulates a video, and returns its record. Its files of events are either complete or missing, even if the
+    process is killed; without `keep`, only their hashes are recorded. The folder `scratch` is on the same file system
+    as the folder of the data set."""
     if keep:
-        remove_events(output, video.name)
+        remove_events(folder, video.name)
     record = {"name": video.name, "state": state_of(video.path),
               "input": {"path": os.path.relpath(video.path, os.path.dirname(video.recipe.path)),
                         "sha256": hash_of(video.path)},
-              "making": making_of(video), "parameters": dict(video.parameters), "split": video.split}
-    path = os.path.join(scratch, "events")
+              "making": making_of(video), "parameters": dict(video.parameters)}
+    paths = {output: os.path.join(scratch, output) for output in video.recipe.outputs}
     try:
-        figures, picture, warnings, decoders = simulate(video, path)
+        figures, picture, warnings, decoders = simulate(video, paths)
     except Refused as reason:
         return record | {"refused": str(reason)}
     except ec.PipelineError as failure:
         if is_of_machine(failure):
             raise
         return record | {"refused": f"corrupt or not supported: {failure}"}
-    written = {"path": f"data/{video.name}.{extension_of(video.recipe)}", "size": os.path.getsize(path),
-               "sha256": hash_of(path)}
+    written = {output: {"path": file_of(video.name, output), "size": os.path.getsize(path), "sha256": hash_of(path)}
+               for output, path in paths.items()}
     if keep:
-        with open(path_in(output, "previews", video.name, "png"), "wb") as file:
+        with open(path_in(folder, f"previews/{video.name}.png"), "wb") as file:
             file.write(picture)
-        os.replace(path, path_in(output, "data", video.name, extension_of(video.recipe)))
+        for output, path in paths.items():
+            os.replace(path, path_in(folder, written[output]["path"]))
     return record | {"written": written, "figures": figures, "warnings": warnings,
                      "versions": versions() | {"decoders": decoders}}
 
 
-def remove_events(output, name):
-    """Removes a video's file of events, in any format."""
-    for extension in (*WRITERS, ".npy"):
+def remove_events(folder, name):
+    """Removes a video's files of events, in any format."""
+    for output in OUTPUTS:
         with contextlib.suppress(FileNotFoundError):
-            os.remove(path_in(output, "data", name, extension[1:]))
+            os.remove(path_in(folder, file_of(name, output)))
 
 
 def write_record(path, record):
@@ -179,29 +180,33 @@ def write_record(path, record):
     os.replace(file.name, path)
 
 
-def simulate(video, path):
-    """Writes the events or tensors of a video. Returns figures, a picture, warnings, and the decoders."""
+def writer_of(recipe, output):
+    """Elements that write an output; the sink is named "file-" and the output."""
+    if output == TENSORS:
+        return f"eventtensor {recipe.tensors} ! {TENSOR_CAPS} ! appsink name=file-{TENSORS} sync=false async=false"
+    writer = WRITERS["." + output].replace("name=file", f"name=file-{output}")
+    return f"{writer} {SAME_BYTES.get(output, '')} async=false"
+
+
+def simulate(video, paths):
+    """Writes the events and tensors of a video to a path for each output. Returns figures, a picture, warnings, and the
+    decoders."""
     figures, frames = Figures(), Frames()
-    is_tensors = video.recipe.output == TENSORS
-    writer = f"eventtensor {video.recipe.tensors} ! {TENSOR_CAPS} ! appsink name=tensors sync=false async=false"
-    if not is_tensors:
-        writer = f"{WRITERS['.' + video.recipe.output]} {SAME_BYTES.get(video.recipe.output, '')} async=false"
+    writers = "".join(f" events. ! queue ! {writer_of(video.recipe, output)} " for output in paths)
 
     # One thread, since there is a job for each processor.
-    with video.playing(f"tee name=events ! queue ! {writer}  events. ! queue ! {SINK}", threads=1) as pipeline:
+    with video.playing(f"tee name=events ! queue ! {SINK} {writers}", threads=1) as pipeline:
         decoders = decoders_of(pipeline)
         pipeline.gaps_as_buffers()
         frames.watch(pipeline.element("decoded").get_static_pad("sink"))
-        array = None
-        if is_tensors:
-            array = NpyFile(path)
-        else:
-            pipeline.element("file").set_property("location", utf8_path(path))
+        array = NpyFile(paths[TENSORS]) if TENSORS in paths else None
+        for output in set(paths) - {TENSORS}:
+            pipeline.element(f"file-{output}").set_property("location", utf8_path(paths[output]))
         for sample in pipeline.samples():
             figures.add(events_of(sample))
-            while array and (tensor := pipeline.element("tensors").emit("try-pull-sample", 0)):
+            while array and (tensor := pipeline.element(f"file-{TENSORS}").emit("try-pull-sample", 0)):
                 array.append(tensor_of(tensor))
-        for tensor in pipeline.samples("tensors") if array else ():
+        for tensor in pipeline.samples(f"file-{TENSORS}") if array else ():
             array.append(tensor_of(tensor))
         pipeline.wait()
         duration = duration_of(pipeline)
@@ -211,13 +216,12 @@ def simulate(video, path):
         raise Refused("too short: nothing is left of it after the filters")
     if array:
         array.close()
-    picture = png_of(picture_of(figures.busiest()))
-    return figures.described(len(frames.times)), picture, frames.warnings(), sorted(decoders)
+    return figures.described(len(frames.times)), picture_of(figures.busiest()), frames.warnings(), sorted(decoders)
 
 
 def is_of_machine(failure):
     """True if the machine is at fault, not the video."""
-    return failure.element == "file" or (failure.error is not None and any(
+    return failure.element.startswith("file-") or (failure.error is not None and any(
         failure.error.matches(Gst.ResourceError.quark(), code) for code in MACHINE_ERRORS))
 
 
@@ -240,12 +244,11 @@ def versions():
 
 
 def picture_of(events):
-    """Events by row and column: ON blue, OFF red, on white."""
-    side = max(-(-events.width // PREVIEW_SIDE), -(-events.height // PREVIEW_SIDE), 1)
-    width, height = -(-events.width // side), -(-events.height // side)
-    place = (events["y"] // side).astype(np.int64) * width + events["x"] // side
-    on, off = (np.bincount(place[events["p"] == polarity], minlength=width * height) for polarity in (True, False))
-    # A cell is in full colour with an event per column of it.
-    on, off = (np.minimum(count / side, 1).reshape(height, width) for count in (on, off))
-    colours = 1 - np.stack([on, np.maximum(on, off), off], axis=-1)
-    return np.round(255 * colours)
+    """Events drawn as a PNG."""
+    start, end = round(1e6 * events.start), round(1e6 * events.end)
+    picture, = samples_of(
+        "appsrc name=events format=time ! eventrender ! video/x-raw,format=RGB,framerate=0/1 ! pngenc"
+        " ! appsink name=out sync=false",
+        [("events", f"{EVENT_CAPS},width={events.width},height={events.height},framerate=0/1",
+          [buffer_of(events, start, end - start)])])
+    return picture.get_buffer().extract_dup(0, picture.get_buffer().get_size())

@@ -1,19 +1,19 @@
 #!/usr/bin/python3 -B
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Finds the contrast thresholds at which a simulator generates as many ON and OFF events from a
-video as a real camera recorded of the same scene. For eventsim-dvs it then tries changes one at a time:
-exposure compensation, refractory period, threshold jitter, upsampling, the offset of the logarithm,
-overexposed light, adaptation, denoising, long exposures and exposure pulses, and keeps those that make the streams more
-similar by more than the noise of that figure. Balances the errors of mean and standard deviation over the
-pixels. Prints the settings, and how similar the two streams are. Overexposed parts of the frames are
-excluded.
+video as a real camera recorded of the same scene, and prints how similar the two streams are.
+For eventsim-dvs it then tries changes one at a time: exposure compensation, refractory period, threshold jitter,
+the offset of the logarithm, overexposed light, adaptation, denoising, long exposures and exposure pulses, and keeps
+those that make the streams clearly more similar, also in parts that they were not chosen on. Balances the errors of
+mean and standard deviation over the pixels. Prints the settings. Overexposed parts of the frames are excluded.
 
     event-calibrate drive.mp4 drive.raw --profile camera.profile --to 2
+    event-calibrate davis.aedat4
 
 VIDEO is anything that GStreamer decodes, or a text file of lines "seconds picture"; RECORDING is
-any event file that this project reads. Both need the same pixels and the same clock. --from and
---to are in seconds after the first frame; the default is the time that both cover. --measure-from
-and --measure-to select another time for the comparison."""
+any event file that this project reads. Both need the same pixels and the same clock; a file that has both, such as
+AEDAT 4, is given once. --from and --to are in seconds after the first frame; the default is the time that both cover.
+--measure-from and --measure-to select another time for the comparison."""
 import argparse
 import functools
 import os
@@ -28,8 +28,9 @@ import numpy as np
 from plugins import find_plugins
 from threshold_search import PRECISION, ROUGH_PRECISION, Setting, find_thresholds
 
-# Parts of the calibrated time for cross-validation.
-PARTS = 4
+# Windows of the calibrated time, with equally many events each, so that fast parts count. Changes are chosen on every
+# second one, and confirmed on the others.
+WINDOWS = 8
 # Changes of eventsim-dvs that suit some cameras, tried one after the other.
 CHANGES = [
     {"linear-light": "true", "log-eps": 0.001},
@@ -38,7 +39,6 @@ CHANGES = [
     {"refractory-period": 1_000_000, "refractory-reset": "signal"},
     {"threshold-jitter": 0.1},
     {"threshold-jitter": 0.2},
-    {"upsampling": "linear"},
     {"log-eps": 0.02},
     {"log-eps": 0.1},
     {"overexposed-light": 1},
@@ -53,8 +53,9 @@ LONG_EXPOSURE = 0.85
 PULSES = [0.04, 0.08, 0.12, 0.16]
 # Values of these are shares of the mean threshold.
 SHARES = {"threshold-jitter", "exposure-pulse"}
-# A change has to gain at least this likeness.
-MIN_GAIN = 0.003
+# A change has to gain more likeness than this, and may not cost more map correlation or matches. Smaller gains in one
+# part of a recording are often lost in another.
+MIN_GAIN = 0.01
 # Maximum factor between the numbers of events, when mean and standard deviation are balanced.
 MAX_BALANCE = 1.1
 # The element that has profiles.
@@ -67,42 +68,45 @@ MAX_SILENT, BUSY_NEIGHBOURS, BUSY_EVENTS = 0.05, 5, 24
 PROGRESS_INTERVAL = 60
 
 
-def likeness(figures):
-    """Similarity of two streams, from 0 to 1: the mean of the map correlation, the harmonic means of the shares of
-    recorded and of simulated events that have a match within 1, 5 and 10 ms, which count twice, the ratio of the
-    variances over the pixels, and the ratio between the times from event to event. A harmonic mean is close to the
-    smaller share, so a simulator cannot trade one share for the other."""
-    def both(limit):
-        return harmonic_mean([figures[f"{side}-matches"][f"within-{limit}ms"] for side in ("reference", "candidate")])
-
+def ratings_of(figures):
+    """Similarity of two streams, from 0 to 1: their likeness, map correlation, and the mean of the harmonic means of
+    the shares of recorded and of simulated events that have a match within 1, 5 and 10 ms. A harmonic mean is close to
+    the smaller share, so a simulator cannot trade one share for the other. The likeness is a mean of these, the ratio of
+    the variances over the pixels, and the ratio between the times from event to event; matches count six times."""
+    sides = figures["reference-matches"], figures["candidate-matches"]
+    matches = np.mean([harmonic_mean([side[f"within-{limit}ms"] for side in sides]) for limit in (1, 5, 10)])
     deviations = sorted(figures[side]["std-dev"] for side in ("reference", "candidate"))
     variances = (deviations[0] / deviations[1]) ** 2 if deviations[1] > 0 else 0
-    return float(np.average([figures["map-correlation"], both(1), both(5), both(10), variances,
-                             10 ** -figures["interval-distance"]],
-                            weights=[1, 2, 2, 2, 1, 1]))
+    likeness = np.average([figures["map-correlation"], matches, variances, 10 ** -figures["interval-distance"]],
+                          weights=[1, 6, 1, 1])
+    return np.array([likeness, figures["map-correlation"], matches])
 
 
 class Progress:
-    """Prints progress: one line, overwritten, on a terminal; elsewhere a line a minute, and every result."""
+    """Prints progress: one line, rewritten, on a terminal; elsewhere a line a minute, and every result."""
 
     def __init__(self):
         self.on_terminal = sys.stderr.isatty()
         self.told = time.monotonic()
+        self.left = ""  # time left, before each text
 
     def tell(self, text):
         if self.on_terminal:
-            print(f"\r{text:<78}", end="", file=sys.stderr, flush=True)
+            width = (os.get_terminal_size(sys.stderr.fileno()).columns or 80) - 1
+            print(f"\r{(self.left + text)[:width]:<{width}}", end="", file=sys.stderr, flush=True)
         elif time.monotonic() > self.told + PROGRESS_INTERVAL:
-            self.say(text)
+            self.say(self.left + text)
 
     def say(self, text):
         """Prints a result, which stays."""
-        print(f"\r{text:<78}" if self.on_terminal else text, file=sys.stderr, flush=True)
+        self.end()
+        print(text, file=sys.stderr, flush=True)
         self.told = time.monotonic()
 
     def end(self):
+        """Removes the line of progress."""
         if self.on_terminal:
-            print(file=sys.stderr)
+            print("\r\033[K", end="", file=sys.stderr, flush=True)
 
 
 def explained(video, recorded):
@@ -138,8 +142,7 @@ def silent_pixels(sensor, recorded):
 
 
 class Search:
-    """Rates settings by cross-validation: each part of the time is simulated with thresholds that fit the explained
-    events of the other parts, and rated by its likeness."""
+    """Fits thresholds to the explained events, and rates settings by the likeness of each window."""
 
     def __init__(self, video, recorded, span, progress):
         self.video, self.recorded, self.span, self.progress = video, recorded, span, progress
@@ -147,40 +150,45 @@ class Search:
         self.explained = recorded[is_explained]
         in_span = is_explained[(recorded["t"] > span.start) & (recorded["t"] <= span.end)]
         self.unexplained_share = 1 - in_span.mean() if len(in_span) else 0
-        self.parts = parts_of(video, span)
+        self.windows = windows_of(recorded, span)
         # The last stream of a threshold search is rated.
         self.simulated_by = functools.lru_cache(maxsize=4)(functools.partial(simulate, video))
         self.thresholds = None  # of the last setting, the first guess for the next one
 
-    def fit(self, setting, spans, precision=PRECISION, share=1.0):
-        """The element with thresholds that fit this share of the events of the spans."""
-        self.thresholds = find_thresholds(self.simulated_by, self.explained, spans, setting, self.progress,
+    def fit(self, setting, precision=PRECISION, share=1.0):
+        """The element with thresholds that fit this share of the events."""
+        self.thresholds = find_thresholds(self.simulated_by, self.explained, self.span, setting, self.progress,
                                           self.thresholds, precision, share)
         return setting.with_thresholds(self.thresholds)
 
-    def likenesses(self, setting):
-        """The likeness of each part."""
-        found = []
-        for part in self.parts:
-            others = [other for other in self.parts if other is not part] or [part]
-            simulated = self.simulated_by(self.fit(setting, others, ROUGH_PRECISION))
-            found.append(likeness(compare(self.video, self.recorded, simulated, part)))
-        return np.array(found)
+    def figures(self, element, window):
+        return compare(self.video, self.recorded, self.simulated_by(element), window)
+
+    def ratings(self, element, windows):
+        """Of each window."""
+        return np.array([ratings_of(self.figures(element, window)) for window in windows])
 
     def balanced(self, setting):
         """The element with thresholds that balance the errors of the mean event rate and of its standard deviation
         over the pixels: one is too small by the factor that the other is too large."""
-        figures = compare(self.video, self.explained, self.simulated_by(self.fit(setting, self.parts)), self.span)
+        figures = compare(self.video, self.explained, self.simulated_by(self.fit(setting)), self.span)
         mean, deviation = (figures["candidate"][field] / figures["reference"][field] for field in ("mean", "std-dev"))
-        return self.fit(setting, self.parts, share=np.clip(np.sqrt(mean / deviation), 1 / MAX_BALANCE, MAX_BALANCE))
+        return self.fit(setting, share=np.clip(np.sqrt(mean / deviation), 1 / MAX_BALANCE, MAX_BALANCE))
 
 
-def parts_of(video, span):
-    """A span cut at the frames closest to its quarters."""
-    inside = [frame.time // 1000 for frame in video.frames if span.start < frame.time // 1000 < span.end]
-    quarters = [span.start + (span.end - span.start) * i / PARTS for i in range(1, PARTS)]
-    cuts = sorted({min(inside, key=lambda time: abs(time - quarter)) for quarter in quarters if inside})
-    return [Span(start, end) for start, end in zip([span.start, *cuts], [*cuts, span.end])]
+def windows_of(recorded, span):
+    """A span cut into windows."""
+    times = span.of(recorded)["t"]
+    quantiles = np.quantile(times, np.arange(1, WINDOWS) / WINDOWS, method="lower") if len(times) else []
+    cuts = [span.start, *sorted({int(time) for time in quantiles} - {span.end}), span.end]
+    return [Span(start, end) for start, end in zip(cuts, cuts[1:])]
+
+
+def is_better(gains):
+    """Whether likeness gains by more than noise, and in most windows, and neither map correlation nor matches lose.
+    gains: of each rating, by window."""
+    mean = gains.mean(axis=0)
+    return mean[0] > MIN_GAIN and (mean > -MIN_GAIN).all() and np.mean(gains[:, 0] > 0) > 0.5
 
 
 def changes_of(video, recorded, span, element):
@@ -203,27 +211,32 @@ def changed(element, change):
 
 
 def calibrate(search, element):
-    """The element with calibrated thresholds, and with those of its changes that gain more than their noise."""
+    """The element with calibrated thresholds, and with those of its changes that gain on every second window, if they
+    gain on the others, too."""
     progress = search.progress
-    began = time.monotonic()
-    progress.say(f"calibrated thresholds: {search.fit(Setting(element), search.parts)}")
-    changes = changes_of(search.video, search.recorded, search.span, element)
-    if not changes:
-        return search.balanced(Setting(element))
+    fitted = search.fit(Setting(element))
+    progress.say(describe(f"calibrated thresholds: {fitted}", search.figures(fitted, search.span)))
+    windows, held_out = search.windows[::2], search.windows[1::2]
+    changes = changes_of(search.video, search.recorded, search.span, element) if held_out else []
     kept = {}
-    rating = search.likenesses(Setting(element))
+    ratings = search.ratings(fitted, windows)
+    began = time.monotonic()
     for tried, change in enumerate(changes, 1):
-        other = search.likenesses(changed(element, kept | change))
-        gains = other - rating
-        noise = gains.std(ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else 0
+        other = search.ratings(search.fit(changed(element, kept | change), ROUGH_PRECISION), windows)
+        gain = (other - ratings)[:, 0].mean()
         text = " ".join(f"{name}={value}" for name, value in change.items())
         left = (time.monotonic() - began) / tried * (len(changes) - tried)
-        progress.tell(f"{text}: likeness {gains.mean():+.4f}; {tried} of {len(changes)} changes,"
-                      f" about {left // 60:.0f}:{left % 60:02.0f} left")
-        if gains.mean() > max(noise, MIN_GAIN):
-            kept, rating = kept | change, other
-            progress.say(f"kept {text}: likeness {gains.mean():+.4f}, now {rating.mean():.4f}")
-    return search.balanced(changed(element, kept))
+        progress.left = f"{tried} of {len(changes)} changes tried, about {left // 60:.0f}:{left % 60:02.0f} left; "
+        progress.tell(f"{text}: likeness {gain:+.4f}")
+        if is_better(other - ratings):
+            kept, ratings = kept | change, other
+            progress.say(f"kept {text}: likeness {gain:+.4f}, now {ratings[:, 0].mean():.4f}")
+    progress.left = ""
+    found = search.balanced(changed(element, kept))
+    if kept and not is_better(search.ratings(found, held_out) - search.ratings(fitted, held_out)):
+        progress.say("dropped all changes: they do not gain on the windows that they were not chosen on")
+        return search.balanced(Setting(element))
+    return found
 
 
 def fit_thresholds(video, recorded, span, element, progress):
@@ -231,7 +244,7 @@ def fit_thresholds(video, recorded, span, element, progress):
     setting = Setting(element)
     simulated_by = functools.partial(simulate, video)
     return setting.with_thresholds(
-        find_thresholds(simulated_by, recorded[explained(video, recorded)], [span], setting, progress))
+        find_thresholds(simulated_by, recorded[explained(video, recorded)], span, setting, progress))
 
 
 def exposure_of(video):
@@ -311,7 +324,7 @@ def find_lag(video, recorded, span, element, progress):
     @functools.cache
     def likeness_at(lag):
         shown, over = late(lag)
-        rating = likeness(compare(shown, shown.visible(recorded), simulate(shown, fitted), over))
+        rating = ratings_of(compare(shown, shown.visible(recorded), simulate(shown, fitted), over))[0]
         progress.tell(f"frames {1000 * lag:.1f} ms late: likeness {rating:.4f}")
         return rating
 
@@ -364,7 +377,7 @@ def options():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("video")
-    parser.add_argument("recording")
+    parser.add_argument("recording", nargs="?", help="default: the events beside the frames of VIDEO, as in AEDAT 4")
     parser.add_argument("--element", type=element_of, default=PROFILED,
                         help=f"a simulator and its properties (default: {PROFILED})")
     for name, what in (("from", "start of the calibration (default: the second frame)"),
@@ -385,7 +398,9 @@ def options():
     parser.add_argument("--map", metavar="PNG", help="write a picture of the event counts per pixel")
     parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
                         help="print the version and exit")
-    return parser.parse_args()
+    args = parser.parse_args()
+    args.recording = args.recording or args.video
+    return args
 
 
 def write_profile(path, element, video, recording):
@@ -414,6 +429,13 @@ def span_of(video, recorded, lag, start, end):
     the first of several frame intervals, which warms up the pixels."""
     latest_start = max(video.frames[0].time // 1000, int(recorded["t"][0]) - 1)
     earliest_end = min(video.frames[-1].time // 1000, int(recorded["t"][-1]))
+    if latest_start >= earliest_end:
+        frames = [video.frames[i].time / 1e9 for i in (0, -1)]
+        events = recorded["t"][[0, -1]] / 1e6
+        raise RuntimeError(
+            f"the clocks differ: the frames are from {frames[0]:.3f} to {frames[1]:.3f} s, the events from"
+            f" {events[0]:.3f} to {events[1]:.3f} s. Converted files may start at 0; give a file that has both, such as"
+            " AEDAT 4, once and unconverted")
     origin = video.origin // 1000
     end = earliest_end if end is None else origin + round((end + lag) * 1e6)
     if start is not None:
@@ -425,8 +447,8 @@ def span_of(video, recorded, lag, start, end):
     span = Span(start, end)
     if span.end <= span.start:
         raise RuntimeError(f"nothing to compare from {span.start / 1e6:.3f} to {span.end / 1e6:.3f} s: the video and the"
-                           f" recording have both from {latest_start / 1e6:.3f} to {earliest_end / 1e6:.3f} s; they"
-                           " need the same clock, and the times of the options must lie within")
+                           f" recording have both from {latest_start / 1e6:.3f} to {earliest_end / 1e6:.3f} s; choose"
+                           " --from and --to within")
     return span
 
 

@@ -10,6 +10,7 @@ the recipe, with the same name. A second call makes only what is missing or has 
 events again without keeping them, and compares their hashes, and those of the files in data/, with the
 manifest."""
 import argparse
+import collections
 import concurrent.futures
 import contextlib
 import fcntl
@@ -24,6 +25,7 @@ import sys
 
 try:
     import gst_eventcamera as ec
+    import yaml
     from dataset_report import write_reports
     from dataset_video import hash_of, making_of, record_of, state_of, write_record
     from gst_eventcamera.recipe import uniform_number
@@ -52,6 +54,8 @@ def options():
                         " a name that Snakemake knows")
     parser.add_argument("--part", type=part_of_all, default=(1, 1), metavar="K/N",
                         help="make only the K-th of N parts, such as 3/100, for data sets of more than 10,000 videos")
+    parser.add_argument("--dry-run", action="store_true",
+                        help="print the videos, their parts and drawn parameters, and which would be made")
     parser.add_argument("--manifest", metavar="FILE",
                         help="the manifest that verify compares with (default: that of the folder)")
     parser.add_argument("--video", metavar="NAME", help="make one video only, as the jobs do; needs --file")
@@ -67,6 +71,8 @@ def options():
     args.verify = args.words[0] == "verify" and len(args.words) > 1
     if len(args.words) != 1 + args.verify:
         parser.error(f"give one recipe, not {' '.join(args.words)}")
+    if args.dry_run and args.verify:
+        parser.error("--dry-run is not for verify")
     if (args.video is None) != (args.file is None):
         parser.error("--video and --file need each other")
     if args.cores < 1 or args.retries < 0:
@@ -100,10 +106,11 @@ def is_record(record):
     def has(part, *keys):
         return isinstance(part, dict) and all(key in part for key in keys)
 
-    return (has(record, "name", "split", "input", "making") and has(record["input"], "sha256")
+    return (has(record, "name", "input", "making") and has(record["input"], "sha256")
             and has(record["making"], "line")
             and ("refused" in record or has(record, "written", "figures", "versions")
-                 and has(record["written"], "path", "size", "sha256")))
+                 and isinstance(record["written"], dict)
+                 and all(has(file, "path", "size", "sha256") for file in record["written"].values())))
 
 
 def id_of(name):
@@ -120,7 +127,8 @@ def record_path(args, name):
 
 
 def read_records(args, videos):
-    """Records by name, None if missing. The split follows today's recipe, which needs no new simulation."""
+    """Records by name, None if missing. The split follows today's recipe and videos, which needs no new
+    simulation."""
     found = {}
     for video in videos:
         record = read_json(record_path(args, video.name))
@@ -132,12 +140,13 @@ def reason_to_make(video, record, output):
     """Reason to make a video; empty if it is up to date."""
     if not record or "written" not in record:
         return "missing"
-    try:
-        size = os.path.getsize(os.path.join(output, record["written"]["path"]))
-    except FileNotFoundError:
-        return "missing"
-    if size != record["written"]["size"]:
-        return "the size of its file of events has changed"
+    for file in record["written"].values():
+        try:
+            size = os.path.getsize(os.path.join(output, file["path"]))
+        except FileNotFoundError:
+            return "missing"
+        if size != file["size"]:
+            return "the size of its file of events has changed"
     if record["making"] != making_of(video) or record["figures"]["frames"] < video.recipe.min_frames:
         return "the recipe has changed"
     try:
@@ -164,9 +173,29 @@ def profile_options(profile):
     """Options for one of our profiles, by name, or any other that Snakemake finds."""
     own = os.path.join(HERE, profile)
     if os.sep in profile or not os.path.isfile(os.path.join(own, "config.yaml")):
+        expect_slurm(profile)
         return ["--profile", profile]
+    expect_slurm(own)
     # Snakemake passes the path of a profile's program to a shell without quotes.
     return ["--profile", own, "--cluster-status", shlex.quote(os.path.join(own, "status"))]
+
+
+def expect_slurm(folder):
+    """Raises RuntimeError if a profile submits jobs with sbatch, which refuses them."""
+    try:
+        with open(os.path.join(folder, "config.yaml"), encoding="utf-8") as file:
+            words = shlex.split((yaml.safe_load(file) or {}).get("cluster", ""))
+    except (FileNotFoundError, NotADirectoryError, yaml.YAMLError):  # Snakemake tells, or looks elsewhere
+        return
+    if words[:1] != ["sbatch"]:
+        return
+    words = [word for word in words if "{" not in word]  # set by Snakemake for each job
+    try:
+        tested = subprocess.run([*words, "--test-only", "--wrap=true"], capture_output=True, text=True)
+    except FileNotFoundError:
+        raise RuntimeError("sbatch is missing; on Debian, install: slurm-client") from None
+    if tested.returncode != 0:
+        raise RuntimeError(f"Slurm takes no jobs: {tested.stderr.strip()}")
 
 
 def run_snakemake(args, videos, *options):
@@ -248,13 +277,25 @@ def expect_own_folder(output, videos):
             raise RuntimeError(f"{output} has {video.path}, a video of the recipe; choose another folder with --output")
 
 
+def print_plan(videos, stale):
+    for video in videos:
+        parameters = " ".join(f"{name}={value}" for name, value in video.parameters.items())
+        print("\t".join(filter(None, [video.name, video.split, parameters])))
+    parts = collections.Counter(video.split for video in videos)
+    print(", ".join([f"{len(videos)} videos: {len(stale)} to make",
+                     *(f"{count} in {part}" for part, count in sorted(parts.items()) if part)]))
+
+
 def make_all(args, recipe):
     """Returns the exit status."""
     videos = list(ec.Dataset(recipe))
     expect_own_folder(args.output, videos)
-    os.makedirs(args.output, exist_ok=True)
     mine = selected(args, videos)
     stale = stale_videos(mine, read_records(args, mine), args.output)
+    if args.dry_run:
+        print_plan(mine, stale)
+        return 0
+    os.makedirs(args.output, exist_ok=True)
     status = make(args, stale) if stale else 0
     with open(os.path.join(args.output, ".lock-reports"), "w", encoding="utf-8") as reports:
         fcntl.flock(reports, fcntl.LOCK_EX)  # other parts write them, too, from all records
@@ -314,7 +355,7 @@ def difference_of(expected, record):
         return f"made by \"{record['making']['line']}\" instead of \"{expected['making']['line']}\""
     if "refused" in record:
         return record["refused"]
-    if expected["written"]["sha256"] == record["written"]["sha256"]:
+    if expected["written"] == record["written"]:
         return ""
     if expected["versions"] != record["versions"]:
         return f"other events, by {record['versions']} instead of {expected['versions']}"
@@ -322,9 +363,9 @@ def difference_of(expected, record):
 
 
 def is_damaged(written, output):
-    """True if a file of events is there, and is not what was written."""
-    path = os.path.join(output, written["path"])
-    return os.path.exists(path) and hash_of(path) != written["sha256"]
+    """True if one of the files of events is there, and is not as it was written."""
+    paths = {os.path.join(output, file["path"]): file["sha256"] for file in written.values()}
+    return any(os.path.exists(path) and hash_of(path) != sha256 for path, sha256 in paths.items())
 
 
 def main():
@@ -334,7 +375,7 @@ def main():
     if args.video:
         make_one(args, recipe)
         return 0
-    if not shutil.which("snakemake"):
+    if not args.dry_run and not shutil.which("snakemake"):
         raise RuntimeError("Snakemake is missing; on Debian, install: snakemake")
     if args.unlock:
         return run_snakemake(args, [], "--unlock")

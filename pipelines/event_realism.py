@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 # Imported first: it reports missing packages.
 from event_streams import (GLib, Gst, Sensor, Span, compare, expect_writable, png_of, read_mask, read_recording,
-                           read_video, seconds)
+                           read_video, reconstruct, seconds)
 import numpy as np
 from plugins import find_plugins
 
@@ -25,7 +25,7 @@ LIMITS = (1, 5, 10)  # of matches, ms
 # Tolerance for figures beyond the ceiling, which is an estimate.
 TOLERANCE = 0.05
 SPLITS = 20
-COLOURS = ["#808080", "#4080d0", "#d07020", "#309060", "#a050c0", "#c04060", "#60a0a0"]
+COLOURS = ["currentColor", "#4080d0", "#d07020", "#309060", "#a050c0", "#c04060", "#60a0a0"]
 
 
 @dataclass
@@ -64,7 +64,20 @@ def spread_by_chance(sensor, events):
     return np.sqrt(2 * np.mean(np.square(differences), axis=0))
 
 
-def table_of(sensor, real, simulated):
+def similarity(a, b):
+    """Mean structural similarity (SSIM; Wang et al., IEEE TIP 2004) of pictures, in windows of 8 x 8 pixels."""
+    def mean(values):
+        sums = np.pad(values.cumsum(axis=1).cumsum(axis=2), ((0, 0), (1, 0), (1, 0)))
+        return (sums[:, 8:, 8:] - sums[:, 8:, :-8] - sums[:, :-8, 8:] + sums[:, :-8, :-8]) / 64
+
+    mean_a, mean_b = mean(a), mean(b)
+    variances = mean(a * a) - mean_a ** 2 + mean(b * b) - mean_b ** 2
+    covariance = mean(a * b) - mean_a * mean_b
+    return np.mean((2 * mean_a * mean_b + 1e-4) * (2 * covariance + 9e-4)
+                   / ((mean_a ** 2 + mean_b ** 2 + 1e-4) * (variances + 9e-4)))
+
+
+def table_of(sensor, real, simulated, span):
     """The rows of the table."""
     first = simulated[0].figures
     ceiling = first["noise-ceiling"]
@@ -85,6 +98,11 @@ def table_of(sensor, real, simulated):
                         [False] * len(simulated)))
     rows.append(Row("map correlation", "—", [f"{stream.figures['map-correlation']:.3f}" for stream in simulated],
                     [False] * len(simulated)))
+    if min(sensor.width, sensor.height) >= 8:
+        pictures = reconstruct(sensor, real.events, span)
+        rows.append(Row("similarity of reconstructions", "—",
+                        [f"{similarity(pictures, reconstruct(sensor, stream.events, span)):.3f}" for stream in simulated],
+                        [False] * len(simulated)))
     values = [stream.figures["rate-correlation"] for stream in simulated]
     rows.append(Row("rate correlation, 1 ms", f"{ceiling['rate-correlation']:.3f}",
                     [f"{value:.3f}" for value in values],
@@ -127,39 +145,58 @@ def map_of(counts, max_count):
     return "data:image/png;base64," + base64.b64encode(encoded).decode()
 
 
-def chart(title, x_title, y_title, curves, logarithmic=(False, False)):
-    """An SVG of curves, given as x and y of each stream. A logarithmic axis, to the base 10, starts at the lowest
-    value, a linear one at 0."""
+def ticks_of(low, high, is_log):
+    """Round values from `low` to `high`, about five: 1, 2 and 5 times powers of ten. A logarithmic axis has those of
+    its values, and only the powers if these suffice."""
+    if is_log:
+        powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.log10(high) + 1)
+        shown = powers[::-(-len(powers) // 8)] if len(powers) > 4 else np.outer(powers, (1, 2, 5)).ravel()
+    else:
+        coarse = 10.0 ** np.floor(np.log10((high - low) / 5)) * np.array([1, 2, 5, 10])
+        step = coarse[coarse >= (high - low) / 6][0]
+        shown = np.arange(np.ceil(low / step), high / step + 1) * step
+    return shown[(shown >= low * 0.999) & (shown <= high * 1.001)]
+
+
+def legend_of(names):
+    return " ".join(f'<span style="color: {COLOURS[i % len(COLOURS)]}">■ {name}</span>' for i, name in enumerate(names))
+
+
+def chart(title, x_title, y_title, names, curves, logarithmic=(False, False)):
+    """An SVG of curves, given as x and y of each stream, the real one first, which is drawn over the others. A
+    logarithmic axis starts at the lowest value, a linear one at 0."""
     points = []
     for curve in curves:
         curve = np.array(curve, float).reshape(2, -1)
-        curve = curve[:, (curve > 0).all(axis=0) | (not any(logarithmic))]
-        points.append(np.array([np.log10(axis) if is_log else axis for axis, is_log in zip(curve, logarithmic)]))
+        points.append(curve[:, (curve > 0).all(axis=0) | (not any(logarithmic))])
     drawn = np.concatenate(points, axis=1)
     if drawn.shape[1] == 0:
         return ""
     low = np.where(logarithmic, drawn.min(axis=1), 0)
-    size = drawn.max(axis=1) - low
-    size = np.where(size > 0, size, 1)
+    high = np.maximum(drawn.max(axis=1), np.where(logarithmic, low * 1.001, low + 1e-9))
     width, height, left, bottom = 540, 260, 90, 44
 
-    def place(curve):
-        x, y = (curve - low[:, None]) / size[:, None]
-        return " ".join(f"{left + a * width:.1f},{10 + (1 - b) * height:.1f}" for a, b in zip(x, y))
+    def share(axis, values):
+        scale = np.log10 if logarithmic[axis] else np.asarray
+        return (scale(values) - scale(low[axis])) / (scale(high[axis]) - scale(low[axis]))
 
-    def number(axis, share):
-        value = low[axis] + share * size[axis]
-        return f"{10 ** value:.3g}" if logarithmic[axis] else f"{value:.3g}"
+    def place(curve):
+        return " ".join(f"{left + a * width:.1f},{10 + (1 - b) * height:.1f}"
+                        for a, b in zip(share(0, curve[0]), share(1, curve[1])))
 
     lines = [f'<polyline points="{place(curve)}" stroke="{COLOURS[i % len(COLOURS)]}"/>'
-             for i, curve in enumerate(points)]
-    marks = "".join(
-        f'<text x="{left + share * width:.0f}" y="{height + 28}" text-anchor="middle">'
-        f"{number(0, share)}</text>"
-        f'<text x="{left - 6}" y="{10 + (1 - share) * height + 4:.0f}" text-anchor="end">'
-        f"{number(1, share)}</text>" for share in (0, 0.25, 0.5, 0.75, 1))
-    return (f'<figure><figcaption>{title}</figcaption><svg viewBox="0 0 {left + width + 30} {height + 10 + bottom}">'
-            f'<rect x="{left}" y="10" width="{width}" height="{height}"/>{"".join(lines)}{marks}'
+             for i, curve in reversed(list(enumerate(points)))]
+    marks = ""
+    for value in ticks_of(low[0], high[0], logarithmic[0]):
+        x = left + share(0, value) * width
+        marks += (f'<path d="M{x:.1f} 10v{height}"/><text x="{x:.1f}" y="{height + 28}" text-anchor="middle">'
+                  f"{value:g}</text>")
+    for value in ticks_of(low[1], high[1], logarithmic[1]):
+        y = 10 + (1 - share(1, value)) * height
+        marks += f'<path d="M{left} {y:.1f}h{width}"/><text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
+    return (f"<figure><figcaption><b>{title}</b> {legend_of(names)}</figcaption>"
+            f'<svg viewBox="0 0 {left + width + 30} {height + 10 + bottom}">'
+            f'<rect x="{left}" y="10" width="{width}" height="{height}"/>{marks}{"".join(lines)}'
             f'<text x="{left + width / 2}" y="{height + 46}" text-anchor="middle">{x_title}</text>'
             f'<text x="14" y="{10 + height / 2}" text-anchor="middle" transform="rotate(-90 14 {10 + height / 2})">'
             f"{y_title}</text></svg></figure>")
@@ -174,9 +211,9 @@ def intervals_of(sensor, events):
 
 
 def interval_curve(sensor, events):
-    """Share of the intervals in each tenth of a decade."""
+    """Share of the intervals in each tenth of a decade, in ms."""
     share, edges = np.histogram(np.log10(intervals_of(sensor, events)), np.arange(-0.35, 7.05, 0.1))
-    return 10 ** ((edges[:-1] + edges[1:]) / 2), share / max(share.sum(), 1)
+    return 10 ** ((edges[:-1] + edges[1:]) / 2 - 3), share / max(share.sum(), 1)
 
 
 def travels_of(path, sensor, span):
@@ -207,16 +244,17 @@ def response_curve(sensor, events, travels):
 def charts_of(sensor, real, simulated, travels):
     """The curves of the page, with the response to light if the changes of the light are known."""
     streams = [real] + simulated
+    names = [html.escape(stream.name) for stream in streams]
     rates = []
     for i, stream in enumerate(streams):
         curve = (stream.figures or simulated[0].figures)["rate-curve"]
         counts = np.array(curve["candidate" if i > 0 else "reference"], float)
-        rates.append((np.arange(len(counts)) * curve["bin"] / 1e9, counts / (curve["bin"] / 1e9)))
-    charts = [chart("Event rate", "seconds", "events per second", rates),
-              chart("Times between successive events of a pixel", "microseconds", "share",
+        rates.append((np.arange(len(counts)) * curve["bin"] / 1e6, counts / curve["bin"] * 1e3))
+    charts = [chart("Event rate", "ms", "Mev/s", names, rates),
+              chart("Times between successive events of a pixel", "ms", "share", names,
                     [interval_curve(sensor, stream.events) for stream in streams], (True, False))]
     if travels is not None:
-        charts.append(chart("Response", "change of the logarithm of the light", "events per pixel and polarity",
+        charts.append(chart("Response", "change of the logarithm of the light", "events per pixel and polarity", names,
                             [np.transpose(response_curve(sensor, stream.events, travels)) for stream in streams],
                             (True, True)))
     else:
@@ -228,7 +266,7 @@ def charts_of(sensor, real, simulated, travels):
                       if (chosen := (theirs >= 2 ** low) & (theirs < 2 ** (low + 1))).sum() >= 20]
             curves.append(np.transpose(groups) if groups else ((), ()))
         charts.append(chart("Real events of the pixels with as many simulated ones", "simulated events of a pixel",
-                            "real events", curves, (True, True)))
+                            "real events", names, curves, (True, True)))
     return charts
 
 
@@ -241,14 +279,17 @@ tr:nth-child(even) { background: #8882 } .beyond { color: light-dark(#b02020, #f
 .maps { grid-template-columns: repeat(auto-fill, minmax(18rem, 1fr)) }
 .charts { grid-template-columns: repeat(auto-fill, minmax(min(32rem, 100%), 1fr)) }
 img { width: 100%; image-rendering: pixelated } svg { width: 100% } svg text { font-size: 12px; fill: currentColor }
-svg rect { fill: none; stroke: #8888 } polyline { fill: none; stroke-width: 2 }
+svg rect, path { fill: none; stroke: #8888 } path { stroke: #8884 } polyline { fill: none; stroke-width: 2 }
+figcaption span { margin-left: .7em; white-space: nowrap }
+.bar { display: flex; justify-content: space-between; max-width: 18rem; padding: .1rem .4rem; background: linear-gradient(90deg, #000, #fff) }
+.bar span:nth-child(-n+2) { color: #fff } .bar span { color: #000 }
 """
 
 
 def page_of(sensor, real, simulated, rows, charts):
     streams = [real] + simulated
     maps = [counts_per_pixel(sensor, stream.events) for stream in streams]
-    max_count = max(np.quantile(maps[0], 0.999), 1)
+    max_count = max(np.quantile(maps[0][maps[0] > 0], 0.995), 1)
     names = [html.escape(stream.name) for stream in streams]
     header = "".join(f'<th style="border-bottom: 3px solid {COLOURS[i % len(COLOURS)]}">{name}</th>'
                      for i, name in enumerate([f"{names[0]}, ceiling"] + names[1:]))
@@ -262,7 +303,9 @@ def page_of(sensor, real, simulated, rows, charts):
             f"<title>Realism of {', '.join(names[1:])}</title><style>{STYLE}</style><h1>Beside {names[0]}</h1>"
             f"<table><tr><th></th>{header}</tr>{body}</table>"
             "<p>* beyond the noise ceiling: two recordings of the scene by the same camera would differ less.</p>"
-            f'<h2>Events per pixel</h2><div class="maps">{figures}</div><div class="charts">{"".join(charts)}</div>\n')
+            f'<h2>Events per pixel</h2><p class="bar"><span>0</span><span>{max_count / 4:.3g}</span><span>{max_count:.3g}'
+            "</span></p><p>White: the count that 99.5 % of the pixels with real events do not exceed. The brightness is"
+            f' the square root of the count.</p><div class="maps">{figures}</div><div class="charts">{"".join(charts)}</div>\n')
 
 
 # the program
@@ -329,7 +372,7 @@ def main():
     travels = travels_of(args.video, sensor, span) if args.html and args.video else None
     for stream in simulated:
         stream.figures = compare(sensor, real.events, stream.events, span)
-    rows = table_of(sensor, real, simulated)
+    rows = table_of(sensor, real, simulated, span)
     print_table(real, simulated, rows)
     if args.html:
         page = page_of(sensor, real, simulated, rows, charts_of(sensor, real, simulated, travels))

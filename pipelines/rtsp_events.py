@@ -5,10 +5,12 @@
     rtsp-events --device /dev/video0
 
     rtsp://HOST:8554/events   the events
+    rtsp://HOST:8554/picture  the events, drawn as H.264 video for any player
     rtsp://HOST:8554/video    the video of the camera
-    rtsp://HOST:8554/both     both in one session, synchronized by RTCP
+    rtsp://HOST:8554/both     events and video in one session, synchronized by RTCP
 
-Without --device it serves a test scene. With --certificate, it serves rtsps:// only."""
+Without --device or --source it serves a test scene; of a recording, only events and picture. With --certificate, it
+serves rtsps:// only."""
 import os
 import sys
 
@@ -26,24 +28,29 @@ except (ImportError, ValueError) as missing:
     sys.exit(f"error: {missing}\nOn Debian, install: python3-gi gir1.2-gst-plugins-base-1.0"
              " gir1.2-gst-rtsp-server-1.0")
 
-from capture import Capture, described, find_elements, host_of, option_parser  # noqa: E402
+from capture import Capture, Source, described, find_elements, host_of, option_parser  # noqa: E402
 
-ELEMENTS = ["vp8enc", "rtpvp8pay"]
+ELEMENTS = ["vp8enc", "rtpvp8pay",
+            "x264enc", "rtph264pay"]
 
+EVENTS_CAPTURED = "application/x-event-camera"
 # A format that every simulator and the encoder support.
 CAPTURED = "videoconvert ! video/x-raw,format=I420"
 # The appsrc drops frames while a client pauses; the queues drop them if a simulator or an encoder is too slow.
-FRAMES = ("appsrc name=frames is-live=true format=time leaky-type=downstream max-buffers=2 max-bytes=0"
+FRAMES = ("appsrc name=frames is-live=true format=time leaky-type=downstream max-buffers={buffers} max-bytes=0"
           " max-time=0")
-QUEUE = "queue leaky=downstream max-size-buffers=2"
-EVENTS = f"{QUEUE} ! {{simulator}} ! application/x-event-camera ! rtpeventpay"
+QUEUE = "queue leaky=downstream max-size-buffers={buffers}"
+EVENTS = f"{QUEUE} ! {{simulator}} ! application/x-event-camera"
 # RTSP clients cannot request a key frame, so there is one every second.
+PICTURE = ("eventrender ! video/x-raw,framerate=30/1 ! videoconvert ! video/x-raw,format=I420 ! queue"
+           " ! x264enc tune=zerolatency speed-preset=veryfast bitrate=4000 key-int-max=30 ! rtph264pay config-interval=-1")
 VIDEO = (f"{QUEUE} ! videoconvert ! vp8enc deadline=1 cpu-used=8 threads=2 target-bitrate=4000000"
          " keyframe-max-dist=30 ! rtpvp8pay picture-id-mode=15-bit")
 MEDIA = {
-    "/events": f"{FRAMES} ! {EVENTS} name=pay0",
+    "/events": f"{FRAMES} ! {EVENTS} ! rtpeventpay name=pay0",
+    "/picture": f"{FRAMES} ! {EVENTS} ! {PICTURE} name=pay0",
     "/video": f"{FRAMES} ! {VIDEO} name=pay0",
-    "/both": f"{FRAMES} ! tee name=t  t. ! {EVENTS} name=pay0  t. ! {VIDEO} name=pay1",
+    "/both": f"{FRAMES} ! tee name=t  t. ! {EVENTS} ! rtpeventpay name=pay0  t. ! {VIDEO} name=pay1",
 }
 VIEWER = "viewer"
 SECONDS_BETWEEN_CLEANUPS = 5
@@ -52,17 +59,22 @@ SECONDS_BETWEEN_CLEANUPS = 5
 class Server:
     """RTSP server: clients of a path share its media, and all media share the camera."""
 
-    def __init__(self, device, simulator):
-        self._capture = Capture(device, CAPTURED)
+    def __init__(self, device, source, simulator):
+        source = Source(device, source)
+        self._capture = Capture(device, source, EVENTS_CAPTURED if source.has_events else CAPTURED)
+        self._paths = ("/events", "/picture") if source.has_events else tuple(MEDIA)
         self._server = GstRtspServer.RTSPServer()
         permissions = GstRtspServer.RTSPPermissions.new()
         for permission in ("media.factory.access", "media.factory.construct"):
             permissions.add_permission_for_role(VIEWER, permission, True)
-        # Reports errors at the start, not to the first client.
-        Gst.parse_launch_full(MEDIA["/both"].format(simulator=simulator), None, Gst.ParseFlags.FATAL_ERRORS)
-        for path, launch in MEDIA.items():
+        for path in self._paths:
+            # A recording comes in buffers of 10 ms, none of which is dropped for another.
+            launch = MEDIA[path].format(**({"simulator": "identity", "buffers": 100} if source.has_events
+                                           else {"simulator": simulator, "buffers": 2}))
+            # Reports errors at the start, not to the first client.
+            Gst.parse_launch_full(launch, None, Gst.ParseFlags.FATAL_ERRORS)
             factory = GstRtspServer.RTSPMediaFactory()
-            factory.set_launch(f"( {launch.format(simulator=simulator)} )")
+            factory.set_launch(f"( {launch} )")
             factory.set_shared(True)
             factory.set_permissions(permissions)
             factory.connect("media-configure", self._feed)
@@ -92,7 +104,7 @@ class Server:
                                "choose another with --port")
         self._capture.start()
         base = f"{scheme}://{host_of(address)}:{self._server.get_bound_port()}"
-        print(f"Serving {', '.join(base + path for path in MEDIA)} until Ctrl-C", flush=True)
+        print(f"Serving {', '.join(base + path for path in self._paths)} until Ctrl-C", flush=True)
         sessions = self._server.get_session_pool()
         GLib.timeout_add_seconds(SECONDS_BETWEEN_CLEANUPS, lambda: sessions.cleanup() >= 0)
         try:
@@ -126,8 +138,8 @@ def main():
     if args.user == "":
         parser.error("--user is empty")
     Gst.init(None)
-    find_elements(ELEMENTS, "gstreamer1.0-plugins-good")
-    server = Server(args.device, args.simulator)
+    find_elements(ELEMENTS, "gstreamer1.0-plugins-good gstreamer1.0-plugins-ugly")
+    server = Server(args.device, args.source, args.simulator)
     if args.user is not None or args.certificate:
         server.protect(args.user, args.password, args.certificate)
     server.run(args.address, args.port, "rtsps" if args.certificate else "rtsp")

@@ -113,10 +113,10 @@ class ThresholdSearch:
         self.next = np.where(within, step, np.sqrt(self.low * self.high))
 
 
-def find_thresholds(simulated_by, recorded, spans, setting, progress, first=None, precision=PRECISION, share=1.0):
+def find_thresholds(simulated_by, recorded, span, setting, progress, first=None, precision=PRECISION, share=1.0):
     """The thresholds at which the simulator generates this share of the recorded ON and OFF events within the
-    spans."""
-    goal = share * sum(counts(span.of(recorded)) for span in spans)
+    span."""
+    goal = share * counts(span.of(recorded))
     if goal.min() == 0:
         raise RuntimeError("the recording lacks ON or OFF events in the time to calibrate on; choose another with"
                            " --from and --to")
@@ -124,7 +124,7 @@ def find_thresholds(simulated_by, recorded, spans, setting, progress, first=None
     for trial in range(MAX_TRIALS):
         thresholds = search.pair()
         simulated = simulated_by(setting.with_thresholds(thresholds))
-        made = sum(counts(span.of(simulated)) for span in spans)
+        made = counts(span.of(simulated))
         progress.tell(f"{setting}: trial {trial + 1}, thresholds {thresholds[0]:.4g} and"
                       f" {thresholds[1]:.4g}, {made[0] / goal[0]:.3f} of the ON and"
                       f" {made[1] / goal[1]:.3f} of the OFF events")

@@ -1,11 +1,11 @@
 #!/usr/bin/python3 -B
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Serves a page that shows the events of a camera live, with the event rate beside them; any number
-of browsers can watch. Ctrl-C ends it.
+"""Serves a page that shows the events of a camera live, with their rate of the last ten seconds; any number
+of browsers can watch, and each can change how all see them drawn. Ctrl-C ends it.
 
     web-events --device /dev/video0
 
-Without --device it shows a test scene. By default only browsers on this machine can connect; with
+Without --device or --source it shows a test scene. By default only browsers on this machine can connect; with
 --address 0.0.0.0, anyone who can reach this machine can, without a password."""
 import ipaddress
 import json
@@ -27,13 +27,13 @@ except (ImportError, ValueError) as missing:
     sys.exit(f"error: {missing}\nOn Debian, install: python3-gi gir1.2-gst-plugins-base-1.0"
              " gir1.2-gst-plugins-bad-1.0 gir1.2-soup-3.0")
 
-from capture import Capture, find_elements, host_of, option_parser  # noqa: E402
+from capture import Capture, Source, find_elements, host_of, option_parser  # noqa: E402
 
 PAGE = os.path.join(os.path.dirname(os.path.realpath(__file__)), "web_events.html")
 ELEMENTS = ["vp8enc", "rtpvp8pay", "webrtcbin", "nicesink", "dtlssrtpenc"]
 
 DRAW_AND_ENCODE = (
-    "{simulator} ! application/x-event-camera ! eventstats interval=500000000 ! eventrender"
+    "{simulator} ! application/x-event-camera ! eventstats interval=500000000 ! eventrender name=renderer"
     " ! video/x-raw,framerate=30/1 ! videoconvert ! queue leaky=downstream max-size-buffers=2"
     " ! vp8enc name=encoder deadline=1 cpu-used=8 threads=2 target-bitrate=4000000"
     " keyframe-max-dist=3600")
@@ -70,12 +70,14 @@ def refuse(message, status):
 
 class Viewer:
     """A browser: its WebSocket, and the WebRTC connection negotiated through it. Calls `need_key_frame`,
-    from any thread, when the browser needs one to decode, and `end` when it has disconnected."""
+    from any thread, when the browser needs one to decode, `set_mode` when its user chooses a mode of drawing, which
+    raises ValueError if there is none such, and `end` when it has disconnected."""
 
-    def __init__(self, websocket, capture, need_key_frame, end):
+    def __init__(self, websocket, capture, need_key_frame, set_mode, end):
         self._websocket = websocket
         self._capture = capture
         self._need_key_frame = need_key_frame
+        self._set_mode = set_mode
         self._end = end
         self._has_offered = False
         self._has_left = False
@@ -156,6 +158,8 @@ class Viewer:
             for name, value in json.loads(data.get_data()).items():
                 if name == "answer":
                     self._set_answer(value)
+                elif name == "mode":
+                    self._set_mode(value)
                 elif name == "candidate":
                     self._webrtc.emit("add-ice-candidate", value["sdpMLineIndex"], value["candidate"])
         except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as cause:
@@ -201,8 +205,12 @@ class Viewer:
 class Server:
     """Serves the page, and streams to its viewers."""
 
-    def __init__(self, device, simulator, hosts):
-        self._capture = Capture(device, DRAW_AND_ENCODE.format(simulator=simulator), self._tell_rate)
+    def __init__(self, device, source, simulator, hosts):
+        source = Source(device, source)
+        self._name = source.name if source.has_events else f"{source.name}, {simulator.split()[0]}"
+        drawn = DRAW_AND_ENCODE.format(simulator="identity" if source.has_events else simulator)
+        self._capture = Capture(device, source, drawn, self._tell_rate)
+        self._renderer = self._capture.pipeline.get_by_name("renderer")
         self._encoder = self._capture.pipeline.get_by_name("encoder").get_static_pad("src")
         self._viewers = []
         self._hosts = {name.lower() for name in ("localhost", socket.gethostname(), *hosts)}
@@ -261,7 +269,16 @@ class Server:
 
     def _add_viewer(self, _, message, path, websocket):
         websocket.set_keepalive_interval(20)
-        self._viewers.append(Viewer(websocket, self._capture, self._encode_key_frame, self._viewers.remove))
+        self._viewers.append(Viewer(websocket, self._capture, self._encode_key_frame, self._set_mode,
+                                    self._viewers.remove))
+        self._viewers[-1].send(name=self._name, mode=self._renderer.get_property("mode").value_nick)
+
+    def _set_mode(self, mode):
+        if mode not in [value.value_nick for value in self._renderer.get_property("mode").__enum_values__.values()]:
+            raise ValueError(f"no mode {mode}")
+        Gst.util_set_object_arg(self._renderer, "mode", mode)
+        for viewer in self._viewers:
+            viewer.send(mode=mode)
 
     def _encode_key_frame(self):
         self._encoder.send_event(
@@ -282,7 +299,7 @@ def main():
     args = parser.parse_args()
     Gst.init(None)
     find_elements(ELEMENTS, "gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-nice")
-    Server(args.device, args.simulator, args.host).run(args.address, args.port)
+    Server(args.device, args.source, args.simulator, args.host).run(args.address, args.port)
 
 
 if __name__ == "__main__":

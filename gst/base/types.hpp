@@ -3,7 +3,30 @@
 
 #include <gst/gst.h>
 
+#include <string>
+
 /// GObject types made from tables, which must have static storage duration.
+
+/// Parses the value of an enum property as GStreamer does, but prints the choices if there is
+/// none such: gst-launch-1.0 only says that it could not set the property.
+inline gboolean parse_choice(GValue* value, const gchar* text, GParamSpec* property) {
+  auto* const type = static_cast<GEnumClass*>(g_type_class_ref(G_VALUE_TYPE(value)));
+  gchar* end = nullptr;
+  const auto number = static_cast<gint>(g_ascii_strtoll(text, &end, 0));
+  const GEnumValue* choice = g_enum_get_value_by_nick(type, text);
+  if (choice == nullptr) choice = g_enum_get_value_by_name(type, text);
+  if (choice == nullptr && end != text && *end == '\0') choice = g_enum_get_value(type, number);
+  if (choice != nullptr) {
+    g_value_set_enum(value, choice->value);
+  } else if (property != nullptr) {
+    std::string choices;
+    for (guint i = 0; i < type->n_values; ++i)
+      choices += std::string(i == 0 ? "" : ", ") + type->values[i].value_nick;
+    g_message("%s=%s: choose one of %s", property->name, text, choices.c_str());
+  }
+  g_type_class_unref(type);
+  return choice != nullptr;
+}
 
 /// For class_init: returns an enum type with these values, terminated by one without a name.
 inline GType enum_type(const char* name, const GEnumValue* values) {
@@ -11,6 +34,10 @@ inline GType enum_type(const char* name, const GEnumValue* values) {
   if (type == G_TYPE_INVALID) {
     type = g_enum_register_static(name, values);
     gst_type_mark_as_plugin_api(type, static_cast<GstPluginAPIFlags>(0));
+    auto* const parser = g_new0(GstValueTable, 1);  // GStreamer keeps it
+    parser->type = type;
+    parser->deserialize_with_pspec = parse_choice;
+    gst_value_register(parser);
   }
   return type;
 }

@@ -23,17 +23,19 @@ from .video import VideoFile, VideoPipeline
 
 @dataclasses.dataclass(frozen=True)
 class DatasetVideo:
-    """A video of a data set. Iterating over it simulates it, and yields what the recipe's output holds: an
+    """A video of a data set. Iterating over it simulates it, and yields what the recipe's first output holds: an
     Events array per pair of consecutive frames, or tensors of shape (channels, height, width). Raises
     PipelineError if the video cannot be read; at its end, also if it is corrupt or has fewer frames than the
     recipe asks for.
 
     name: its path below the first folder of the pattern that has a wildcard, without extension.
-    path: of the file, or of the folder of pictures."""
+    path: of the file, or of the folder of pictures.
+    split: its part of the data set, such as "train"; empty if the recipe has no split."""
 
     recipe: Recipe
     name: str
     path: str
+    split: str = ""
 
     @functools.cached_property
     def parameters(self) -> Mapping[str, Value]:
@@ -45,13 +47,8 @@ class DatasetVideo:
         """The elements from frames to events."""
         return self.recipe.line(self.parameters)
 
-    @property
-    def split(self) -> str:
-        """Its part of the data set, such as "train"; empty if the recipe has no split."""
-        return self.recipe.part_of(self.name)
-
     def __iter__(self) -> Iterator[Events] | Iterator[np.ndarray]:
-        if self.recipe.output == TENSORS:
+        if self.recipe.outputs[0] == TENSORS:
             with self.playing(f"eventtensor {self.recipe.tensors} ! {TENSOR_CAPS} ! {SINK}") as pipeline:
                 yield from map(tensor_of, self._samples(pipeline))
         else:
@@ -115,8 +112,10 @@ class Dataset(Sequence[DatasetVideo]):
         self.recipe = recipe if isinstance(recipe, Recipe) else Recipe.load(recipe)
         if split is not None and split not in self.recipe.split:
             raise ValueError(f"the recipe has no part {split!r}")
-        videos = [DatasetVideo(self.recipe, name, path) for name, path in self.recipe.inputs().items()]
-        self._videos = [video for video in videos if split in (None, video.split)]
+        inputs = self.recipe.inputs()
+        parts = self.recipe.parts(inputs)
+        self._videos = [DatasetVideo(self.recipe, name, path, parts[name]) for name, path in inputs.items()
+                        if split in (None, parts[name])]
 
     def __len__(self) -> int:
         return len(self._videos)

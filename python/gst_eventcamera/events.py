@@ -2,6 +2,7 @@
 """Arrays of events."""
 from __future__ import annotations
 
+import math
 from typing import Any, Iterable, Optional
 
 import numpy as np
@@ -19,6 +20,7 @@ class Events(np.ndarray):
     start, end: time span of the array, in seconds, as in `t`. A slice keeps the span of the whole.
     stream_start: `start` as players count, in seconds; differs for videos whose timestamps do not begin at 0, such as
         MP4 with B-frames, and for recordings. Files written from a simulation begin at this time.
+    arrival: time at which live() yielded the array, in seconds as in `t`: `arrival - end` is its latency. NaN in others.
     cause, object_class: labels of the events, uint8 and uint16 of the same shape, where an element has
     labelled them (GstEventCameraLabel); else None. They follow an index, a slice, copy() and sort();
     functions of NumPy that move rows by themselves, such as np.random.shuffle(), leave them behind.
@@ -29,6 +31,7 @@ class Events(np.ndarray):
     start: float
     end: float
     stream_start: float
+    arrival: float
     cause: Optional[np.ndarray]
     object_class: Optional[np.ndarray]
 
@@ -44,6 +47,7 @@ class Events(np.ndarray):
         self.start = getattr(source, "start", 0.0)
         self.end = getattr(source, "end", 0.0)
         self.stream_start = getattr(source, "stream_start", 0.0)
+        self.arrival = getattr(source, "arrival", math.nan)
         self.cause = self.object_class = None
 
     def __getitem__(self, index: Any) -> Any:

@@ -188,6 +188,11 @@ class Pipeline:
         """Caps of the output; the pipeline must be paused."""
         return self._sink.get_static_pad("sink").get_current_caps()
 
+    def now(self, segment: Gst.Segment) -> float:
+        """Time in a segment, in seconds, by the clock of the playing pipeline; NaN if it is not within the segment."""
+        time = segment.position_from_running_time(Gst.Format.TIME, self._pipeline.get_current_running_time())
+        return math.nan if time == Gst.CLOCK_TIME_NONE else time / 1e9
+
     def samples(self, sink: str = "out") -> Iterator[Gst.Sample]:
         """Plays to the end, and yields the samples of an appsink."""
         source = self.element(sink)

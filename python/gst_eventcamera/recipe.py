@@ -12,7 +12,7 @@ import re
 import reprlib
 import statistics
 from fractions import Fraction
-from typing import Any, Iterator, Mapping, Optional
+from typing import Any, Iterable, Iterator, Mapping, Optional
 
 import yaml
 
@@ -121,7 +121,7 @@ class Recipe:
     seed: int
     videos: tuple[str, ...]
     simulator: str
-    output: str
+    outputs: tuple[str, ...]
     framerate: Optional[Fraction] = None
     window: Optional[Window] = None
     frames: str = ""
@@ -201,16 +201,37 @@ class Recipe:
         elements = [self.frames, " ".join([self.simulator, *values]), self.filters]
         return " ! ".join(filter(None, elements))
 
-    def part_of(self, name: str) -> str:
-        """The part of the data set that a video belongs to, such as "train"; empty without split."""
-        match = re.search(self.group, name) if self.group else None
-        share = uniform_number(self.seed, match.group() if match else name, "split")
-        part = ""
-        for part, size in self.split.items():
-            share -= size
-            if share < 0:
-                break
-        return part
+    def parts(self, names: Iterable[str]) -> dict[str, str]:
+        """The part of the data set that each video belongs to, such as "train"; empty without split. In random order
+        within each folder, a group goes to the part that lacks most of its share."""
+        groups: dict[str, list[str]] = {}
+        for name in sorted(names):
+            match = re.search(self.group, name) if self.group else None
+            groups.setdefault(match.group() if match else name, []).append(name)
+
+        def place(group: str) -> tuple[float, float]:
+            folder = os.path.dirname(groups[group][0])
+            return uniform_number(self.seed, folder, "folder"), uniform_number(self.seed, group, "split")
+
+        total = sum(map(len, groups.values()))
+        sizes = _whole_sizes(self.split, total)
+        parts: dict[str, str] = {}
+        counts = dict.fromkeys(sizes, 0)
+        for group in sorted(groups, key=place):
+            share = (len(parts) + len(groups[group])) / total
+            part = max(sizes, key=lambda part: sizes[part] * share - counts[part], default="")
+            parts |= dict.fromkeys(groups[group], part)
+            counts[part] = counts.get(part, 0) + len(groups[group])
+        return parts
+
+
+def _whole_sizes(shares: Mapping[str, float], total: int) -> dict[str, int]:
+    """The numbers of videos that come closest to these shares, by the largest remainder."""
+    sizes = {part: math.floor(share * total + 1e-6) for part, share in shares.items()}
+    remainders = sorted(shares, key=lambda part: sizes[part] - shares[part] * total)
+    for part in remainders[:total - sum(sizes.values())]:
+        sizes[part] += 1
+    return sizes
 
 
 def is_picture(name: str) -> bool:
@@ -259,11 +280,9 @@ def _checked(path: str, recipe: Any, trust: bool) -> Recipe:
     _expect_number("seed", seed, 0, MAX_SEED, whole=True)
     min_frames = recipe.get("min-frames", 2)
     _expect_number("min-frames", min_frames, 2, 10**9, whole=True)
-    texts = {key: _text(recipe, key) for key in ("simulator", "frames", "filters", "output", "tensors", "group")}
-    output = texts["output"].removeprefix(".") or "h5"
-    if output not in OUTPUTS:
-        raise RecipeError(f"output: {output} is none of {', '.join(OUTPUTS)}")
-    if texts["tensors"] and output != TENSORS:
+    texts = {key: _text(recipe, key) for key in ("simulator", "frames", "filters", "tensors", "group")}
+    outputs = _outputs(recipe)
+    if texts["tensors"] and TENSORS not in outputs:
         raise RecipeError("tensors: only for output: tensors")
     if not texts["simulator"]:
         raise RecipeError("simulator: give an element and its properties, such as \"eventsim-dvs preset=davis346\"")
@@ -273,7 +292,7 @@ def _checked(path: str, recipe: Any, trust: bool) -> Recipe:
         _expect_safe(texts)
     if not Gst.ElementFactory.find(texts["simulator"].split()[0]):
         raise RecipeError(f"simulator: there is no element \"{texts['simulator'].split()[0]}\"")
-    checked = Recipe(path, seed, tuple(patterns), texts["simulator"], output, _framerate(recipe), _window(recipe),
+    checked = Recipe(path, seed, tuple(patterns), texts["simulator"], outputs, _framerate(recipe), _window(recipe),
                      texts["frames"], _parameters(recipe, texts["simulator"], trust), texts["filters"], texts["tensors"],
                      _split(recipe), texts["group"], min_frames)
     if checked.window and not checked.framerate:
@@ -315,6 +334,18 @@ def _text(recipe: Mapping[str, Any], key: str) -> str:
     if not isinstance(value, str):
         raise RecipeError(f"{key}: {reprlib.repr(value)} is not text")
     return value.strip()
+
+
+def _outputs(recipe: Mapping[str, Any]) -> tuple[str, ...]:
+    given = recipe.get("output", "h5")
+    outputs = [str(output).strip().removeprefix(".") for output in (given if isinstance(given, list) else [given])]
+    if wrong := [output for output in outputs if output not in OUTPUTS]:
+        raise RecipeError(f"output: {reprlib.repr(wrong[0])} is none of {', '.join(OUTPUTS)}")
+    if {"npy", TENSORS} <= set(outputs):
+        raise RecipeError("output: npy and tensors would be the same files")
+    if not outputs or len(set(outputs)) < len(outputs):
+        raise RecipeError("output: give each format once")
+    return tuple(outputs)
 
 
 def _framerate(recipe: Mapping[str, Any]) -> Optional[Fraction]:

@@ -15,11 +15,14 @@ SINK = "appsink name=out sync=false max-buffers=4"
 OUTPUT = f"{EVENT_CAPS} ! {SINK}"
 
 
-def _chunks(playing: Pipeline) -> Iterator[Events]:
+def _chunks(playing: Pipeline, is_live: bool = False) -> Iterator[Events]:
     with playing as pipeline:
         pipeline.gaps_as_buffers()
         for sample in pipeline.samples():
-            yield events_of(sample)
+            events = events_of(sample)
+            if is_live:
+                events.arrival = pipeline.now(sample.get_segment())
+            yield events
 
 
 def simulate(video: str | os.PathLike[str], simulator: str = "eventsim-dvs") -> Iterator[Events]:
@@ -41,4 +44,4 @@ def live(pipeline: str) -> Iterator[Events]:
 
     Leaving the loop, by break, an exception or Ctrl-C, stops the pipeline. The pipeline waits while the loop is
     busy, but live sources drop events that are not read in time. Raises PipelineError."""
-    return _chunks(Pipeline(f"{pipeline} ! {OUTPUT}"))
+    return _chunks(Pipeline(f"{pipeline} ! {OUTPUT}"), is_live=True)

@@ -54,7 +54,7 @@ constexpr std::size_t max_scalars = 20;
 /// Entries of the outermost mapping, each with its scalars in order.
 using Entries = std::map<std::string, std::vector<std::string>>;
 
-Entries entries_of(std::string_view yaml) {
+Entries entries_of_yaml(std::string_view yaml) {
   // Written by OpenCV's FileStorage, but not valid YAML.
   if (yaml.starts_with("%YAML:")) yaml.remove_prefix(std::min(yaml.find('\n'), yaml.size()));
   YamlParser parser(yaml);
@@ -89,6 +89,39 @@ Entries entries_of(std::string_view yaml) {
         break;
     }
   }
+}
+
+/// The same of XML, as OpenCV's FileStorage writes it: without attributes, comments and entities.
+Entries entries_of_xml(std::string_view xml) {
+  constexpr std::string_view space = " \t\r\n";
+  Entries entries;
+  std::vector<std::string>* entry = nullptr;
+  const auto add = [&entry](std::string_view text) {
+    if (entry != nullptr && entry->size() < max_scalars) entry->emplace_back(text);
+  };
+  int depth = 0;
+  while (!xml.empty()) {
+    if (!xml.starts_with('<')) {
+      const auto end = std::min(xml.find_first_of("< \t\r\n"), xml.size());
+      if (end > 0) add(xml.substr(0, end));
+      xml.remove_prefix(end);
+      xml.remove_prefix(std::min(xml.find_first_not_of(space), xml.size()));
+      continue;
+    }
+    const auto end = xml.find('>');
+    if (end == std::string_view::npos) throw std::invalid_argument("its last tag has no end");
+    const auto tag = xml.substr(1, end - 1);
+    xml.remove_prefix(end + 1);
+    if (tag.starts_with('?')) continue;
+    if (tag.starts_with('/')) {
+      if (--depth == 1) entry = nullptr;
+      continue;
+    }
+    const auto name = tag.substr(0, tag.find_first_of(space));
+    if (++depth == 2) entry = &entries[std::string(name)];
+    if (name == "data") add(name);
+  }
+  return entries;
 }
 
 double number(const std::string& text, const std::string& name) {
@@ -203,10 +236,10 @@ CameraCalibration::Point CameraCalibration::undistorted(Point point) const {
   return {nowhere, nowhere};
 }
 
-CameraCalibration parse_calibration(std::string_view yaml) {
-  const Entries entries = entries_of(yaml);
+CameraCalibration parse_calibration(std::string_view text) {
+  const Entries entries = text.starts_with("<?xml") ? entries_of_xml(text) : entries_of_yaml(text);
   CameraCalibration calibration;
-  const auto camera = matrix(entries, {"camera_matrix", "K"});
+  const auto camera = matrix(entries, {"camera_matrix", "cameraMatrix", "K"});
   if (camera.size() != 9)
     throw std::invalid_argument("camera_matrix has " + std::to_string(camera.size()) +
                                 " numbers, not 9");
@@ -218,7 +251,8 @@ CameraCalibration parse_calibration(std::string_view yaml) {
     throw std::invalid_argument(
         "camera_matrix is not a valid camera matrix: focal lengths must be positive, without skew");
   calibration.lens = lens_of(entries);
-  const auto distortion = matrix(entries, {"distortion_coefficients", "dist_coeffs", "D"});
+  const auto distortion =
+      matrix(entries, {"distortion_coefficients", "dist_coeffs", "distCoeffs", "D"});
   const std::size_t max_count = calibration.lens == CameraCalibration::Lens::fisheye ? 4 : 5;
   for (std::size_t i = 0; i < distortion.size(); ++i) {
     if (i < max_count)

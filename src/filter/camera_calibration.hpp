@@ -38,10 +38,11 @@ struct CameraCalibration {
   Point undistorted(Point point) const;
 };
 
-/// Reads a calibration in YAML, as OpenCV's FileStorage writes it, with camera_matrix and
-/// distortion_coefficients (or K and D), and optionally image_width and image_height, and
-/// fisheye_model; or as ROS's camera_calibration writes it, with distortion_model. Throws
-/// std::invalid_argument that says what is wrong.
-CameraCalibration parse_calibration(std::string_view yaml);
+/// Reads a calibration in YAML or XML, as OpenCV's FileStorage writes it, with camera_matrix and
+/// distortion_coefficients (or K and D, or cameraMatrix and distCoeffs as GStreamer's
+/// cameracalibrate), and optionally image_width and image_height, and fisheye_model; or as ROS's
+/// camera_calibration writes it, with distortion_model. Throws std::invalid_argument that says what
+/// is wrong.
+CameraCalibration parse_calibration(std::string_view text);
 
 }  // namespace eventcamera

@@ -49,6 +49,8 @@ Renderer::Memory Renderer::make_memory(int width, int height, const RenderSettin
       return DecayingSums(width, height, settings.time_constant, settings.full_scale);
     case RenderMode::time_surface:
       return TimeSurface(width, height, settings.time_constant);
+    case RenderMode::reconstruct:
+      return Reconstruction(width, height, settings.reconstruction);
     case RenderMode::accumulate:
     case RenderMode::count:
       break;
@@ -99,6 +101,8 @@ void Renderer::shade_row(int y, Microseconds time) {
     sums->read_row(y, time, take);
   } else if (const auto* surface = std::get_if<TimeSurface>(&memory_)) {
     surface->read_row(y, time, take);
+  } else if (const auto* reconstruction = std::get_if<Reconstruction>(&memory_)) {
+    reconstruction->read_row(y, take);
   } else {
     const auto* counts = std::get<EventWindow>(memory_).row(y);
     if (settings_.mode == RenderMode::accumulate) {
@@ -118,6 +122,7 @@ void Renderer::draw(Microseconds start, Microseconds end, const PixelLayout& lay
   const bool is_first = !std::exchange(has_drawn_, true);
   if (auto* window = std::get_if<EventWindow>(&memory_))
     window->begin_at(is_first ? start : start + 1);
+  if (auto* reconstruction = std::get_if<Reconstruction>(&memory_)) reconstruction->finish_picture();
   const auto pixels = pixels_of(settings_, layout);
   for (int y = 0; y < height_; ++y) {
     shade_row(y, time);

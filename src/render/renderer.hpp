@@ -11,6 +11,7 @@
 #include "src/core/event.hpp"
 #include "src/core/event_validator.hpp"
 #include "src/core/image.hpp"
+#include "src/reconstruct/reconstruction.hpp"
 #include "src/render/decaying_sums.hpp"
 #include "src/render/event_window.hpp"
 #include "src/render/palette.hpp"
@@ -56,6 +57,7 @@ enum class RenderMode {
   decay,         ///< exponentially decaying sum of ON minus OFF
   time_surface,  ///< age and polarity of the last event
   count,         ///< ON minus OFF within a window
+  reconstruct,   ///< brightness
 };
 
 /// Changing any setting except the palette forgets all events.
@@ -65,6 +67,7 @@ struct RenderSettings {
   WindowLimits limits{};                 ///< for accumulate and count
   Microseconds time_constant = 100'000;  ///< of decay; maximum age for time_surface
   float full_scale = 2;  ///< number of events shown in full colour by decay and count
+  Reconstruction::Settings reconstruction{};
 
   friend bool operator==(const RenderSettings&, const RenderSettings&) = default;
 };
@@ -102,7 +105,7 @@ class Renderer {
   int height() const { return height_; }
 
  private:
-  using Memory = std::variant<EventWindow, DecayingSums, TimeSurface>;
+  using Memory = std::variant<EventWindow, DecayingSums, TimeSurface, Reconstruction>;
 
   static Memory make_memory(int width, int height, const RenderSettings& settings);
   void shade_row(int y, Microseconds time);

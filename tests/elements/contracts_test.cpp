@@ -296,10 +296,10 @@ TEST_P(EveryConsumer, StartsOverAfterAFlush) {
 }
 
 /// Elements whose output continues where their input does not: files and datagrams have no flags,
-/// and eventrender draws frames through gaps.
+/// and eventrender and eventreconstruct draw frames through gaps.
 bool continues_through_discontinuities(const std::string& name) {
   return name.ends_with("enc") || name.ends_with("mux") || name.ends_with("pay") ||
-         name == "eventrender";
+         name == "eventrender" || name == "eventreconstruct";
 }
 
 TEST_P(EveryConsumer, MarksADiscontinuity) {

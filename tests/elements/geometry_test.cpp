@@ -311,6 +311,15 @@ TEST_F(FileTest, UndistortsAndCounts) {
   EXPECT_EQ(stat_of(h.element(), "dropped-events"), 1U);
 }
 
+TEST_F(FileTest, CalibrationMayBeText) {
+  Harness h("eventundistort location=/nowhere/at/all.yaml");
+  g_object_set(h.element(), "settings", calibration("-2.").c_str(), nullptr);
+  h.caps(sensor);
+  EXPECT_EQ(passed(h, {on(4, 2), on(6, 2), on(0, 2)}), (Pixels{{4, 2}, {6, 2}}));
+  EXPECT_NE(error_of("eventundistort settings=\"camera: [\"").find("\"settings\": line"),
+            std::string::npos);
+}
+
 TEST_F(FileTest, CalibrationOfAnotherSizeIsAnError) {
   write(calibration("0.", "image_width: 346\nimage_height: 260\n"));
   const auto error = error_of("eventundistort" + location());

@@ -91,7 +91,7 @@ constexpr Case cases[] = {
                             "fakesink t. ! queue ! compare.candidate"},
     {"eventmerge", EVENTS "! tee name=t ! queue ! merge. eventmerge name=merge ! fakesink t. ! "
                           "queue ! merge."},
-    {"eventrender", EVENTS "! eventrender ! fakesink"},
+    {"eventpictures", EVENTS "! eventrender ! fakesink"},
     {"eventtensor", EVENTS "! eventtensor ! fakesink"},
     {"eventoverlay",
      EVENTS "! overlay.event_sink eventoverlay name=overlay ! fakesink videotestsrc "

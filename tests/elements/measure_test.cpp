@@ -614,6 +614,7 @@ TEST_F(CompareTest, ClassifiesWhereNoEventIsLeft) {
   ASSERT_TRUE(figures);
   const auto* classification = within(figures, "classification");
   ASSERT_TRUE(classification);
+  EXPECT_STREQ(gst_structure_nth_field_name(figures, 2), "classification");  // after start and end
   EXPECT_EQ(count_in(classification, "true-negatives"), 1U);
 }
 

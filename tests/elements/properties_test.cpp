@@ -73,6 +73,24 @@ TEST_P(EverySimulator, KeepsWhatIsSet) {
   EXPECT_EQ(palette, static_cast<int>(eventcamera::PaletteName::red_blue));
 }
 
+TEST(Choices, AreNamedIfAValueIsNoneOfThem) {
+  gst_init(nullptr, nullptr);
+  Owned<GstElement> element(gst_element_factory_make("eventsim-dvs", nullptr));
+  const auto set = [&](const char* value) {
+    gst_util_set_object_arg(G_OBJECT(element.get()), "preset", value);
+    gint preset = -1;
+    g_object_get(element.get(), "preset", &preset, nullptr);
+    return preset;
+  };
+  const gint esim = set("esim");
+  g_test_expect_message(nullptr, G_LOG_LEVEL_MESSAGE,
+                        "preset=davis999: choose one of standard, ideal, *, gen4, hs-ergb");
+  EXPECT_EQ(set("davis999"), esim);
+  g_test_assert_expected_messages();
+  EXPECT_EQ(set("0"), 0);
+  EXPECT_EQ(set(std::to_string(esim).c_str()), esim);
+}
+
 TEST_P(EverySimulator, DescribesItself) {
   gst_init(nullptr, nullptr);
   Owned<GstElement> element(gst_element_factory_make(GetParam().element, nullptr));

@@ -318,6 +318,19 @@ TEST_F(Render, ShowsAnEventAtTheVeryStart) {
   expect(finish(), {{0, 40 * ms, accumulated(first)}, {40 * ms, 40 * ms, accumulated(column(1))}});
 }
 
+TEST_F(Render, DrawsShorterIntervalsWhenPlayedSlower) {
+  begin(grey_at("25/1"));
+  GstSegment slow;
+  gst_segment_init(&slow, GST_FORMAT_TIME);
+  slow.rate = 0.1;
+  gst_harness_push_event(h.get(), gst_event_new_segment(&slow));
+  push(0, column(5));  // at 20 ms
+  std::vector<Picture> pictures;
+  for (int i = 0; i < 10; ++i)
+    pictures.push_back({i * 4 * ms, 4 * ms, i == 4 ? accumulated(column(5)) : blank});
+  expect(finish(), pictures);
+}
+
 TEST_F(Render, RefusesToRunBackwards) {
   begin(grey_at("25/1"));
   play_backwards(h);
@@ -615,6 +628,27 @@ TEST(RenderPipeline, SaysWhatToDoIfDownstreamWantsAnotherSize) {
   EXPECT_FALSE(pipeline.play());
   EXPECT_NE(pipeline.error.find("the sensor has 320x240 pixels"), std::string::npos)
       << pipeline.error;
+}
+
+class Reconstruct : public Render {
+ protected:
+  Reconstruct() : Render("eventreconstruct smoothing=0") {}
+};
+
+TEST_F(Reconstruct, ShowsBrightnessInGrey) {
+  begin("video/x-raw, framerate=25/1");
+  push(0, {Event::at(1, 1, 0, Polarity::on), Event::at(2, 1, 1, Polarity::off)});
+  const auto picture = wait_for_picture();
+  ASSERT_TRUE(picture);
+  const Owned<GstCaps> caps(gst_pad_get_current_caps(h->sinkpad));
+  EXPECT_STREQ(gst_structure_get_string(gst_caps_get_structure(caps.get(), 0), "format"), "GRAY8");
+  const auto bytes = bytes_of(picture.get());
+  const auto grey = [&bytes](int x) {
+    return static_cast<unsigned char>(bytes[static_cast<std::size_t>(width + x)]);
+  };
+  EXPECT_EQ(grey(0), 128);
+  EXPECT_GT(grey(1), 160);
+  EXPECT_LT(grey(2), 96);
 }
 
 /// Players autoplug it.

@@ -273,12 +273,38 @@ TEST(Calibration, IsReadFromRos) {
   EXPECT_EQ(calibration.distortion[1], 0.01);
 }
 
+/// As GStreamer's cameracalibrate writes its property `settings`.
+std::string opencv_xml(const std::string& distortion) {
+  return "<?xml version=\"1.0\"?>\n<opencv_storage>\n<cameraMatrix type_id=\"opencv-matrix\">\n"
+         "  <rows>3</rows>\n  <cols>3</cols>\n  <dt>d</dt>\n  <data>\n    250. 0. 1.725e+02 0.\n"
+         "    252. 130. 0. 0. 1.</data></cameraMatrix>\n"
+         "<distCoeffs type_id=\"opencv-matrix\">\n  <rows>5</rows>\n  <data>\n    " +
+         distortion + "</data></distCoeffs>\n</opencv_storage>\n";
+}
+
+TEST(Calibration, IsReadFromXml) {
+  const auto calibration = eventcamera::parse_calibration(opencv_xml("-3.5e-01 0.12 0 0\n -.02"));
+  EXPECT_EQ(calibration.lens, CameraCalibration::Lens::plumb_bob);
+  EXPECT_EQ(calibration.size, SensorSize());
+  EXPECT_EQ(calibration.fx, 250);
+  EXPECT_EQ(calibration.fy, 252);
+  EXPECT_EQ(calibration.cx, 172.5);
+  EXPECT_EQ(calibration.cy, 130);
+  EXPECT_EQ(calibration.distortion, (std::array{-0.35, 0.12, 0.0, 0.0, -0.02}));
+  const auto sized =
+      opencv_xml("0").insert(opencv_xml("").find("<distCoeffs"), "<image_width>346</image_width>");
+  EXPECT_EQ(eventcamera::parse_calibration(sized).size.width, 346);
+}
+
 TEST(Calibration, SaysWhatIsWrong) {
   const auto error = [](const std::string& yaml) {
     return error_of<std::invalid_argument>([&] { eventcamera::parse_calibration(yaml); });
   };
   EXPECT_EQ(error(""), "it has no camera_matrix");
   EXPECT_NE(error("a: [").find("line"), std::string::npos);
+  EXPECT_EQ(error("<?xml?>"), "it has no camera_matrix");
+  EXPECT_EQ(error("<?xml?><a"), "its last tag has no end");
+  EXPECT_EQ(error(opencv_xml("x")), "distortion_coefficients has \"x\" in place of a number");
   EXPECT_EQ(error("camera_matrix: [1, 2]"), "camera_matrix has 2 numbers, not 9");
   EXPECT_EQ(error("camera_matrix: [x]"), "camera_matrix has \"x\" in place of a number");
   EXPECT_NE(error("camera_matrix: [0, 0, 0, 0, 1, 0, 0, 0, 1]").find("focal"), std::string::npos);

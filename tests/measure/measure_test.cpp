@@ -440,7 +440,7 @@ TEST(MapPicture, ShowsMoreEventsBrighterAndSaysWhatCannotBeWritten) {
   many.at(2, 1) = 9;
   const auto alone = draw_map(few);
   EXPECT_EQ(alone.width(), 3);
-  EXPECT_EQ(alone.height(), 2);
+  EXPECT_EQ(alone.height(), 2 + 8);  // with the bar
   EXPECT_GT(alone.row(0)[0], 200);
   EXPECT_LT(alone.row(0)[3], 10);
   const auto pair = draw_maps(few, many);
@@ -453,6 +453,26 @@ TEST(MapPicture, ShowsMoreEventsBrighterAndSaysWhatCannotBeWritten) {
   EXPECT_EQ(colour(8, 1), (std::vector{32, 64, 224}));
   EXPECT_GT(colour(6, 0)[0], colour(6, 0)[2]);
   EXPECT_EQ(pair.png().substr(1, 3), "PNG");
+}
+
+TEST(MapPicture, HasABarWithTheCountOfTheLastColour) {
+  EventMap map(40, 1);
+  std::fill_n(map.row(0), 40, 17);
+  const auto picture = draw_map(map);
+  const auto is_dark = [&](int x, int y) { return picture.row(y)[3 * x] < 10; };
+  EXPECT_TRUE(is_dark(0, 2));
+  EXPECT_FALSE(is_dark(39, 2));
+  std::string digits;
+  for (int y = 3; y < 8; ++y) {
+    for (int x = 32; x < 39; ++x) digits += is_dark(x, y) ? '#' : '.';
+    digits += '\n';
+  }
+  EXPECT_EQ(digits,
+            ".#..###\n"
+            "##....#\n"
+            ".#....#\n"
+            ".#....#\n"
+            "###...#\n");
 }
 
 }  // namespace

@@ -140,7 +140,7 @@ class Slurm:
 
 def hashes(folder):
     with open(f"{folder}/manifest.json", encoding="utf-8") as file:
-        return {one["name"]: one["written"]["sha256"] for one in json.load(file)["videos"]}
+        return {one["name"]: one["written"]["h5"]["sha256"] for one in json.load(file)["videos"]}
 
 
 def main(folder, slurm_folder):

@@ -40,7 +40,7 @@ for ending in dat es csv; do event-convert drive.raw recording.$ending; done
 # The first recipe of the page.
 sed -n '/^```yaml$/,/^```$/p' "$SOURCE/docs/data-sets.md" | sed '1d; /^```$/q' | sed '/^```/d' >recipe.yaml
 run_lines "$SOURCE/README.md" "$SOURCE"/docs/*.md "$SOURCE"/docs/elements/*.md
-for page in README.md docs/learning.md docs/data-sets.md; do
+for page in README.md docs/learning.md docs/data-sets.md docs/recipes.md docs/latency.md; do
   sed -n '/^```python$/,/^```$/p' "$SOURCE/$page" | sed '/^```/d; s/v4l2src/videotestsrc is-live=true pattern=ball/' >block.py
   echo "Python of $page"
   timeout 120 /usr/bin/python3 block.py >output 2>&1 || fail "$(cat output)"
@@ -54,6 +54,15 @@ for file in events.webm events.mp4 ball.npz recording.h5 figures.json map.png ma
 done
 gst-discoverer-1.0 -v events.mp4 | grep -q "profile=(string)main.*chroma-format=(string)4:2:0" ||
   fail "players cannot play $(gst-discoverer-1.0 -v events.mp4 | grep profile=)"
+# 40 frames of a video of 25 frames/s, 8 times as fast; noise with its cause, and recorded events without.
+/usr/bin/python3 - <<'PYTHON' || fail "a recipe has other events"
+import gst_eventcamera as ec
+import numpy as np
+
+assert 0.15 < ec.stream("phone.raw").duration < 0.21, ec.stream("phone.raw").duration
+causes = set(np.load("noisy.npz")["cause"])
+assert {0, 2, 4} <= causes and 1 not in causes, causes
+PYTHON
 event-convert left.raw merged.npz 2>&1 | sed 's/ events.*//' >events
 event-convert merged.raw merged.npz 2>&1 | sed 's/ events.*//' >merged
 [ "$(cat merged)" = "$((2 * $(cat events)))" ] || fail "$(cat merged) events of twice $(cat events) are merged"

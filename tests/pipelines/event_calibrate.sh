@@ -23,7 +23,7 @@ recovers() { # POSITIVE NEGATIVE TOLERANCE ELEMENT...
   shift 3
   "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! "$@" positive-threshold="$positive" negative-threshold="$negative" ! evtenc ! filesink location=recorded.raw
   calibrate scene.mkv recorded.raw --element "$*" --lag 0 --to 0.3 | tee found
-  grep -q "^calibrated thresholds: " progress || fail "no progress was printed"
+  grep -A 5 "^calibrated thresholds: " progress | grep -q "map correlation" || fail "no quick answer was printed"
   read -r found_positive found_negative < <(sed -n 's/.* positive-threshold=\([0-9.]*\) negative-threshold=\([0-9.]*\)$/\1 \2/p' found)
   awk -v p="$found_positive" -v n="$found_negative" -v wp="$positive" -v wn="$negative" -v by="$tolerance" \
     'BEGIN { exit !(p / wp < 1 + by && wp / p < 1 + by && n / wn < 1 + by && wn / n < 1 + by) }' ||
@@ -58,6 +58,55 @@ awk '$1 == "mean" { mean = $4 / $2 } $1 == "std." { deviation = $5 / $3 } END { 
 calibrate moving.mkv recorded.raw --element "eventsim-dvs linear-light=false log-eps=0.05 exposure-compensation=true refractory-period=0 threshold-jitter=0 upsampling=motion overexposed-light=1.5 adaptation=0.05 denoise=-1 exposure-pulse=0" --lag 0 --to 0.3 | tee found
 grep -q "exposure-time=34000000" found || fail "the long exposure is not found"
 
+# No progress goes into a pipe; on a terminal it is one line.
+[ "$(wc -l <progress)" -lt 20 ] || fail "$(wc -l <progress) lines of progress"
+script -qec "stty columns 60; '$BUILD/pipelines/event-calibrate' moving.mkv recorded.raw --lag 0 --to 0.1" terminal.txt >/dev/null </dev/null
+grep -qa "about 0:[0-9][0-9] left" terminal.txt || fail "no time left was printed"
+tr '\r' '\n' <terminal.txt | awk 'length > 59 && /left; / { exit 1 }' || fail "progress is longer than a line of the terminal"
+[ "$(grep -ca left terminal.txt)" -le 4 ] || fail "progress takes several lines"
+
+# Changes that gain only where they were chosen are dropped.
+/usr/bin/python3 - <<END
+import sys
+sys.path.insert(0, "$SOURCE/pipelines")
+import event_calibrate as calibrate
+import numpy as np
+
+class Search:
+    video = recorded = span = None
+    windows = list(range(8))
+    progress = calibrate.Progress()
+    def __init__(self, gain_of):
+        self.gain_of = gain_of
+    def fit(self, setting, precision=None):
+        return str(setting)
+    balanced = fit
+    def figures(self, element, span):
+        return None
+    def ratings(self, element, windows):
+        return np.array([[0.5 + self.gain_of(window) * ("denoise" in element)] * 3 for window in windows])
+
+calibrate.describe = lambda name, figures: name
+calibrate.changes_of = lambda *_: [{"denoise": 0}]
+def is_kept(gain_of):
+    return "denoise" in calibrate.calibrate(Search(gain_of), "eventsim-dvs")
+
+assert is_kept(lambda window: 0.02)
+assert not is_kept(lambda window: 0.005), "a small gain"
+assert not is_kept(lambda window: 0.1 * (window == 0)), "a gain in one window"
+assert not is_kept(lambda window: 0.1 * (window % 2 == 0)), "a gain that is not confirmed"
+gains = np.full((4, 3), 0.02)
+assert calibrate.is_better(gains)
+gains[:, 1] = -0.02
+assert not calibrate.is_better(gains), "a loss of map correlation"
+# Most windows are where most events are.
+recorded = np.zeros(800, [("t", "i8")])
+recorded["t"] = np.sort(np.concatenate([np.arange(100) * 10_000, 500_000 + np.arange(700)]))
+windows = calibrate.windows_of(recorded, calibrate.Span(-1, 1_000_000))
+assert [len(window.of(recorded)) for window in windows] == [100] * 8
+assert windows[3].end - windows[3].start < 1000
+END
+
 # Exposure pulses are found by their bursts of events.
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-dvs preset=ideal response=log log-eps=0.02 exposure-pulse=0.03 exposure-lead=9000000 ! evtenc ! filesink location=recorded.raw
 calibrate scene.mkv recorded.raw --element "eventsim-dvs preset=ideal response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0" --lag 0 --to 0.3 | tee found
@@ -74,7 +123,7 @@ done >pictures.txt
 calibrate pictures.txt recorded.csv --element eventsim-dense --to 0.3 --measure-from 0.3 --measure-to 0.5 --map map.png | tee found
 lag=$(sed -n 's/Frames show the scene \(-*[0-9.]*\) ms later.*/\1/p' found)
 awk -v lag="${lag:-0}" 'BEGIN { exit !(lag > -5 && lag < 0) }' || fail "the pictures are ${lag:-0} ms late"
-without_search="eventsim-dvs refractory-period=0 refractory-reset=level threshold-jitter=0 exposure-compensation=true upsampling=motion log-eps=0.05 overexposed-light=1 adaptation=0.05 denoise=-1 exposure-time=0 exposure-pulse=0"
+without_search="eventsim-dvs refractory-period=0 refractory-reset=level threshold-jitter=0 exposure-compensation=true log-eps=0.05 overexposed-light=1 adaptation=0.05 denoise=-1 exposure-time=0 exposure-pulse=0"
 calibrate scene.mkv recorded.raw --element "$without_search" --to 0.04 | tee one
 grep -q "^The lag cannot be estimated from one frame interval" one || fail "a lag was estimated from one frame interval"
 
@@ -123,6 +172,11 @@ grep -q "^[1-9][0-9]* % of the pixels never fire although their neighbours do" f
 calibrate pictures.txt warped.csv --element eventsim-dense --lag 0 --to 0.5 --mask warped.png | tee found
 ! grep -q "never fire" found || fail "pixels outside the mask are told"
 
+# A file with frames and events is given once.
+"$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! videoconvert ! video/x-raw,format=GRAY8 ! tee name=t ! queue ! mux.  t. ! queue ! eventsim-frame positive-threshold=12.5 negative-threshold=8.5 ! mux.  aedatmux name=mux ! filesink location=both.aedat4
+calibrate both.aedat4 --element eventsim-frame --lag 0 --to 0.3 | tee found
+awk '/map correlation/ { exit !($3 > 0.97) }' found || fail "frames and events of a file differ"
+
 # Where the video is overexposed, events of the recording are left out.
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-frame positive-threshold=12.5 negative-threshold=8.5 ! evtenc ! filesink location=recorded.raw
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! videobalance brightness=0.4 ! matroskamux ! filesink location=bright.mkv
@@ -148,6 +202,7 @@ refused() { # WORDS ARGUMENT...
 }
 refused "no element" scene.mkv recorded.raw --element eventsim-nothing
 refused "only eventsim-dvs has profiles" scene.mkv recorded.raw --element eventsim-frame --profile frame.profile
+refused "recorded.raw: events without frames; give the video" recorded.raw
 refused "nowhere.mkv" nowhere.mkv recorded.raw
 cp scene.mkv $'lat\xfcin.mkv'
 refused 'lat\\xfcin.mkv is not UTF-8; rename it' $'lat\xfcin.mkv' recorded.raw
@@ -174,6 +229,8 @@ for option in --profile --map; do
   refused "\. cannot be written; name a file" scene.mkv recorded.raw --element eventsim-dvs $option .
 done
 refused "recorded.raw is read, so it cannot be written" scene.mkv recorded.raw --map ./recorded.raw
+awk -F, -v OFS=, 'NR > 1 { $1 += 2000000000; } { print }' recorded.csv >late.csv
+refused "the clocks differ: the frames are from 0.002 to 0.602 s, the events from 2000.[0-9]* to 2000.[0-9]* s" pictures.txt late.csv
 refused "nothing to compare from" scene.mkv recorded.raw --element eventsim-frame --from 5
 
 # A checkout asks for the Debian packages that the Python package depends on.

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """event-dataset and ec.Dataset: data sets from recipes, made, continued, verified, and on the fly."""
 
+import collections
 import glob
 import json
 import os
@@ -24,6 +25,8 @@ sys.path.insert(0, os.path.join(os.environ["BUILD"], "pipelines"))
 import gst_eventcamera as ec
 import numpy as np
 from dataset_video import hash_of, record_of
+from gst_eventcamera.sources import SINK
+from gst_eventcamera.video import VideoFile
 from gst_eventcamera.recipe import OUTPUTS, Distribution, uniform_number
 
 FOLDER = tempfile.TemporaryDirectory()
@@ -93,7 +96,11 @@ def load(folder, name):
 
 
 def hashes(folder):
-    return {one["name"]: one["written"]["sha256"] for one in load(folder, "manifest.json")["videos"]}
+    return {one["name"]: one["written"]["npz"]["sha256"] for one in load(folder, "manifest.json")["videos"]}
+
+
+def sizes(parts):
+    return dict(collections.Counter(parts.values()))
 
 
 class DataSets(unittest.TestCase):
@@ -108,7 +115,8 @@ class DataSets(unittest.TestCase):
         self.assertEqual(sorted(made), ["run/four", "run/three's", "walk/two words"])
         for one in load(folder, "manifest.json")["videos"]:
             self.assertEqual(one["input"]["sha256"], hash_of(path_of(f"{folder}/{one['input']['path']}")))
-            self.assertEqual(one["written"]["sha256"], hash_of(path_of(f"{folder}/recipe/{one['written']['path']}")))
+            written = one["written"]["npz"]
+            self.assertEqual(written["sha256"], hash_of(path_of(f"{folder}/recipe/{written['path']}")))
             self.assertEqual(one["figures"]["frames"], 8)
         self.check_reports(folder, made)
         self.check_on_the_fly(folder, recipe)
@@ -125,7 +133,7 @@ class DataSets(unittest.TestCase):
 
         self.assertIn("3 videos of the manifest compared, 0 differences", event_dataset("verify", recipe))
         manifest = load(folder, "manifest.json")
-        manifest["videos"][0]["written"]["sha256"] = "0" * 64
+        manifest["videos"][0]["written"]["npz"]["sha256"] = "0" * 64
         manifest["videos"][1]["input"]["sha256"] = "0" * 64
         with open(path_of(f"{folder}/other.json"), "w", encoding="utf-8") as file:
             json.dump(manifest, file)
@@ -154,7 +162,8 @@ class DataSets(unittest.TestCase):
         for part in ("train", "test"):
             with open(path_of(f"{folder}/recipe/{part}.txt"), encoding="utf-8") as file:
                 parts[part] = file.read().splitlines()
-        self.assertEqual(sorted(parts["train"] + parts["test"]), sorted(f"data/{name}.npz" for name in made))
+        self.assertEqual(sorted(parts["train"] + parts["test"]),
+                         sorted(f"data/{name}.npz\t{os.path.dirname(name)}" for name in made))
         statistics = load(folder, "statistics.json")
         self.assertEqual(statistics["all"]["videos"], 3)
         self.assertEqual(statistics["all"]["frames"], 24)
@@ -162,9 +171,17 @@ class DataSets(unittest.TestCase):
             page = file.read()
         self.assertEqual(page.count("<img"), 3)
         self.assertNotIn("//", page)  # no address of another machine
-        self.assertIn('src="previews/walk/two%20words.png"', page)
+        self.assertIn('<a href="previews/walk/two%20words.png"><img', page)
+        self.assertRegex(page, "64 × 48 pixels, 8 frames, 0.3 s, .* Mev/s, .*positive-threshold 0")
+        self.assertNotIn("rate-p", page)
         picture = path_of(f"{folder}/recipe/previews/run/four.png")
-        launch(f"filesrc {shlex.quote('location=' + picture)} ! pngdec ! fakesink")
+        with VideoFile(picture, f"videoconvert ! video/x-raw,format=RGB ! {SINK}") as pipeline:
+            sample, = pipeline.samples()
+        buffer = sample.get_buffer()
+        pixels = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), np.uint8).reshape(48, 64, 3)
+        colours = set(map(tuple, pixels.reshape(-1, 3).tolist()))
+        self.assertIn((240, 244, 250), colours)  # ON
+        self.assertIn((64, 128, 208), colours)  # OFF
 
     def check_on_the_fly(self, folder, recipe):
         dataset = ec.Dataset(recipe)
@@ -284,6 +301,40 @@ class DataSets(unittest.TestCase):
         self.assertRegex(printed, "^error: .*Cannot keep events in a temporary file in /nowhere")
         self.assertIn("1 made, 1 unchanged", event_dataset(path_of("failing/recipe.yaml")))
 
+    def test_are_planned(self):
+        for name in ("a/1", "a/2", "b/1"):
+            make_video(f"planned/videos/{name}.mkv")
+        recipe = recipe_of("planned")
+        printed = event_dataset(recipe, "--dry-run")
+        for video in ec.Dataset(recipe):
+            threshold = video.parameters["positive-threshold"]
+            self.assertRegex(printed, f"(?m)^{video.name}\t{video.split}\t.*positive-threshold={threshold} ")
+        self.assertIn("3 videos: 3 to make, 1 in test, 2 in train", printed)
+        self.assertFalse(os.path.exists(path_of("planned/recipe")))
+        event_dataset(recipe)
+        os.remove(path_of("planned/recipe/data/b/1.npz"))
+        self.assertIn("3 videos: 1 to make", event_dataset(recipe, "--dry-run"))
+        self.assertIn("--dry-run is not for verify", event_dataset("verify", recipe, "--dry-run", status=2))
+
+    def test_ask_slurm_once(self):
+        """Before any job, with Slurm's own words."""
+        make_video("refused/videos/0.mkv")
+        recipe = recipe_of("refused")
+        os.makedirs(path_of("refused/profile"))
+        with open(path_of("refused/profile/config.yaml"), "w", encoding="utf-8") as file:
+            file.write("cluster: sbatch --partition=none --cpus-per-task={threads}\njobs: 1\n")
+        with open(path_of("refused/sbatch"), "w", encoding="utf-8") as file:
+            file.write('#!/bin/sh\necho "$@" >>"$0.words"\necho "sbatch: error: invalid partition" >&2\nexit 1\n')
+        os.chmod(path_of("refused/sbatch"), 0o755)
+        with unittest.mock.patch.dict(os.environ, PATH=path_of("refused") + ":" + os.environ["PATH"]):
+            for profile in ("slurm", path_of("refused/profile")):
+                self.assertIn("error: Slurm takes no jobs: sbatch: error: invalid partition\n",
+                              event_dataset(recipe, "--profile", profile, status=1))
+        with open(path_of("refused/sbatch.words"), encoding="utf-8") as file:
+            asked = file.read().splitlines()
+        self.assertEqual(len(asked), 2)
+        self.assertEqual(asked[1], "--partition=none --test-only --wrap=true")
+
     def test_are_made_in_parts(self):
         for number in range(4):
             make_video(f"parts/videos/{number}.mkv", frames=3)
@@ -301,7 +352,7 @@ class DataSets(unittest.TestCase):
         self.assertIn("0 made, 4 unchanged", printed)
         for part in ("one", "two"):
             with open(path_of(f"parts/recipe/{part}.txt"), encoding="utf-8") as file:
-                self.assertEqual(file.read().split(), [f"data/{video.name}.npz" for video in ec.Dataset(recipe, part)])
+                self.assertEqual(file.read().splitlines(), [f"data/{video.name}.npz" for video in ec.Dataset(recipe, part)])
         printed = event_dataset(recipe_of("parts", RECIPE + "min-frames: 4"), status=1)
         self.assertIn("1: the recipe has changed; making it again", printed)
         self.assertIn("0 made, 0 unchanged, 3 refused, 1 failed", printed)
@@ -346,12 +397,20 @@ class Outputs(unittest.TestCase):
         for output in OUTPUTS:
             with self.subTest(output):
                 video, records = self.records(RECIPE.replace("npz", output))
-                self.assertEqual(records[0]["written"]["sha256"], records[1]["written"]["sha256"])
+                self.assertEqual(records[0]["written"], records[1]["written"])
                 events = sum(len(chunk) for chunk in video.events())
                 self.assertEqual(records[0]["figures"]["events"], events)
                 self.assertGreater(events, 500)
                 if output not in ("tensors", "csv", "txt"):
                     self.assertEqual(len(ec.read(path_of(f"outputs/made/data/ball.{output}"))), events)
+
+    def test_are_written_at_once(self):
+        apart = {output: self.records(RECIPE.replace("npz", output))[1][0]["written"][output]
+                 for output in ("csv", "tensors", "raw")}
+        _, records = self.records(RECIPE.replace("npz", "[csv, tensors, raw]"))
+        self.assertEqual(records[0]["written"], apart)
+        for file in apart.values():
+            self.assertTrue(os.path.exists(path_of("outputs/made/" + file["path"])))
 
     def test_of_tensors_are_those_on_the_fly(self):
         video, _ = self.records(RECIPE.replace("npz", "tensors\ntensors: bins=3 frame-count=2 data-type=float16"))
@@ -406,7 +465,9 @@ class Recipes(unittest.TestCase):
             "eventsim-dvs leak-rate=-5: it must be from 0 to": base.replace("dvs", "dvs leak-rate=-5"),
             "eventtensor bins=100000: it must be from 1 to": base + "output: tensors\ntensors: bins=100000",
             "seed: True is not a whole number": base + "seed: true",
-            "output: avi is none of aedat4, csv": base + "output: avi",
+            "output: 'avi' is none of aedat4, csv": base + "output: [h5, avi]",
+            "output: give each format once": base + "output: [h5, h5]",
+            "output: npy and tensors": base + "output: [npy, tensors]",
             "tensors: only for output: tensors": base + "tensors: bins=5",
             "window: give width, height and distance": base + "framerate: 9\nwindow: {width: 3}",
             "window: give a framerate": base + "window: {width: 3, height: 3, distance: 3}",
@@ -443,7 +504,7 @@ class Recipes(unittest.TestCase):
         self.expect("{ball}' has braces", base)
         os.rename(path_of("recipes/videos/{ball}.mp4"), path_of("recipes/videos/b\udce4ll.mp4"))
         self.expect(path_of("recipes/videos/b\\xe4ll.mp4") + " is not UTF-8; rename it", base)
-        self.assertIn("output: avi is none of",
+        self.assertIn("output: 'avi' is none of",
                       event_dataset(recipe_of("recipes", base + "output: avi"), status=2))
 
     def test_run_only_harmless_elements(self):
@@ -517,11 +578,28 @@ class Recipes(unittest.TestCase):
         self.assertIn(whole["preset"], ("gen4", "davis346"))
         self.assertIs(type(whole["refractory-period"]), int)
         self.assertEqual(whole["seed"], drawn["a"]["seed"])
-        # Videos of a group stay together; shares are as asked for.
-        recipe = ec.Recipe.load(recipe_of("draws", RECIPE + "group: 'g\\d+'\n"))
-        self.assertEqual(len({recipe.part_of(f"x_g07_{number}") for number in range(20)}), 1)
-        parts = [recipe.part_of(f"g{number}") for number in range(1000)]
-        self.assertAlmostEqual(parts.count("train") / 1000, 0.6, delta=0.05)
+
+    def test_split_by_exact_shares(self):
+        make_video("draws/videos/a.mkv", frames=2)
+        split = "split: {train: 0.8, validation: 0.1, test: 0.1}"
+        text = RECIPE.replace("split: {train: 0.6, test: 0.4}", split)
+        recipe = ec.Recipe.load(recipe_of("draws", text))
+        for total, expected in {10: (8, 1, 1), 7: (5, 1, 1), 91: (73, 9, 9), 1000: (800, 100, 100)}.items():
+            found = sizes(recipe.parts(map(str, range(total))))
+            self.assertEqual(tuple(found.get(part, 0) for part in recipe.split), expected)
+        # Of each folder, too.
+        parts = recipe.parts(f"{folder}/{number}" for folder in "abcdefg" for number in range(20))
+        self.assertEqual(sizes(parts), {"train": 112, "validation": 14, "test": 14})
+        for folder in "abcdefg":
+            of_folder = sizes({name: part for name, part in parts.items() if name[0] == folder})
+            self.assertEqual(of_folder, {"train": 16, "validation": 2, "test": 2})
+        # Videos of a group stay together.
+        recipe = ec.Recipe.load(recipe_of("draws", text + "group: 'g\\d+'\n"))
+        parts = recipe.parts(f"x_g{group:02}_{number}" for group in range(30) for number in range(group % 7 + 1))
+        for group in range(30):
+            self.assertEqual(len({part for name, part in parts.items() if f"g{group:02}" in name}), 1)
+        for part, share in recipe.split.items():
+            self.assertLessEqual(abs(sizes(parts)[part] - share * len(parts)), 7)
 
     def test_distributions(self):
         shares = [uniform_number("key", i) for i in range(2000)]

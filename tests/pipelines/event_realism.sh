@@ -27,6 +27,9 @@ column() { # NUMBER TITLE: the cell of a row, with its mark
   sed -n "s/^$2  *//p" table | sed 's/ \*/*/g; s/ (/(/g; s/ ±/±/; s/ %/%/g' | awk -v column="$1" '{ print $column }'
 }
 [ "$(column 2 "map correlation")" = 1.000 ] || fail "a recording is unlike itself"
+[ "$(column 2 "similarity of reconstructions")" = 1.000 ] || fail "a reconstruction is unlike itself"
+awk -v second="$(column 3 "similarity of reconstructions")" -v dense="$(column 4 "similarity of reconstructions")" \
+  'BEGIN { exit !(second > 0.5 && dense < second - 0.1) }' || fail "reconstructions of dense interpolation are as similar"
 [ "$(column 2 "real events matched within 1 ms")" = 1.000 ] || fail "a recording does not match itself"
 [ "$(column 2 "nearest match of real events, ms")" = 0.00 ] || fail "a recording is far from itself"
 [ "$(grep -c '^[a-z].* \*$' table)" -ge 10 ] || fail "dense interpolation is within the noise ceiling"
@@ -42,6 +45,16 @@ done
 ! grep -oE '(src|href)="(http|//)[^"]*' page.html || fail "the page refers to the network"
 [ "$(grep -o 'src="data:image/png;base64,[A-Za-z0-9+/]*' page.html | wc -l)" -eq 4 ] || fail "maps are missing"
 [ "$(grep -o '<svg' page.html | wc -l)" -eq 3 ] || fail "curves are missing"
+[ "$(grep -o '■ dense.csv' page.html | wc -l)" -eq 3 ] && grep -q ">Mev/s<" page.html || fail "legends or units are missing"
+[ "$(grep -o '<polyline[^>]*stroke="currentColor"/><text' page.html | wc -l)" -eq 3 ] || fail "the real curve is not on top"
+PYTHONPATH=$SOURCE/pipelines:$PYTHONPATH /usr/bin/python3 - <<'PYTHON' || fail "ticks are not round"
+from event_realism import ticks_of
+
+for low, high, is_log, ticks in ((0, 560, False, (0, 100, 200, 300, 400, 500)), (0, 2.6, False, (0, .5, 1, 1.5, 2, 2.5)),
+                                 (.03, 6, True, (.05, .1, .2, .5, 1, 2, 5)), (.001, 5000, True, (.001, .01, .1, 1, 10, 100, 1000))):
+    found = ticks_of(low, high, is_log)
+    assert len(found) == len(ticks) and all(abs(found - ticks) < 1e-9), (low, high, found)
+PYTHON
 /usr/bin/python3 -c 'import sys; from html.parser import HTMLParser; HTMLParser().feed(open("page.html").read())'
 realism real1.raw real2.raw --video scene.mkv --from 0.1 --to 0.4 --html page.html >table
 grep -q "change of the logarithm of the light" page.html || fail "the page has no response to the light"

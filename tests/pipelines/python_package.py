@@ -477,7 +477,8 @@ class Simulators(unittest.TestCase):
     def test_leaving_the_loop_stops_the_pipeline(self):
         before = threading.active_count(), len(os.listdir("/proc/self/task"))
         for _ in range(3):
-            for _ in ec.live("videotestsrc is-live=true pattern=ball ! eventsim-frame"):
+            for chunk in ec.live("videotestsrc is-live=true pattern=ball ! eventsim-frame"):
+                self.assertTrue(chunk.end < chunk.arrival < chunk.end + 20, f"{chunk.end} s, {chunk.arrival} s")
                 break
         self.assertLessEqual(len(os.listdir("/proc/self/task")), before[1] + 4)  # pools of threads stay
 

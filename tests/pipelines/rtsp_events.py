@@ -262,7 +262,28 @@ def in_sync():
         print(f"events are {1000 * lag:.0f} ms later than the video, {distance:.2f} pixels apart")
 
 
+def pictures():
+    """The events of the test scene, and of a recording that is repeated, as video for any player."""
+    with tempfile.TemporaryDirectory() as folder:
+        recording = os.path.join(folder, "ball.raw")
+        subprocess.run([os.environ["GST_LAUNCH"], "-q", "videotestsrc", "pattern=ball", "num-buffers=30", "!",
+                        "eventsim-diff", "!", "evtenc", "!", "filesink", f"location={recording}"], check=True)
+        for arguments in ((), ("--source", recording)):
+            with Server(*arguments) as server:
+                assert ("/video" in server.address) == (not arguments), server.address
+                with Client(server.base + "/picture", "! rtph264depay ! avdec_h264 ! videoconvert"
+                            " ! video/x-raw,format=RGB ! appsink name=out sync=false") as client:
+                    for sample in client.samples(75)[15:]:  # longer than the recording
+                        pixels = np.frombuffer(sample.get_buffer().extract_dup(0, 320 * 240 * 3), np.uint8)
+                        drawn = np.count_nonzero(pixels.reshape(-1, 3).max(1) > 150)
+                        times = sample.get_buffer().pts
+                        assert 50 < drawn < 10000, f"{drawn} pixels of events at {times} ns"
+                with events_of(server.base) as client:
+                    check_events(client.samples(20))
+
+
 def errors():
+    fails("nowhere is no file", "--source", "nowhere", "--port", "0")
     fails("/nowhere", "--device", "/nowhere", "--port", "0")
     fails("nowhere.pem", "--certificate", "nowhere.pem", "--port", "0")
     fails("--password", "--user", "ada")
@@ -271,7 +292,7 @@ def errors():
 
 
 Gst.init(None)
-for test in (clients_come_and_leave, in_sync, pauses, passwords, encryption, errors):
+for test in (clients_come_and_leave, pictures, in_sync, pauses, passwords, encryption, errors):
     start = time.monotonic()
     test()
     print(f"{test.__name__}: {time.monotonic() - start:.1f} s", flush=True)

@@ -37,6 +37,12 @@ PICTURE = """(() => {
 })()"""
 
 
+def keep(page, name):
+    """A screenshot for whoever looks at it."""
+    if folder := os.environ.get("SCREENSHOTS"):
+        page.screenshot(os.path.join(folder, name))
+
+
 def wait_for(what, condition):
     deadline = time.monotonic() + SECONDS
     while not (value := condition()):
@@ -133,14 +139,30 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, context
     first = browser.open(url)
     see_events(first)
     see_rate(first)
-    print("one viewer sees events and their rate")
+    wait_for("the state", lambda: first.evaluate("state.textContent") == "live")
+    assert first.evaluate("document.title") == "test scene, eventsim-diff", first.evaluate("document.title")
+    wait_for("a curve of rates", lambda: len((first.evaluate("curve.getAttribute('points')") or "").split()) > 3)
+    print("one viewer sees events, their rate and its curve, what is shown and the state")
 
     first.resize(390, 844)
     video, rate = (first.evaluate(f"document.querySelector('{name}').getBoundingClientRect().toJSON()")
                    for name in ("video", "output"))
     assert video["width"] == 390 and rate["top"] >= video["bottom"], f"on a phone: {video}, {rate}"
+    assert first.evaluate("document.documentElement.scrollWidth") == 390, "the page is wider than a phone"
+    keep(first, "web-events-phone.png")
     first.resize(1280, 720)
+    keep(first, "web-events.png")
     print("on a phone the picture is as wide as the page, and the rate is below it")
+
+    other = browser.open(url)
+    first.evaluate("mode.value = 'decay', mode.onchange()")
+    for page in (first, other):
+        wait_for("the mode of all viewers", lambda page=page: page.evaluate("mode.value") == "decay")
+    wait_for("pictures of events that fade", lambda: (picture := first.evaluate(PICTURE)) and
+             picture["size"] - picture["none"] - picture["on"] - picture["off"] > 300)
+    other.evaluate("mode.value = 'accumulate', mode.onchange()")
+    other.close()
+    print("a viewer chooses how all see the events")
 
     alone = server.descriptors() + 3  # browsers keep connections for later; a viewer needs about 20
     for name in ("second", "third"):
@@ -161,7 +183,7 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, context
     print("viewers come and leave, and the first sees events still")
 
     for message in ("nonsense", "[]", '{"answer": ""}', '{"answer": 5}',
-                    '{"answer": "nonsense"}', '{"candidate": {}}', '{"candidate": null}', "[" * 100_000,
+                    '{"answer": "nonsense"}', '{"mode": "nonsense"}', '{"mode": 5}', '{"candidate": {}}', '{"candidate": null}', "[" * 100_000,
                     '{"candidate": {"sdpMLineIndex": -1, "candidate": ""}}'):
         code = closing_code(first, url, message)
         assert code == 1007, f"{message}: it was answered with {code}"
@@ -189,12 +211,14 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, context
     refused("Address already in use; choose another with --port", "--port", port)
     refused("nowhere", "--address", "nowhere")
     refused("/nowhere", "--device", "/nowhere", "--port", "0")
+    refused("nowhere is no file", "--source", "nowhere", "--port", "0")
+    refused("not allowed with argument", "--source", "nowhere", "--device", "nowhere")
     refused("eventsim-nothing", "--simulator", "eventsim-nothing", "--port", "0")
     print("errors are told")
 
     server.interrupt()
     wait_for("the viewer learns that the server has ended", lambda: "reconnecting" in first.evaluate(
-        "document.querySelector('output').textContent"))
+        "state.textContent"))
     assert first.evaluate("!last.hidden && last.width > 0"), "the last picture is gone"
     print("Ctrl-C ends it, and the last picture stays")
 
@@ -203,5 +227,18 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, context
     wait_for("the viewer reconnects", lambda: first.evaluate("last.hidden"))
     see_events(first)
     see_rate(first)
+    assert first.evaluate("state.textContent") == "live", first.evaluate("state.textContent")
     server.interrupt()
     print("viewers reconnect when the server is back")
+
+    recording = os.path.join(profile, "ball.raw")
+    subprocess.run([os.environ["GST_LAUNCH"], "-q", "videotestsrc", "pattern=ball", "num-buffers=60", "!", "eventsim-diff",
+                    "!", "evtenc", "!", "filesink", f"location={recording}"], check=True)
+    for source, name in ((recording, "ball.raw"), ("videotestsrc is-live=true pattern=ball ! eventsim-diff", "pipeline")):
+        server = ServerProcess(PROGRAM, "--port", port, "--source", source)
+        at_end.callback(server.process.kill)
+        wait_for(f"the name {name}", lambda name=name: first.evaluate("document.title") == name)
+        time.sleep(3)  # the recording has 2 s
+        see_events(first)
+        server.interrupt()
+    print("a recording, which is repeated, and a pipeline are sources")

@@ -10,8 +10,9 @@
  *
  * The calibration is a YAML file, as OpenCV's FileStorage writes it: `camera_matrix` and
  * `distortion_coefficients`, optionally `image_width`, `image_height` and `fisheye_model`; or as
- * ROS's camera_calibration writes it, with the `distortion_model` plumb_bob or equidistant. Without
- * a file all events pass.
+ * ROS's camera_calibration writes it, with the `distortion_model` plumb_bob or equidistant. XML of
+ * the same content is read, too. #GstEventUndistort:settings takes a calibration as text, such as
+ * the property `settings` of GStreamer's cameracalibrate. Without a calibration all events pass.
  *
  * ## Example launch line
  * |[
@@ -40,29 +41,39 @@ namespace {
 
 struct Settings {
   std::string location;
+  std::string calibration;  ///< instead of a file
 };
 
 /// Maximum size of a calibration file, bytes.
 constexpr std::size_t max_file_size = 1 << 20;
 
-CameraCalibration read_calibration(const std::string& location, SensorSize sensor) {
-  return read_named_file("the calibration", location, max_file_size, [&](const std::string& yaml) {
-    const auto calibration = eventcamera::parse_calibration(yaml);
-    const auto [width, height] = calibration.size;
-    const SensorSize size{width != 0 ? width : sensor.width, height != 0 ? height : sensor.height};
-    if (size != sensor)
-      throw std::invalid_argument("it is for " + in_pixels(size) + ", but the sensor has " +
-                                  in_pixels(sensor));
-    return calibration;
-  });
+/// Throws std::invalid_argument.
+CameraCalibration calibration_of(const std::string& text, SensorSize sensor) {
+  const auto calibration = eventcamera::parse_calibration(text);
+  const auto [width, height] = calibration.size;
+  const SensorSize size{width != 0 ? width : sensor.width, height != 0 ? height : sensor.height};
+  if (size != sensor)
+    throw std::invalid_argument("it is for " + in_pixels(size) + ", but the sensor has " +
+                                in_pixels(sensor));
+  return calibration;
 }
 
 class Undistort final : public EventFilter {
  public:
   void start(SensorSize in, SensorSize /*out*/) override {
     core_.reset();
-    if (const auto location = settings.copy().location; !location.empty())
-      core_.emplace(in, read_calibration(location, in));
+    const auto [location, calibration] = settings.copy();
+    const auto parse = [in](const std::string& text) { return calibration_of(text, in); };
+    if (!calibration.empty()) {
+      try {
+        core_.emplace(in, parse(calibration));
+      } catch (const std::invalid_argument& error) {
+        throw std::runtime_error(std::string("cannot read the calibration in \"settings\": ") +
+                                 error.what());
+      }
+    } else if (!location.empty()) {
+      core_.emplace(in, read_named_file("the calibration", location, max_file_size, parse));
+    }
   }
   void stop() override { core_.reset(); }
   LabelledEvents filter(LabelledEvents events, Microseconds /*start*/) override {
@@ -85,8 +96,13 @@ static void gst_event_undistort_class_init(GstEventUndistortClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
   properties.add(&Settings::location,
                  g_param_spec_string("location", "Location",
-                                     "YAML file with the calibration of the camera, read when a "
-                                     "stream begins",
+                                     "YAML or XML file with the calibration of the camera, read "
+                                     "when a stream begins",
+                                     "", mutable_ready_flags));
+  properties.add(&Settings::calibration,
+                 g_param_spec_string("settings", "Settings",
+                                     "Calibration of the camera as YAML or XML text, such as the "
+                                     "property `settings` of cameracalibrate; instead of location",
                                      "", mutable_ready_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event undistortion", "Filter",
                                         "Undoes the distortion of a lens", EVENTSIM_AUTHORS);

@@ -168,6 +168,12 @@ GstStructure* structure_of(const StreamComparison& comparison) {
   GstStructure* structure =
       gst_structure_new("eventcompare", "start", G_TYPE_INT64, gint64{figures.start}, "end",
                         G_TYPE_INT64, gint64{figures.end}, nullptr);
+  const auto& reference = comparison.causes(StreamRole::reference);
+  const auto& candidate = comparison.causes(StreamRole::candidate);
+  const bool is_all_dropped = figures.streams[StreamRole::candidate].events == 0;
+  if (reference.all() > 0 && (candidate.all() > 0 || is_all_dropped))
+    put_structure(structure, "classification",
+                  structure_of(Classification::of(reference, candidate)));
   for (const auto role : both_roles) {
     GstStructure* stream = gst_structure_new_empty(name_of(role));
     put_figures(stream, figures.streams[role]);
@@ -188,12 +194,6 @@ GstStructure* structure_of(const StreamComparison& comparison) {
   put_structure(ceiling, "matches", matches_of(figures.ceiling.matches));
   put_structure(structure, "noise-ceiling", ceiling);
   put_structure(structure, "rate-curve", curve_of(comparison.rates()));
-  const auto& reference = comparison.causes(StreamRole::reference);
-  const auto& candidate = comparison.causes(StreamRole::candidate);
-  const bool is_all_dropped = figures.streams[StreamRole::candidate].events == 0;
-  if (reference.all() > 0 && (candidate.all() > 0 || is_all_dropped))
-    put_structure(structure, "classification",
-                  structure_of(Classification::of(reference, candidate)));
   return structure;
 }
 
@@ -363,9 +363,11 @@ DEFINE_EVENT_AGGREGATOR(GstEventCompare, gst_event_compare, EVENT_COMPARE, Event
 
 static void gst_event_compare_class_init(GstEventCompareClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  add_report_properties(properties,
-                        "PNG file of the events per pixel, of both streams and of their "
-                        "difference, written at EOS, at the end of a segment or on stop");
+  add_report_properties(
+      properties,
+      "PNG file of the events per pixel, of both streams and of their "
+      "difference, with bars of the counts, written at EOS, at the end of a segment "
+      "or on stop");
 
   auto* const aggregator = GST_EVENT_AGGREGATOR_CLASS(klass);
   add_aggregator_pad_template(aggregator, "reference", GST_PAD_SINK, EVENT_CAPS);

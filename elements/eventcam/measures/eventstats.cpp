@@ -361,9 +361,10 @@ static void gst_event_stats_class_init(GstEventStatsClass* klass) {
           "interval", "Interval",
           "Time between statistics messages, in stream time (ns; 0 = at the end only)", 0,
           std::numeric_limits<gint64>::max(), Settings().interval, mutable_playing_flags));
-  add_report_properties(properties,
-                        "PNG file of the events per pixel, written at EOS, at the end of a segment "
-                        "or on stop");
+  add_report_properties(
+      properties,
+      "PNG file of the events per pixel, with a bar of the counts, written at EOS, "
+      "at the end of a segment or on stop");
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_templates(element_class, EVENT_CAPS, EVENT_CAPS);

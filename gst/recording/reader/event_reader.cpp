@@ -53,9 +53,11 @@ void wait_until_added(GstElement* element) {
 /// Report for source pads that are not linked. decodebin plugs eventrender unless its caps ask for
 /// events: the message says how.
 Report not_linked() {
-  return {GST_STREAM_ERROR_FAILED,
-          "Nothing is linked downstream. decodebin draws events as video; for the events "
-          "themselves, set decodebin " ASK_FOR_EVENTS "."};
+  return {
+      GST_STREAM_ERROR_FAILED,
+      "Nothing is linked downstream. Insert eventrender before elements that take video. "
+      "decodebin draws events as video; for the events themselves, set decodebin " ASK_FOR_EVENTS
+      "."};
 }
 
 Report report_of(const std::exception& error, const EventReaderFormat& format) {
@@ -493,8 +495,10 @@ gboolean EventReader::src_event(GstPad* pad, GstEvent* event) {
 
 bool EventReader::seek(const SeekRequest& request) {
   if (!request.plays_on_from_time() || !timeline_.can_seek()) {
-    GST_INFO_OBJECT(element_, "refused to seek at rate %g in %s", request.rate(),
-                    gst_format_get_name(request.format()));
+    GST_WARNING_OBJECT(element_,
+                       "refused to seek at rate %g in %s: events are read forwards in time, from "
+                       "sources that can seek",
+                       request.rate(), gst_format_get_name(request.format()));
     return false;
   }
   if (request.counts_from_end() && !GST_CLOCK_TIME_IS_VALID(timeline_.duration())) {

@@ -1,0 +1,368 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "elements/eventcam/drawing/event_pictures.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "gst/base/event_caps.hpp"
+#include "gst/base/played_segment.hpp"
+#include "gst/base/video_frame.hpp"
+#include "gst/drawing/drawn_video.hpp"
+#include "gst/eventcamera/eventcamera.h"
+
+GST_DEBUG_CATEGORY_STATIC(event_pictures_debug);
+#define GST_CAT_DEFAULT event_pictures_debug
+
+using eventcamera::Microseconds;
+using eventcamera::Renderer;
+
+namespace {
+
+/// Part of a longer pause that pictures show, so that the last one is empty.
+constexpr GstClockTime shown_pause = GST_SECOND;
+
+/// Maximum time to wait for the first input of a live source.
+constexpr GstClockTime max_wait = 200 * GST_MSECOND;
+
+}  // namespace
+
+EventPictures::EventPictures(GstAggregator* element)
+    : EventAggregator(element, {.verb = "draw", .passes_main_pad = false}),
+      warn_of_pause_(GST_CAT_DEFAULT) {}
+
+/* events */
+
+/// Adds the events of a buffer up to `end`, or all if there is none. Returns true if these were
+/// all. May throw.
+bool EventPictures::add_events(const MappedEvents& mapped, const EventInterval& interval,
+                               std::optional<GstClockTime> end, GstBuffer* buffer) {
+  const auto rest = mapped.events().subspan(std::min(*taken_, mapped.events().size()));
+  if (*taken_ == 0)
+    GST_LOG_OBJECT(main_pad(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, rest.size(),
+                   GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
+  const auto due = end && *end < interval.end
+                       ? events_until(rest, mapped.start(), static_cast<Microseconds>(*end / 1000))
+                       : rest;
+  *taken_ += due.size();
+  state_->renderer.configure(render_settings());
+  warn(state_->renderer.add(due, mapped.start(), length_of(interval)), buffer);
+  return due.size() == rest.size();
+}
+
+void EventPictures::drop_buffer() {
+  taken_.reset();
+  gst_aggregator_pad_drop_buffer(main_pad());
+}
+
+/// Advances to the time of a buffer. Returns true if a picture is due before the buffer can be
+/// processed. May throw.
+bool EventPictures::approach(GstBuffer* buffer, const EventInterval& interval) {
+  if (!taken_) {
+    const bool returns =
+        GST_BUFFER_IS_DISCONT(buffer) && interval.start + event_resolution < known_;
+    const bool leaps = times_ && interval.start > times_->events().end + max_pause;
+    if (returns || leaps) {
+      GST_DEBUG_OBJECT(
+          main_pad(), "starting over: time %s from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
+          returns ? "goes back" : "leaps", GST_TIME_ARGS(known_), GST_TIME_ARGS(interval.start));
+      start_over();
+    }
+    taken_ = 0;
+  }
+  const GstClockTime segment_start = segment_of(main_pad()).start;
+  if (!times_ && state_->has_framerate() &&
+      (interval.end > segment_start || interval.start >= segment_start))
+    begin_pictures(std::max(interval.start, segment_start));
+  return times_ && interval.start >= times_->events().end;
+}
+
+/// Adds the events of a buffer that are due, and pushes the picture that this completes, if any.
+/// May throw.
+GstFlowReturn EventPictures::handle_buffer(GstBuffer* buffer) {
+  auto interval = interval_of(buffer);
+  if (!interval) {
+    warn(interval_fault(buffer), buffer);
+    drop_buffer();
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
+  if (gst_buffer_get_size(buffer) == 0 && interval->end - interval->start > max_pause &&
+      state_->has_framerate()) {
+    if (!taken_)
+      warn_of_pause_(
+          element(),
+          {GST_STREAM_ERROR_FAILED,
+           "The events pause for more than a minute; skipping the pictures of pauses."},
+          "pause of " + std::to_string((interval->end - interval->start) / GST_SECOND) + " s");
+    interval->end = interval->start + shown_pause;
+  }
+  if (approach(buffer, *interval)) return push_next_picture();
+  std::optional<GstClockTime> due;
+  if (times_) due = times_->events().end;
+  bool all = false;
+  {
+    const MappedEvents mapped(buffer);
+    if (!mapped) {
+      warn(EventFault::partial_event, buffer);
+      drop_buffer();
+      return GST_AGGREGATOR_FLOW_NEED_DATA;
+    }
+    all = add_events(mapped, *interval, due, buffer);
+  }
+  known_ = std::max(known_, interval->end);
+  if (due && (!all || interval->end + event_resolution > *due)) return push_next_picture();
+  drop_buffer();
+  if (state_->has_framerate() || interval->end <= segment_of(main_pad()).start)
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  return push_picture(*interval, *interval);
+}
+
+/// Starts the first picture now, because the live source has not sent events.
+void EventPictures::begin_now() {
+  const GstSegment segment = segment_of(main_pad());
+  const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(element()));
+  const guint64 position = gst_segment_position_from_running_time(&segment, GST_FORMAT_TIME, now);
+  if (!GST_CLOCK_TIME_IS_VALID(position) || !state_->has_framerate()) return;
+  GST_DEBUG_OBJECT(element(), "no events yet: first picture at %" GST_TIME_FORMAT,
+                   GST_TIME_ARGS(position));
+  begin_pictures(position);
+}
+
+GstFlowReturn EventPictures::aggregate(bool timed_out) {
+  GstAggregatorPad* pad = main_pad();
+  if (timed_out) waiting_since_.reset();  // if no picture can start yet, wait again
+  if (!state_ || !state_->video) {
+    if (has_ended(pad)) return GST_FLOW_EOS;
+    return gst_aggregator_pad_has_buffer(pad) ? GST_FLOW_NOT_NEGOTIATED
+                                              : GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
+  if (const auto buffer = next_buffer(pad)) return handle_buffer(buffer.get());
+  if (has_ended(pad)) return has_begun_picture() ? push_next_picture() : GST_FLOW_EOS;
+  if (!timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  if (times_) return push_next_picture();
+  begin_now();
+  return GST_AGGREGATOR_FLOW_NEED_DATA;
+}
+
+GstClockTime EventPictures::next_time() {
+  if (!state_) return GST_CLOCK_TIME_NONE;
+  if (times_)
+    return running_time(main_pad(), times_->picture().start).value_or(GST_CLOCK_TIME_NONE);
+  const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(element()));
+  if (!waiting_since_ && GST_CLOCK_TIME_IS_VALID(now)) waiting_since_ = now;
+  return waiting_since_ ? *waiting_since_ + max_wait : GST_CLOCK_TIME_NONE;
+}
+
+/* pictures */
+
+/// Skips a picture that sinks would drop anyway. False if it must be drawn.
+bool EventPictures::skip(const EventInterval& picture) {
+  const auto time = running_time(main_pad(), picture.start);
+  if (!qos.count_skipped(time)) return false;
+  discontinuous_ = true;
+  GST_DEBUG_OBJECT(element(), "downstream is late: skipped the picture at %" GST_TIME_FORMAT,
+                   GST_TIME_ARGS(picture.start));
+  const GstSegment segment = segment_of(main_pad());
+  const GstClockTime stream_time =
+      gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, picture.start);
+  gst_element_post_message(GST_ELEMENT(element()),
+                           qos.message(GST_ELEMENT(element()), picture, *time, stream_time));
+  return true;
+}
+
+GstFlowReturn EventPictures::draw(const EventInterval& events, GstBuffer* buffer) {
+  state_->renderer.configure(render_settings());
+  const VideoFrame frame(*state_->video, buffer, GST_MAP_WRITE);
+  if (!frame) {
+    GST_ELEMENT_ERROR(element(), RESOURCE, FAILED,
+                      ("Cannot draw into an output buffer: %s. Check the element downstream.",
+                       frame.fault().c_str()),
+                      ("%" GST_PTR_FORMAT, buffer));
+    return GST_FLOW_ERROR;
+  }
+  state_->renderer.draw(window_start(events), static_cast<Microseconds>(events.end / 1000),
+                        pixel_layout_of(*state_->video), frame.data(), frame.stride());
+  return GST_FLOW_OK;
+}
+
+GstFlowReturn EventPictures::acquire_buffer(GstBuffer** buffer) {
+  GstBufferPool* pool = gst_aggregator_get_buffer_pool(element());
+  if (pool == nullptr) return GST_FLOW_NOT_NEGOTIATED;
+  GstFlowReturn result = GST_FLOW_ERROR;
+  if (gst_buffer_pool_set_active(pool, TRUE))  // GstAggregator does not activate it
+    result = gst_buffer_pool_acquire_buffer(pool, buffer, nullptr);
+  else
+    GST_ELEMENT_ERROR(element(), RESOURCE, SETTINGS,
+                      ("Cannot get output buffers; add a queue or a videoconvert downstream."),
+                      ("gst_buffer_pool_set_active() failed for %" GST_PTR_FORMAT, pool));
+  gst_object_unref(pool);
+  return result;
+}
+
+/// Draws the state at the end of an interval and pushes it. May throw.
+GstFlowReturn EventPictures::push_picture(const EventInterval& events,
+                                          const EventInterval& picture) {
+  if (skip(picture)) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  GstBuffer* acquired = nullptr;
+  GstFlowReturn result = acquire_buffer(&acquired);
+  if (result != GST_FLOW_OK) return result;
+  OwnedBuffer buffer(acquired);
+  result = draw(events, acquired);
+  if (result != GST_FLOW_OK) return result;
+  GST_BUFFER_PTS(acquired) = picture.start;
+  GST_BUFFER_DTS(acquired) = GST_CLOCK_TIME_NONE;
+  GST_BUFFER_DURATION(acquired) = picture.end - picture.start;
+  if (std::exchange(discontinuous_, false)) GST_BUFFER_FLAG_SET(acquired, GST_BUFFER_FLAG_DISCONT);
+  GST_LOG_OBJECT(element(),
+                 "picture at %" GST_TIME_FORMAT " of the events from %" GST_TIME_FORMAT
+                 " to %" GST_TIME_FORMAT,
+                 GST_TIME_ARGS(picture.start), GST_TIME_ARGS(events.start),
+                 GST_TIME_ARGS(events.end));
+  return push(std::move(buffer));
+}
+
+/// Draws the next picture and pushes it. May throw.
+GstFlowReturn EventPictures::push_next_picture() {
+  const EventInterval events = times_->events();
+  const EventInterval picture = times_->picture();
+  const GstSegment segment = segment_of(main_pad());
+  if (GST_CLOCK_TIME_IS_VALID(segment.stop) && picture.start >= segment.stop) return GST_FLOW_EOS;
+  times_->next();
+  return push_picture(events, picture);
+}
+
+/// True if there is input for the next picture.
+bool EventPictures::has_begun_picture() const {
+  return state_ && state_->video && times_ && known_ > times_->events().start + event_resolution;
+}
+
+/// Pushes the incomplete last picture before a change. May throw.
+void EventPictures::drain() {
+  if (has_begun_picture()) push_next_picture();
+}
+
+/* negotiation */
+
+GstFlowReturn EventPictures::choose_caps(GstCaps* downstream, GstCaps** result) const {
+  if (!state_) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  GstCaps* ours = gst_pad_get_pad_template_caps(GST_AGGREGATOR_SRC_PAD(element()));
+  ours = gst_caps_make_writable(ours);
+  gst_caps_set_simple(ours, "width", G_TYPE_INT, state_->renderer.width(), "height", G_TYPE_INT,
+                      state_->renderer.height(), nullptr);
+  *result = gst_caps_intersect_full(downstream, ours, GST_CAPS_INTERSECT_FIRST);
+  gst_caps_unref(ours);
+  if (!gst_caps_is_empty(*result)) return GST_FLOW_OK;
+  GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
+                    ("Cannot draw: the sensor has %dx%d pixels, and downstream does not take "
+                     "pictures of that size in a format of this element. Insert eventscale before "
+                     "this element, or videoconvertscale after it.",
+                     state_->renderer.width(), state_->renderer.height()),
+                    ("downstream takes %" GST_PTR_FORMAT, downstream));
+  return GST_FLOW_NOT_NEGOTIATED;
+}
+
+bool EventPictures::set_video(const GstCaps* caps) {
+  GstVideoInfo video;
+  if (!state_ || !gst_video_info_from_caps(&video, caps)) return false;
+  state_->video = video;
+  if (times_) {
+    const GstClockTime start = times_->picture().start;
+    times_.reset();
+    if (state_->has_framerate()) begin_pictures(start);
+  }
+  const GstClockTime latency = frame_duration(video);
+  GST_DEBUG_OBJECT(element(), "drawing %" GST_PTR_FORMAT ", latency %" GST_TIME_FORMAT, caps,
+                   GST_TIME_ARGS(latency));
+  gst_aggregator_set_latency(element(), latency, latency);
+  return true;
+}
+
+bool EventPictures::handle_caps(GstAggregatorPad*, GstCaps* caps) {
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
+  if (state_ && state_->width == info.width && state_->height == info.height) return true;
+  drain();
+  state_.reset();  // before allocating the next: pictures can be large
+  state_.emplace(
+      State{info.width, info.height, Renderer(info.width, info.height, render_settings())});
+  gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
+  return true;
+}
+
+/* segments, states */
+
+void EventPictures::handle_segment(const GstSegment& segment) {
+  if (continues(segment_of(main_pad()), segment)) return;
+  drain();
+  start_over();
+}
+
+/// Forgets all events, because the next input is discontinuous. May throw.
+void EventPictures::start_over() {
+  if (state_) state_->renderer.reset();
+  discontinuous_ |= times_.has_value();
+  times_.reset();
+  taken_.reset();
+  known_ = 0;
+  waiting_since_.reset();
+}
+
+void EventPictures::flush() {
+  qos.start_over();
+  start_over();
+}
+
+void EventPictures::stop() {
+  state_.reset();
+  flush();
+  discontinuous_ = false;
+  warn_of_pause_.reset();
+  qos.reset_counts();
+}
+
+namespace {
+
+/// Consumes QoS events, because upstream would skip events.
+gboolean src_event(GstAggregator* element, GstEvent* event) {
+  if (GST_EVENT_TYPE(event) != GST_EVENT_QOS)
+    return GST_AGGREGATOR_CLASS(g_type_class_peek(GST_TYPE_EVENT_AGGREGATOR))
+        ->src_event(element, event);
+  aggregator_impl<EventPictures>(element).qos.handle_event(event);
+  gst_event_unref(event);
+  return TRUE;
+}
+
+GstCaps* fixate_src_caps(GstAggregator*, GstCaps* caps) {
+  caps = gst_caps_make_writable(caps);
+  gst_structure_fixate_field_nearest_fraction(gst_caps_get_structure(caps, 0), "framerate", 30, 1);
+  return gst_caps_fixate(caps);
+}
+
+gboolean decide_allocation(GstAggregator*, GstQuery* query) {
+  GstCaps* caps = nullptr;
+  gst_query_parse_allocation(query, &caps, nullptr);
+  return decide_on_drawn_pool(query, caps);
+}
+
+}  // namespace
+
+void init_pictures_class(GstEventAggregatorClass* klass, const char* formats) {
+  GST_DEBUG_CATEGORY_INIT(event_pictures_debug, "eventpictures", 0, "video of events");
+  add_aggregator_pad_template(klass, "sink", GST_PAD_SINK, EVENT_CAPS);
+  const std::string video = std::string("video/x-raw, format = (string) ") + formats +
+                            ", " SIZE_CAPS
+                            ", framerate = (fraction) [ 0, max ], "
+                            "pixel-aspect-ratio = (fraction) 1/1";
+  add_aggregator_pad_template(klass, "src", GST_PAD_SRC, video.c_str());
+
+  GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
+  aggregator_class->src_event = src_event;
+  aggregator_class->fixate_src_caps = fixate_src_caps;
+  aggregator_class->decide_allocation = decide_allocation;
+  aggregator_class->update_src_caps = [](GstAggregator* element, GstCaps* caps, GstCaps** result) {
+    return aggregator_impl<EventPictures>(element).choose_caps(caps, result);
+  };
+  aggregator_class->negotiated_src_caps = [](GstAggregator* element, GstCaps* caps) -> gboolean {
+    return aggregator_impl<EventPictures>(element).set_video(caps);
+  };
+}

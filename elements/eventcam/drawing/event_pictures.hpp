@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/video/video.h>
+
+#include <optional>
+
+#include "elements/eventcam/drawing/frame_times.hpp"
+#include "elements/eventcam/drawing/picture_qos.hpp"
+#include "gst/aggregator/eventaggregator.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/event_faults.hpp"
+#include "src/render/renderer.hpp"
+
+/// Video of an event stream, at the framerate that downstream requests. A subclass chooses what the
+/// pictures show.
+class EventPictures : public EventAggregator {
+ public:
+  explicit EventPictures(GstAggregator* element);
+
+  void stop() override;
+  void flush() override;
+  void release_memory() noexcept override { state_.reset(); }
+  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  void handle_segment(const GstSegment& segment) override;
+  GstFlowReturn aggregate(bool timed_out) override;
+  GstClockTime next_time() override;
+
+  GstFlowReturn choose_caps(GstCaps* downstream, GstCaps** result) const;
+  bool set_video(const GstCaps* caps);
+
+  PictureQos qos;
+
+ protected:
+  /// Settings of the next picture.
+  virtual eventcamera::RenderSettings render_settings() const = 0;
+  /// Start of the window for the picture of an interval.
+  virtual eventcamera::Microseconds window_start(const EventInterval& interval) const {
+    return static_cast<eventcamera::Microseconds>(interval.start / 1000);
+  }
+
+ private:
+  /// State from caps to stop.
+  struct State {
+    int width;  ///< of the sensor
+    int height;
+    eventcamera::Renderer renderer;
+    std::optional<GstVideoInfo> video{};  ///< output format, once negotiated
+
+    bool has_framerate() const { return GST_VIDEO_INFO_FPS_N(&*video) > 0; }
+  };
+
+  void drain();
+  void start_over();
+  bool approach(GstBuffer* buffer, const EventInterval& interval);
+  bool add_events(const MappedEvents& mapped, const EventInterval& interval,
+                  std::optional<GstClockTime> end, GstBuffer* buffer);
+  GstFlowReturn handle_buffer(GstBuffer* buffer);
+  void drop_buffer();
+  void begin_pictures(GstClockTime start) {
+    times_.emplace(start, *state_->video, segment_of(main_pad()).rate);
+  }
+  void begin_now();
+  bool skip(const EventInterval& picture);
+  bool has_begun_picture() const;
+  GstFlowReturn acquire_buffer(GstBuffer** buffer);
+  GstFlowReturn draw(const EventInterval& events, GstBuffer* buffer);
+  GstFlowReturn push_picture(const EventInterval& events, const EventInterval& picture);
+  GstFlowReturn push_next_picture();
+
+  std::optional<State> state_;
+  std::optional<FrameTimes> times_;  // interval of the next picture, once the first event is near
+  std::optional<gsize> taken_;       // number of processed events of the first queued buffer
+  GstClockTime known_ = 0;           // time up to which events are complete
+  std::optional<GstClockTime> waiting_since_;  // for the first event; running time
+  bool discontinuous_ = false;                 // the next picture is discontinuous
+  WarnOnce warn_of_pause_;
+};
+
+/// For class_init: pads and functions of an element of EventPictures, in video formats `formats`.
+void init_pictures_class(GstEventAggregatorClass* klass, const char* formats);
