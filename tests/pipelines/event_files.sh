@@ -65,7 +65,7 @@ done
 gst-typefind-1.0 n-mnist.bin | grep -q " - application/x-atis-bin" || fail "n-mnist.bin is not recognised"
 
 # A file of MATLAB, by the line of the documentation.
-eval "$(grep "^python3 .*loadmat" "$SOURCE/docs/formats.md" | sed 's#^#/usr/bin/#')"
+eval "$(grep "^/usr/bin/python3 .*loadmat" "$SOURCE/docs/formats.md")"
 convert n-mnist.npz matlab.csv
 cmp n-mnist.bin.lines matlab.csv || fail "n-mnist.mat has other events"
 
