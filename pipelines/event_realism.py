@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 # Imported first: it reports missing packages.
 from event_streams import (GLib, Gst, Sensor, Span, compare, expect_writable, png_of, read_mask, read_recording,
-                           read_video, seconds)
+                           read_video, reconstruct, seconds)
 import numpy as np
 from plugins import find_plugins
 
@@ -64,7 +64,20 @@ def spread_by_chance(sensor, events):
     return np.sqrt(2 * np.mean(np.square(differences), axis=0))
 
 
-def table_of(sensor, real, simulated):
+def similarity(a, b):
+    """Mean structural similarity (SSIM; Wang et al., IEEE TIP 2004) of pictures, in windows of 8 x 8 pixels."""
+    def mean(values):
+        sums = np.pad(values.cumsum(axis=1).cumsum(axis=2), ((0, 0), (1, 0), (1, 0)))
+        return (sums[:, 8:, 8:] - sums[:, 8:, :-8] - sums[:, :-8, 8:] + sums[:, :-8, :-8]) / 64
+
+    mean_a, mean_b = mean(a), mean(b)
+    variances = mean(a * a) - mean_a ** 2 + mean(b * b) - mean_b ** 2
+    covariance = mean(a * b) - mean_a * mean_b
+    return np.mean((2 * mean_a * mean_b + 1e-4) * (2 * covariance + 9e-4)
+                   / ((mean_a ** 2 + mean_b ** 2 + 1e-4) * (variances + 9e-4)))
+
+
+def table_of(sensor, real, simulated, span):
     """The rows of the table."""
     first = simulated[0].figures
     ceiling = first["noise-ceiling"]
@@ -85,6 +98,11 @@ def table_of(sensor, real, simulated):
                         [False] * len(simulated)))
     rows.append(Row("map correlation", "—", [f"{stream.figures['map-correlation']:.3f}" for stream in simulated],
                     [False] * len(simulated)))
+    if min(sensor.width, sensor.height) >= 8:
+        pictures = reconstruct(sensor, real.events, span)
+        rows.append(Row("similarity of reconstructions", "—",
+                        [f"{similarity(pictures, reconstruct(sensor, stream.events, span)):.3f}" for stream in simulated],
+                        [False] * len(simulated)))
     values = [stream.figures["rate-correlation"] for stream in simulated]
     rows.append(Row("rate correlation, 1 ms", f"{ceiling['rate-correlation']:.3f}",
                     [f"{value:.3f}" for value in values],
@@ -354,7 +372,7 @@ def main():
     travels = travels_of(args.video, sensor, span) if args.html and args.video else None
     for stream in simulated:
         stream.figures = compare(sensor, real.events, stream.events, span)
-    rows = table_of(sensor, real, simulated)
+    rows = table_of(sensor, real, simulated, span)
     print_table(real, simulated, rows)
     if args.html:
         page = page_of(sensor, real, simulated, rows, charts_of(sensor, real, simulated, travels))

@@ -224,6 +224,9 @@ def decode(path, start, end):
         for sample in pipeline.samples():
             buffer = sample.get_buffer()
             if not video.frames:
+                source = pipeline.element("decoded").get_static_pad("sink").get_peer().get_target()
+                if source.get_parent_element().get_factory().get_name() == "eventrender":
+                    raise RuntimeError(f"{path}: events without frames; give the video of the scene, too")
                 video.caps = sample.get_caps().to_string()
                 info = sample.get_caps().get_structure(0)
                 video.width, video.height = info.get_value("width"), info.get_value("height")
@@ -302,21 +305,37 @@ def simulate(video, element):
     return video.visible(video.of_camera(events))
 
 
-def compare(sensor, recorded, simulated, span, picture=None):
-    """The figures of eventcompare over a time span."""
+def feed_of(name, sensor, events, span):
+    """The events of a time span, for samples_of()."""
     caps = (f"application/x-event-camera,format=XYTP,width={sensor.width},height={sensor.height},"
             "framerate=0/1")
     # A span that includes the time 0 starts before it, where there is no PTS.
     shift = max(0, -span.start)
-    feeds = []
-    for name, events in (("recorded", recorded), ("simulated", simulated)):
-        buffers = []
-        for start in range(span.start, span.end, MAX_BUFFER):
-            end = min(start + MAX_BUFFER, span.end)
-            part = Span(start, end).of(events).copy()
-            part["t"] += shift
-            buffers.append(buffer_of(part, start + shift, end - start))
-        feeds.append((name, caps, buffers))
+    buffers = []
+    for start in range(span.start, span.end, MAX_BUFFER):
+        end = min(start + MAX_BUFFER, span.end)
+        part = Span(start, end).of(events).copy()
+        part["t"] += shift
+        buffers.append(buffer_of(part, start + shift, end - start))
+    return name, caps, buffers
+
+
+def reconstruct(sensor, events, span):
+    """Grey pictures of the brightness, 20 a second, from 0 to 1, by picture, row and column."""
+    samples = samples_of("appsrc name=events format=time ! eventreconstruct ! video/x-raw,format=GRAY8,framerate=20/1"
+                         " ! appsink name=out sync=false", [feed_of("events", sensor, events, span)])
+    stride = -(-sensor.width // 4) * 4
+    pictures = []
+    for sample in samples:
+        buffer = sample.get_buffer()
+        rows = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), np.uint8).reshape(-1, stride)
+        pictures.append(rows[:, :sensor.width] / 255)
+    return np.array(pictures)
+
+
+def compare(sensor, recorded, simulated, span, picture=None):
+    """The figures of eventcompare over a time span."""
+    feeds = [feed_of("recorded", sensor, recorded, span), feed_of("simulated", sensor, simulated, span)]
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "figures.json")
         drawn = f" map={quoted(picture)}" if picture else ""

@@ -3,8 +3,8 @@
 from gi.repository import Gst
 
 
-def find_plugins():
-    for plugin in ("eventcam", "eventsim"):
+def find_plugins(names=("eventcam", "eventsim")):
+    for plugin in names:
         if not Gst.Registry.get().find_plugin(plugin):
             raise RuntimeError(
                 f"GStreamer does not find the plugin {plugin}. In a checkout, enter the development shell:"

@@ -63,7 +63,7 @@ used() {
   try event-calibrate --version
   try event-realism --version
   try event-dataset --version
-  for program in event-convert event-dataset event-thumbnail web-events rtsp-events virtual-camera; do try man --whatis $program; done
+  for program in event-convert event-info event-dataset event-thumbnail web-events rtsp-events virtual-camera; do try man --whatis $program; done
   try test -s /usr/share/doc/gsteventcamera-1.0/struct.Info.html
   try pkg-config --exists --print-errors gsteventcamera-1.0
   try cc /usr/share/doc/libgsteventcamera-1.0-dev/examples/count_events.c -o count_events $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)

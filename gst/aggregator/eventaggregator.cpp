@@ -73,6 +73,13 @@ std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime tim
   return running;
 }
 
+GstClockTime EventAggregator::next_main_time() const {
+  const auto buffer = next_buffer(main_pad_);
+  if (!buffer) return has_ended(main_pad_) ? 0 : GST_CLOCK_TIME_NONE;
+  if (!GST_BUFFER_PTS_IS_VALID(buffer.get())) return 0;
+  return running_time(main_pad_, GST_BUFFER_PTS(buffer.get())).value_or(0);
+}
+
 /// Sends an event upstream from all sink pads. Returns true if all accept it.
 static gboolean forward(GstAggregator* element, GstEvent* event) {
   bool taken = true;

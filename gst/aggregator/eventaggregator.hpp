@@ -7,7 +7,6 @@
 #include <optional>
 #include <vector>
 
-#include "gst/aggregator/segment_end.hpp"
 #include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/event_faults.hpp"
 #include "gst/base/owned.hpp"
@@ -72,6 +71,9 @@ class EventAggregator {
   GstAggregatorPad* pad(const char* name) const;
   /// The main pad; null if pads are requested.
   GstAggregatorPad* main_pad() const { return main_pad_; }
+  /// A next_time() that passes the next live buffer of the main pad on time: at once if it has no
+  /// time, and at the end of the stream.
+  GstClockTime next_main_time() const;
 
   /// Sets the segment of the output. GstAggregator sends it with the next buffer.
   void set_segment(const GstSegment& segment);
@@ -142,6 +144,12 @@ Impl& aggregator_impl(gpointer element) {
   return static_cast<Impl&>(gst_event_aggregator_impl(GST_EVENT_AGGREGATOR(element)));
 }
 
+/// The member `settings` of an element's EventAggregator, for Properties.
+template <class Impl>
+auto& aggregator_settings(GObject* object) {
+  return aggregator_impl<Impl>(object).settings;
+}
+
 /// For class_init: adds the template of an always pad.
 inline void add_aggregator_pad_template(GstEventAggregatorClass* klass, const char* name,
                                         GstPadDirection direction, const char* caps) {
@@ -149,8 +157,8 @@ inline void add_aggregator_pad_template(GstEventAggregatorClass* klass, const ch
                    GST_TYPE_AGGREGATOR_PAD);
 }
 
-/// Defines and registers the type of an element with an EventAggregator of class `Impl`, which
-/// must have a member `settings`. The type's class_init must follow.
+/// Defines and registers the type of an element with an EventAggregator of class `Impl`. The type's
+/// class_init must follow.
 #define DEFINE_EVENT_AGGREGATOR(Type, type, OBJECT, Impl, element, rank, description)         \
   G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventAggregator)                           \
   struct _##Type {                                                                            \
@@ -162,7 +170,4 @@ inline void add_aggregator_pad_template(GstEventAggregatorClass* klass, const ch
   /* A type takes no parentheses: NOLINTNEXTLINE(bugprone-macro-parentheses) */               \
   static void type##_init(Type* self) {                                                       \
     gst_event_aggregator_make<Impl>(GST_EVENT_AGGREGATOR(self));                              \
-  }                                                                                           \
-  static auto& settings_of(GObject* object) {                                                 \
-    return aggregator_impl<Impl>(object).settings;                                            \
   }

@@ -39,13 +39,13 @@ class ByteCursor {
     return field;
   }
 
-  /// Bytes that their number precedes.
+  /// Bytes preceded by their number.
   template <class Size>
   std::span<const std::uint8_t> sized_bytes() {
     return bytes(number<Size>());
   }
 
-  /// Text that its size, 32 bits, precedes.
+  /// Text preceded by its size, 32 bits.
   std::string_view text() {
     const auto field = sized_bytes<std::uint32_t>();
     return {reinterpret_cast<const char*>(field.data()), field.size()};

@@ -10,17 +10,62 @@
 #include <vector>
 
 #include "src/core/label.hpp"
-#include "src/formats/unsettled_events.hpp"
 
 namespace eventcamera {
+
+/// Events at the start of a file or after a jump of the clock, until later ones show which times
+/// are right.
+///
+/// Times that continue for `settled` are right; so are single, increasing ones far apart. Times
+/// that the following events do not continue are stray: of one event, after a flipped bit, or of a
+/// few.
+class UnsettledEvents {
+ public:
+  /// Exceeds the disorder of sensors, and the time that a clock stays wrong after a flipped bit.
+  static constexpr Microseconds settled = 10'000;
+
+  bool empty() const { return first_.empty(); }
+
+  /// True if `t` is near the time of an event among these.
+  bool is_near(Microseconds t) const { return is_near(t, first_) || is_near(t, second_); }
+
+  /// Adds an event. Returns the events known to be right by now, valid until the next call. A
+  /// single event at the start of a file, long before many others, is stray.
+  std::span<const AbsoluteEvent> push(const AbsoluteEvent& event, bool is_start);
+
+  /// Declares that nothing earlier than `t` will follow. Returns as push().
+  std::span<const AbsoluteEvent> settle_before(Microseconds t);
+
+  /// Declares the end of the events. Returns as push().
+  std::span<const AbsoluteEvent> finish();
+
+  /// Drops all of these as stray, because the earlier times continue.
+  void drop();
+
+  /// Number of stray events.
+  std::uint64_t stray() const { return stray_; }
+
+ private:
+  using Events = std::vector<AbsoluteEvent>;
+
+  static bool is_near(Microseconds t, const Events& events);
+  static bool is_long(const Events& events);
+  void settle(Events& events);
+  void drop(Events& events);
+
+  Events first_;   ///< a run of events close in time
+  Events second_;  ///< another, if the clock jumped in either direction
+  Events right_;   ///< returned
+  std::uint64_t stray_ = 0;
+};
 
 /// Cuts the events of a recording into intervals of equal length, each sorted by time. Events
 /// with the same time keep the order in which they came. Times are whole microseconds, rounded
 /// down, so an interval includes its start and excludes its end.
 ///
-/// Events may be out of order by up to `settled`; those later by more whose interval is over are
-/// dropped, and so are events whose times the following ones do not continue, as after a flipped
-/// bit. Neither depends on how the events are divided between calls.
+/// Events may be out of order by up to `settled`. Later ones are dropped if their interval is over;
+/// so are events whose times the following ones do not continue, as after a flipped bit. Neither
+/// depends on how the events are divided between calls.
 class Chunker {
  public:
   static constexpr Microseconds settled = UnsettledEvents::settled;
@@ -33,7 +78,7 @@ class Chunker {
   struct Interval {
     Microseconds start;
     Microseconds duration;  ///< 0 if it has a single time, of which more events may follow
-    /// Sorted, with times from the start; valid until next(). None: a silence, of any length.
+    /// Sorted, timed from the start; valid until next(). None: a silence of any length.
     std::span<const Event> events;
     std::span<const Label> labels;  ///< as many as events, or none
   };
@@ -43,7 +88,7 @@ class Chunker {
     std::uint64_t stray = 0;  ///< with an erroneous time
   };
 
-  /// Where it became certain that the events are not sorted by time.
+  /// Evidence that the events are not sorted by time.
   struct Disorder {
     std::uint64_t row;  ///< number of the first event that showed it, counted from 1
     std::uint64_t dropped;
@@ -53,11 +98,11 @@ class Chunker {
   /// The first interval begins at the first event.
   explicit Chunker(Microseconds length) : length_(length) {}
 
-  /// The first interval begins at `start`; earlier events are ignored from `origin` on, and late
-  /// before it.
+  /// The first interval begins at `start`. Earlier events are ignored, and counted as late if they
+  /// precede `origin`.
   Chunker(Microseconds length, Microseconds start, Microseconds origin);
 
-  /// Whether the next events carry labels, which are then returned with them.
+  /// Returns the labels of the next events with them, if `kept`.
   void keep_labels(bool kept) { keeps_labels_ = kept; }
 
   /// Ends a pause.
@@ -66,7 +111,7 @@ class Chunker {
   /// Declares that nothing earlier than `t` will follow.
   void advance_to(Microseconds t);
 
-  /// Declares a pause up to `t`: the events that wait are returned. Earlier ones may still follow.
+  /// Declares a pause up to `t`: waiting events are returned. Earlier ones may still follow.
   void pause(Microseconds t);
 
   /// Declares the end of the events.
@@ -87,8 +132,7 @@ class Chunker {
 
   Dropped dropped() const { return {late_, stray_ + unsettled_.stray()}; }
 
-  /// Set if more than one event in a hundred was dropped: so far, but for the first hundred
-  /// dropped, or once finished.
+  /// Set if more than one event in a hundred was dropped, once finished or after a hundred drops.
   std::optional<Disorder> disorder() const;
 
  private:

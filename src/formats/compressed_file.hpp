@@ -14,8 +14,8 @@
 
 namespace eventcamera {
 
-/// Decompresses a file that gzip or zstd has compressed, such as events.csv.gz; other files are
-/// returned as they are. The first bytes of the file tell.
+/// Decompresses a file compressed with gzip or zstd, such as events.csv.gz, recognised by its first
+/// bytes; returns other files unchanged.
 ///
 ///     decompressor.push(piece);
 ///     while (!decompressor.next().empty()) ...
@@ -38,11 +38,11 @@ class FileDecompressor {
 
   bool is_compressed() const { return codec_ != nullptr; }
 
-  /// Position in the compressed file from which on it cannot be read, as it is corrupt or cut
-  /// short.
+  /// Position in the compressed file where it is corrupt or cut short; nothing can be read from
+  /// there on.
   std::optional<std::uint64_t> corrupt_at() const { return corrupt_at_; }
 
-  /// True if the first bytes of a file are those of a compressed one.
+  /// True if a file with these first bytes is compressed.
   static bool is_compressed(std::span<const std::uint8_t> start);
 
   /// Bytes that is_compressed() needs.
@@ -66,7 +66,7 @@ class FileDecompressor {
   ExpansionLimit expansion_{256};
 };
 
-/// A compressed file as a source of its content, which is decompressed to a temporary file.
+/// Random access to the content of a compressed file, decompressed to a temporary file.
 class DecompressedFile final : public ByteSource {
  public:
   /// `compressed` must outlive this object.
@@ -76,7 +76,7 @@ class DecompressedFile final : public ByteSource {
   /// False if reading fails. Throws UnsupportedFormat and TemporaryFileError.
   bool decompress();
 
-  /// As of FileDecompressor.
+  /// As FileDecompressor::corrupt_at().
   std::optional<std::uint64_t> corrupt_at() const { return decompressor_.corrupt_at(); }
 
   std::uint64_t size() const override { return content_.size(); }

@@ -37,8 +37,8 @@ class Encoder {
   /// stores.
   virtual std::size_t label(std::span<const Label> /*labels*/) { return 0; }
 
-  /// Appends an encoded trigger, which is not earlier than anything before it. False if the format
-  /// has no triggers, or none of this input.
+  /// Appends an encoded trigger, which must not precede anything written. False if the format has
+  /// no triggers, or none of this input.
   bool encode_trigger(const Trigger& trigger, std::vector<std::uint8_t>& out) {
     put_header(out);
     return append_trigger(trigger, out);

@@ -43,7 +43,7 @@ struct ColumnName {
 /// '(' on is ignored.
 std::optional<ColumnName> column_named(std::string_view name);
 
-/// Times with a fraction are rounded down to microseconds, unless the next one is at most so far:
+/// Times with a fraction are rounded down to microseconds, or up to one at most this far above:
 /// programs print and store 33e-6 s as slightly less.
 constexpr double max_rounding_up = 0.25;
 
@@ -54,7 +54,7 @@ using Columns = std::vector<std::optional<EventColumn>>;
 /// p occurs exactly once.
 std::optional<Columns> columns_of(std::string_view letters);
 
-/// Label from the numbers of its columns; 0 is unknown, and so is what a label cannot hold.
+/// Label from the numbers of its columns; numbers that a label cannot hold become 0, unknown.
 inline Label label_from(std::int64_t cause, std::int64_t object_class) {
   const bool is_cause = cause >= 0 && cause <= UINT8_MAX;
   const bool is_class = object_class >= 0 && object_class <= UINT16_MAX;
@@ -69,7 +69,7 @@ class PolarityCode {
   void count(double number);
 
   /// Chooses between 1 = ON, with 0 or -1 for OFF, and 2 = ON with 1 = OFF, by the counted numbers.
-  /// Throws UnsupportedFormat, which names them, if they do not tell.
+  /// Throws UnsupportedFormat, which lists them, if they are ambiguous.
   void choose();
 
   bool is_one_two() const { return on_ == 2; }
@@ -92,13 +92,13 @@ class PolarityCode {
   std::uint64_t rows_ = 0;
   std::array<std::uint64_t, 3> counts_{};  ///< of 0, 1 and 2
   std::uint64_t minus_ones_ = 0;
-  std::uint64_t unsigned_ = 0;  ///< of them
+  std::uint64_t unsigned_ = 0;  ///< -1 as an unsigned number
   std::string others_;          ///< some of the other numbers
   std::uint64_t other_rows_ = 0;
 };
 
-/// Counts rows that are not events. A table with more than one in a hundred is refused: it is
-/// probably not what it was taken for.
+/// Counts rows that are not events. A table with more than one in a hundred is refused: it probably
+/// has another format.
 class UnreadableRows {
  public:
   void count(std::uint64_t rows) { rows_ += rows; }

@@ -7,8 +7,8 @@
 
 namespace eventcamera {
 
-/// Limits what a file decompresses to, as a few kilobytes of zeros would take minutes: 256 MiB and
-/// `max_ratio` times what was compressed.
+/// Limits the decompressed size of a file, because a few kilobytes of zeros would take minutes: to
+/// 256 MiB plus `max_ratio` times the compressed size.
 class ExpansionLimit {
  public:
   explicit ExpansionLimit(std::uint64_t max_ratio = of_pictures) : max_ratio_(max_ratio) {}
@@ -23,8 +23,8 @@ class ExpansionLimit {
   void count(std::size_t bytes) { allowed_ -= std::min<std::uint64_t>(bytes, allowed_); }
 
  private:
-  /// Pictures of cameras reach a hundred. Black ones reach 13,000, and use up the 256 MiB in some
-  /// hundred pictures.
+  /// Camera frames reach a ratio of 100. Black ones reach 13,000, and use up the 256 MiB in a few
+  /// hundred frames.
   static constexpr std::uint64_t of_pictures = 2048;
 
   std::uint64_t max_ratio_;

@@ -8,7 +8,6 @@
 #include "src/formats/atis/atis_bin.hpp"
 #include "src/formats/magic.hpp"
 #include "src/formats/prophesee_header.hpp"
-#include "src/formats/ros/bag_magic.hpp"
 #include "src/formats/text/csv_decoder.hpp"
 #include "src/formats/text/utf8_text.hpp"
 #include "src/formats/unsupported_format.hpp"
@@ -99,9 +98,9 @@ Likelihood match_dat(Bytes bytes) {
   return matches ? Likelihood::high : Likelihood::none;
 }
 
-/// Matches text if its columns have names, or if CsvDecoder decodes some lines, and every one, as
-/// an event. An ambiguous time unit does not matter here, nor do events outside a sensor;
-/// they are reported when the file is read.
+/// Matches text whose columns have names, or that CsvDecoder decodes as several lines of events
+/// without exception. Ambiguous time units and events outside a sensor do not matter here; they are
+/// reported when the file is read.
 Likelihood match_csv(Bytes bytes) {
   constexpr std::size_t max_bytes = 4096;
   constexpr std::size_t min_events = 3;

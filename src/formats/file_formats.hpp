@@ -16,8 +16,8 @@ enum class Likelihood : std::uint8_t {
   certain,
 };
 
-/// A format of event files: a row of the table from which typefinders are registered, and in which
-/// readers and writers find their extensions.
+/// A format of event files: a row of the table that typefinders are registered from, and that
+/// readers and writers take their extensions from.
 struct FileFormat {
   const char* media_type;
   /// Extensions, separated by commas.
@@ -31,8 +31,8 @@ struct FileFormat {
   Likelihood (*match)(std::span<const std::uint8_t> start) = nullptr;
   /// Returns the field `version` of the caps, if they have one.
   int (*version)(std::span<const std::uint8_t> start) = nullptr;
-  /// False if only the order of the content tells the format: other formats precede it, and the
-  /// extension alone does not suffice.
+  /// False if only the structure of the content identifies the format: other formats are tried
+  /// first, and the extension alone does not suffice.
   bool has_signature = true;
 };
 

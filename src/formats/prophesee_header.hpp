@@ -26,7 +26,7 @@ class PropheseeHeader {
   /// Value of a key; empty if there is none.
   std::string value(const std::string& key) const;
 
-  /// Parses a number from 1 to `max`; 0 if it is not one.
+  /// Parses a number from 1 to `max`; 0 if the text is anything else.
   static int number(const std::string& text, int max);
 
  private:

@@ -15,7 +15,7 @@ namespace {
 
 /// A stream lagging by more than this is treated as silent.
 constexpr Microseconds max_lag = 500'000;
-/// Minimum length of a gap of such a stream. Queues of a second do not fill before.
+/// Minimum length of a gap in such a stream; shorter than the second that queues hold.
 constexpr Microseconds min_gap = 250'000;
 /// Wrap period of the EVT3 clock, the shortest of all; other formats have multiples of it.
 constexpr Microseconds clock_range = Microseconds{1} << 24;
@@ -26,14 +26,13 @@ constexpr std::uint64_t max_surveyed_bytes = std::uint64_t{1} << 24;
 /// Limits of held items, in bytes of memory (4 million events) and in time.
 constexpr std::size_t max_held = std::size_t{1} << 26;
 constexpr Microseconds max_hold = 1'000'000;
-/// Held items of a table, in bytes: so many are surveyed at least, and sorted at most (16 million
-/// events).
+/// Minimum surveyed and maximum sorted size of a table's held items, in bytes (16 million events).
 constexpr std::size_t min_surveyed_rows = std::size_t{1} << 20;
 constexpr std::size_t max_sorted = std::size_t{1} << 28;
 /// Sorted events returned at once.
 constexpr std::size_t sorted_block = std::size_t{1} << 12;
 
-/// True for streams that play by themselves; others accompany them.
+/// True for kinds of streams with a pad of their own; other items accompany events.
 constexpr bool is_shown(StreamKind kind) {
   return kind == StreamKind::events || kind == StreamKind::frames;
 }
@@ -235,8 +234,8 @@ void RecordingReader::learn_streams() {
 /* the start of a file */
 
 /// Pull mode: reads the start of the file, up to 16 MiB or 4 million events, and holds its items.
-/// Looks for streams that begin later by the index of the file or, without one, by reading on
-/// until there are events. False if bytes cannot be read.
+/// Finds streams that begin later by the file's index or, without one, by reading on until there
+/// are events. False if bytes cannot be read.
 bool RecordingReader::survey() {
   input_.restart(std::nullopt);
   streams_.clear();
@@ -276,7 +275,7 @@ bool RecordingReader::survey() {
   return true;
 }
 
-/// Disorder of a table that was not sorted.
+/// Disorder of a table that was not sorted yet.
 std::optional<Chunker::Disorder> RecordingReader::disorder() const {
   const bool may_be = input_.decoder().is_table() && !input_.is_sorted() && !streams_.empty();
   return may_be ? streams_.front().chunker.disorder() : std::nullopt;
@@ -601,7 +600,7 @@ void RecordingReader::add(const EventItem& item) {
   next_stream_ = 0;
 }
 
-/// Lets an assumed size grow with the events, other than a few far out.
+/// Enlarges an assumed size for the events, except a few far out.
 void RecordingReader::grow(Stream& stream, std::span<const AbsoluteEvent> events) {
   UsedPixels used;
   used.include(events);
@@ -675,9 +674,9 @@ std::optional<RecordingReader::Chunk> RecordingReader::next_chunk(std::size_t in
   return std::nullopt;
 }
 
-/// A gap in a stream that has ended before the end of the segment, or lags far behind the newest
-/// item, so that others need not wait for it long; before it, the events that wait. Later items of
-/// one that lags are still returned: the streams of some files are written one after the other.
+/// Returns a gap in a stream that has ended, or that lags far behind the newest item, so that
+/// others do not wait long for it; its waiting events precede the gap. Later items of a lagging
+/// stream are still returned: some files store their streams one after the other.
 std::optional<RecordingReader::Chunk> RecordingReader::next_gap() {
   for (std::size_t i = 0; i < streams_.size(); ++i) {
     auto& stream = streams_[i];

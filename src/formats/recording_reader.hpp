@@ -17,7 +17,6 @@
 #include "src/formats/byte_source.hpp"
 #include "src/formats/chunker.hpp"
 #include "src/formats/decoder.hpp"
-#include "src/formats/seek_points.hpp"
 #include "src/formats/sensor_sizes.hpp"
 #include "src/formats/waiting_items.hpp"
 
@@ -31,9 +30,8 @@ namespace eventcamera {
 /// surveyed first: this gives an exact or estimated duration, and the sensor size if the file does
 /// not state it.
 ///
-/// A table of which more than one row in a hundred is far out of order is sorted if the survey
-/// finds that and the table is not too large for memory; otherwise it is refused, wherever that is
-/// found.
+/// A table with more than one row in a hundred far out of order is sorted if the survey detects
+/// this and the table fits into memory; otherwise it is refused, even after events were returned.
 ///
 ///     recording.push(bytes);  // or open(), once
 ///     while (const auto output = recording.next()) ...
@@ -59,7 +57,7 @@ class RecordingReader {
     unsigned number = 0;                    ///< index among streams of its kind
     bool shown = false;                     ///< it has items, or may have some
     Microseconds position = 0;              ///< end of its items and gaps so far
-    std::optional<std::uint64_t> end = {};  ///< of its part of the segment in the file, if known
+    std::optional<std::uint64_t> end = {};  ///< of its items in the segment, in the file, if known
     std::uint64_t outside = 0;              ///< events outside a size not stated in the file
     std::optional<Frame> first_frame = {};  ///< format only: its pixels are no longer valid
     bool is_implausible = false;            ///< no sensor is as large as the assumed size
@@ -110,19 +108,19 @@ class RecordingReader {
   /// Push mode: marks the end of the bytes.
   void finish() { input_.finish(); }
 
-  /// Words: nothing earlier than `t` will follow.
+  /// Words: declares that nothing earlier than `t` will follow.
   void advance_to(Microseconds t);
 
-  /// Words: whether the time of the first event is known.
+  /// Words: true once the time of the first event is known.
   bool has_events() const { return streams_.front().chunker.first().has_value(); }
 
   /// Reads the pushed bytes and drops their items.
   void discard() { input_.discard(); }
 
-  /// Words: the next ones do not continue those before.
+  /// Words: the next ones start anew, with unknown state and times.
   void interrupt();
 
-  /// Words: the next ones do, but not the times of their intervals.
+  /// Words: the next ones continue the words, but not the times of the intervals.
   void begin_times();
 
   /// Pull mode: sets the source of bytes, which must outlive this object. Call before next().
@@ -132,8 +130,8 @@ class RecordingReader {
   /// cannot be read, and after the end. May throw.
   std::optional<Output> next();
 
-  /// Exchanges the memory of the events of the last chunk, whose stream this is, for other memory.
-  /// The events stay valid there.
+  /// Exchanges the memory of the last chunk's events, of this stream, for other memory. The events
+  /// stay valid in the former.
   void swap_memory(std::size_t stream, std::vector<Event>& memory) {
     streams_[stream].chunker.swap_memory(memory);
   }
@@ -190,7 +188,7 @@ class RecordingReader {
     std::uint64_t corrupt_places = 0;
     std::uint64_t outside = 0;  ///< events outside the sensor
     std::uint64_t skipped = 0;  ///< valid items that are no pixel events
-    std::uint64_t late = 0;     ///< events and frames of an interval already returned
+    std::uint64_t late = 0;     ///< events and frames whose interval was already returned
     std::uint64_t stray = 0;    ///< events and frames with an erroneous time
   };
   Counts counts() const;

@@ -26,13 +26,13 @@ inline constexpr SensorSize sensors[] = {{128, 128}, {240, 180}, {304, 240}, {32
 /// Sensors whose files may have mirrored events.
 inline constexpr SensorSize mirrored_sensors[] = {{240, 180}, {346, 260}, {640, 480}};
 
-/// The last of a sensor's columns and rows.
+/// Last column and row of a sensor.
 struct Extent {
   int x = 0;
   int y = 0;
 };
 
-/// Returns the smallest sensor that reaches so far. Used for files that do not state its size.
+/// Returns the smallest sensor with this extent. Used for files that do not state its size.
 constexpr SensorSize sensor_with(Extent extent, bool mirrored) {
   return mirrored ? sensor_with(extent.x, extent.y, mirrored_sensors)
                   : sensor_with(extent.x, extent.y, sensors);
@@ -40,8 +40,8 @@ constexpr SensorSize sensor_with(Extent extent, bool mirrored) {
 
 /// Columns and rows of events, to guess a sensor size that the file does not state.
 ///
-/// The guess comes from most of the events, since a corrupt one may be anywhere: an event is a
-/// stray if no sensor is so large, or if it lies more than twice as far out as nearly all others.
+/// Uses most of the events, since a corrupt one may be anywhere: an event is stray if no sensor is
+/// that large, or if it lies more than twice as far out as nearly all others.
 class UsedPixels {
  public:
   static constexpr int max_guessed_side = 4096;
@@ -67,8 +67,8 @@ class UsedPixels {
 
   std::uint64_t within() const { return within_; }
 
-  /// True if more than one, and more than 1 in 100, of the events and of `outside` others lie
-  /// beyond any sensor: they are no pixels.
+  /// True if more than one, and more than 1 in 100, of these and `outside` further events lie
+  /// beyond any sensor: their coordinates are not pixels.
   bool are_implausible(std::uint64_t outside) const {
     const auto beyond = beyond_ + outside;
     return beyond > std::max<std::uint64_t>(1, (within_ + beyond) / 100);
@@ -83,7 +83,7 @@ class UsedPixels {
     return std::max(known, last_but(counts, std::min(last_at, 2 * nearly_all + 1), 0));
   }
 
-  /// The last used of those up to `last`, but for `strays` events; 0 if there is none.
+  /// Returns the last used index up to `last`, ignoring `strays` events; 0 if there is none.
   static int last_but(const Counts& counts, int last, std::uint64_t strays) {
     for (std::uint64_t beyond = 0; last > 0; --last)
       if ((beyond += counts[static_cast<std::size_t>(last)]) > strays) break;

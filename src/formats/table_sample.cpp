@@ -73,8 +73,8 @@ bool are_frame_numbers(const std::vector<TableNumber>& times) {
   return times.back().value > times.front().value;
 }
 
-/// False if events were further apart in this unit than event cameras and simulators have them,
-/// unless the table is our own, or if integer microseconds began weeks ago without being a date.
+/// False if events in this unit are further apart than those of event cameras and simulators,
+/// unless the table is our own, or if integer microseconds start at weeks without being a date.
 bool is_plausible(std::vector<TableNumber> times, TimeUnit unit, bool is_own) {
   constexpr std::size_t min_rows = 4;
   constexpr std::size_t many_rows = 64;
@@ -88,7 +88,7 @@ bool is_plausible(std::vector<TableNumber> times, TimeUnit unit, bool is_own) {
   if (is_own) return true;
   std::size_t falls = 0;
   for (std::size_t i = 1; i < times.size(); ++i) falls += times[i].value < times[i - 1].value;
-  // Of a shuffled table, the next event is rarely among the first rows.
+  // In a shuffled table, the next event is rarely among the first rows.
   const bool is_shuffled = falls * 4 > times.size();
   if (is_shuffled) std::ranges::sort(times, {}, &TableNumber::value);
   std::vector<double> gaps;

@@ -22,7 +22,7 @@ struct TableNumber {
   Form form = Form::integer;
 };
 
-/// The first rows of a table, to detect its columns and time unit if nothing else states them.
+/// The first rows of a table, to detect columns and time unit that nothing else states.
 class TableSample {
  public:
   using Row = std::vector<TableNumber>;
@@ -46,8 +46,8 @@ class TableSample {
 
   /// Detects the columns. If only one column has fractions, it is the time. Otherwise returns the
   /// first of txyp, xypt and xytp for which p is a polarity, x and y are coordinates and t never
-  /// decreases; xypt is tried before if it `is_xypt` most likely. A column that counts rows may
-  /// precede them. Nothing if no order fits.
+  /// decreases; with `is_xypt`, xypt is tried first. A column that counts rows may precede them.
+  /// Nothing if no order fits.
   std::optional<Columns> find_columns(bool is_xypt = false) const;
 
   /// Detects the time unit: seconds if a time has a fraction; otherwise microseconds, or
@@ -58,7 +58,7 @@ class TableSample {
   std::optional<TimeUnit> find_unit(const Columns& columns, bool is_either,
                                     bool may_be_own = false) const;
 
-  /// Detects the meaning of the polarities. Throws UnsupportedFormat if they do not tell.
+  /// Detects the meaning of the polarities. Throws UnsupportedFormat if it is ambiguous.
   PolarityCode find_polarities(const Columns& columns) const;
 
  private:

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "src/formats/unit_decoder.hpp"
+#include "src/formats/unit_stream_decoder.hpp"
 
 namespace eventcamera {
 
@@ -21,7 +21,8 @@ class TimeBase {
   /// In microseconds; unsigned, because overflow must be well-defined for any file.
   std::uint64_t time() const { return time_; }
 
-  /// False if the time goes back: this count, or the one before, is corrupt.
+  /// Advances to the next time at `count`. False if time goes back: this count or the previous one
+  /// is corrupt.
   bool follow(std::uint32_t count) {
     const auto last = time_;
     const auto from = step(before_leap_, count) <= max_step ? before_leap_ : last;
@@ -40,7 +41,7 @@ class TimeBase {
   /// Limit of small steps; 0 after a leap, which follow() judges by the next count.
   std::uint32_t small_step_end() const { return before_leap_ == time_ ? max_step + 1 : 0; }
 
-  /// Small steps lead to `time`.
+  /// Sets the time after small steps.
   void advance_to(std::uint64_t time) { before_leap_ = time_ = time; }
 
   /// Uses bits 0 to `bits` of the rest.
@@ -57,8 +58,8 @@ class TimeBase {
   }
 
  private:
-  /// Limit of small steps: two minutes for 28 bits; four seconds for 12, in which faery writes
-  /// pauses. One flipped bit makes no such step across the wrap.
+  /// Limit of small steps: two minutes for 28 bits; four seconds for 12 bits, the steps in which
+  /// faery writes pauses. A flipped bit causes no such step across the wrap.
   static constexpr std::uint32_t max_step = std::uint32_t{1} << (bits == 12 ? 10 : 21);
   /// Limit of leaps across the wrap.
   static constexpr std::uint32_t max_wrapping_leap = bits == 12 ? 1 << 11 : max_step;

@@ -7,7 +7,7 @@
 
 namespace eventcamera {
 
-/// In four lanes, which do not wait for each other.
+/// Uses four independent lanes, so that they do not wait for each other.
 static Microseconds latest_of(std::span<const AbsoluteEvent> events) {
   Microseconds latest[4];
   std::ranges::fill(latest, std::numeric_limits<Microseconds>::min());
@@ -32,7 +32,7 @@ std::size_t UnitStreamDecoder::read_header(std::span<const std::uint8_t>, bool) 
   return 0;
 }
 
-/// Consumes the header, as far as it is there, from the front of rest_.
+/// Consumes the available part of the header from the front of rest_.
 void UnitStreamDecoder::read_headers(bool ended) {
   std::size_t taken = 0;
   while (!decoder_) {
@@ -87,7 +87,7 @@ void UnitStreamDecoder::restore(const SeekPoint& seek_point) {
 }
 
 std::size_t UnitStreamDecoder::read_units(std::span<const std::uint8_t> bytes, Decoded& out) {
-  // Seek points are recorded between batches; silence must not make them rare.
+  // Seek points are recorded between batches: a batch without events must end, too.
   constexpr std::ptrdiff_t max_batch = 1 << 15;
   const auto* from = bytes.data();
   const auto* const to = from + bytes.size();

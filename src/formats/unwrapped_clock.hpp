@@ -7,8 +7,8 @@
 
 namespace eventcamera {
 
-/// Unwraps timestamps of `bits` bits, in microseconds. One that falls by more than half their range
-/// has wrapped; a smaller fall is disorder. So is, after a wrap, a rise by more than max_rise: an
+/// Unwraps timestamps of `bits` bits, in microseconds. A decrease by more than half their range is
+/// a wrap; a smaller one is disorder. So is, after a wrap, an increase by more than max_rise: an
 /// event of the second before the wrap.
 template <int bits>
 class UnwrappedClock {

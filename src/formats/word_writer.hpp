@@ -57,8 +57,8 @@ void write_events(std::span<const AbsoluteEvent> events, std::size_t words_at_on
   }
 }
 
-/// Limits pauses for formats that fill them with words: pauses of more than half a day, also before
-/// the first event, are removed. So a stray time, or one since 1970, does not fill the disk.
+/// Limits pauses for formats that fill them with words: removes pauses of more than half a day,
+/// also before the first event, so that a stray time, or one since 1970, does not fill the disk.
 class GapLimiter {
  public:
   static constexpr Microseconds max_gap = Microseconds{12} * 3600 * 1'000'000;
@@ -74,7 +74,7 @@ class GapLimiter {
     last_ = t;
   }
 
-  /// Of the events since the last call of either, among which there is no long pause.
+  /// Skips events without a long pause among them.
   void pass(std::span<const AbsoluteEvent> events) {
     if (!events.empty()) last_ = events.back().t;
   }

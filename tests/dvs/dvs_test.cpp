@@ -31,22 +31,6 @@ namespace {
 
 using namespace eventcamera;
 
-TEST(Dvs, EqualsTheRuleOfEsim) {
-  constexpr int width = 101;
-  constexpr int height = 37;
-  Playback playback({width, height, 8}, settings_of(DvsPreset::esim));
-  reference::Esim esim(width, height, 1e-3, 0.2);
-  std::vector<TimedEvent> expected;
-  for (int i = 0; i < 12; ++i) {
-    const auto frame = scene::texture<std::uint8_t>(width, height, 8, 1.7 * i, 0.4 * i);
-    playback.push(frame, 8, i * scene::frame_time);
-    const auto events = esim.push(frame, i * 40'000.0);
-    expected.insert(expected.end(), events.begin(), events.end());
-  }
-  EXPECT_GT(expected.size(), 20'000U);
-  expect_near(playback.events, expected, 0.001, 0.999, 1.5);
-}
-
 constexpr double second = 1e6;
 
 class EverySetting : public testing::TestWithParam<DvsSettings> {};
@@ -167,36 +151,6 @@ TEST(Dvs, HasTheSpreadOfThresholdsThatIsSet) {
     }
     EXPECT_NEAR(sum / (side * side), 0.2, 0.001);
     EXPECT_NEAR(std::sqrt(squares / (side * side)), 0.03, 0.02 * 0.03);
-  }
-}
-
-TEST(Dvs, RestsForTheRefractoryPeriod) {
-  for (int i = 0; i < 16; ++i) {
-    const auto is_set = [i](int bit) { return (i >> bit & 1) != 0; };
-    const int period = is_set(0) ? 3000 : 0;  // microseconds
-    // Without a period, signals so steep that they cross many levels in a microsecond.
-    const Nanoseconds frame_time = is_set(0) ? 7'000'000 : 1'733;
-    DvsSettings settings{
-        .cutoff_frequency = is_set(0) ? 500.0 : 0.0,
-        .threshold_jitter = is_set(1) ? 0.02 : 0,
-        .leak_rate = 50,
-        .shot_noise_rate = 200,
-        .refractory_period = period * 1000,
-        .refractory_reset = is_set(2) ? RefractoryReset::signal : RefractoryReset::level,
-        .pixel_latency = is_set(3) ? frame_time / 10 : 0,
-        .pixel_latency_jitter = is_set(3) ? frame_time / 20 : 0};
-    Playback playback({40, 30, 8}, settings);
-    for (int frame = 0; frame < 60; ++frame) {
-      settings.response = frame < 50 ? Response::lin_log : Response::log;  // other units
-      playback.set(settings);
-      playback.push(scene::noise<std::uint8_t>(40, 30, 8, static_cast<unsigned>(frame)), 8,
-                    frame * frame_time);
-    }
-    ASSERT_GT(playback.events.size(), 20'000U);
-    for (const auto& [place, events] : by_pixel(playback.events))
-      for (std::size_t k = 1; k < events.size(); ++k)
-        ASSERT_GE(std::floor(events[k].t) - std::floor(events[k - 1].t), std::max(period, 1))
-            << testing::PrintToString(settings);
   }
 }
 
@@ -361,34 +315,6 @@ TEST(Dvs, HasItsShareOfDeadPixels) {
   dead.push(flat(200, 150, 10), 8, 0);
   dead.push(flat(200, 150, 240), 8, 40'000'000);
   EXPECT_NEAR(static_cast<double>(by_pixel(dead.events).size()), 27'000, 300);
-}
-
-TEST(Dvs, FiresAllOverAsExposuresBegin) {
-  // The first pulse in a static scene, up and down by 0.45: ON when it passes 0.2 and 0.4, OFF when
-  // it passes 0.1 again.
-  const auto first_pulse_is_at = [&](double begin, Nanoseconds lead) {
-    Playback playback({9, 3, 8},
-                      {.negative_threshold = 0.3, .exposure_pulse = 0.45, .exposure_lead = lead});
-    stand(playback, flat(9, 3, 90), 3, 40'000'000);
-    const auto pixels = by_pixel(playback.events);
-    ASSERT_EQ(pixels.size(), 27U) << lead;
-    for (const auto& [place, events] : pixels) {
-      ASSERT_GE(events.size(), 3U) << lead;
-      EXPECT_NEAR(events[0].t + 0.5, begin + 44.4, 0.6) << lead;
-      EXPECT_NEAR(events[1].t + 0.5, begin + 88.9, 0.6) << lead;
-      EXPECT_NEAR(events[2].t + 0.5, begin + 900 + 77.8, 0.6) << lead;
-      EXPECT_EQ(events[1].polarity, Polarity::on);
-      EXPECT_EQ(events[2].polarity, Polarity::off);
-    }
-  };
-  first_pulse_is_at(33'000, 7'000'000);
-  first_pulse_is_at(39'400, 600'000);  // ends after the frame
-  first_pulse_is_at(39'900, 0);        // an edge must be within the interval
-  first_pulse_is_at(0, 40'000'000);
-
-  Playback later({9, 3, 8}, {.exposure_pulse = 0.45, .exposure_lead = 40'001'000});
-  stand(later, flat(9, 3, 90), 3, 40'000'000);
-  EXPECT_TRUE(later.events.empty());
 }
 
 TEST(Dvs, SeesTheSameLightWhereAPulseCutsIt) {

@@ -5,7 +5,6 @@
 #include <map>
 #include <mutex>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "tests/elements/pipeline.hpp"
@@ -39,15 +38,6 @@ class AedatPlayer : public Pipeline {
   }
   ~AedatPlayer() { set(GST_STATE_NULL); }
 
-  /// Stops, and removes the elements linked to the pads.
-  void stop() {
-    set(GST_STATE_READY);
-    for (GstElement* element : std::exchange(after_, {})) {
-      gst_element_set_state(element, GST_STATE_NULL);
-      gst_bin_remove(GST_BIN(get()), element);
-    }
-  }
-
   void preroll() {
     set(GST_STATE_PAUSED);
     while (no_more_pads == 0) g_usleep(1000);  // before, there are no sinks to wait for
@@ -60,13 +50,8 @@ class AedatPlayer : public Pipeline {
     const std::lock_guard lock(mutex_);
     return tracks_[pad];
   }
-  std::size_t pads() {
-    const std::lock_guard lock(mutex_);
-    return tracks_.size();
-  }
 
   std::atomic<int> no_more_pads = 0;
-  std::atomic<int> flushes = 0;  ///< of all pads together
 
  private:
   static void added(GstElement*, GstPad* pad, AedatPlayer* self) {
@@ -76,7 +61,6 @@ class AedatPlayer : public Pipeline {
     gst_element_link(queue, sink);
     {
       const std::lock_guard lock(self->mutex_);
-      self->after_.insert(self->after_.end(), {queue, sink});
       auto& track = self->tracks_[GST_PAD_NAME(pad)] = {};
       // A pad whose caps may depend on what is linked has none yet.
       for (const auto type : {GST_EVENT_CAPS, GST_EVENT_SEGMENT})
@@ -85,8 +69,7 @@ class AedatPlayer : public Pipeline {
     }
     gst_pad_add_probe(pad,
                       static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER |
-                                                   GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
-                                                   GST_PAD_PROBE_TYPE_EVENT_FLUSH),
+                                                   GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
                       seen, self, nullptr);
     GstPad* const in = gst_element_get_static_pad(queue, "sink");
     gst_pad_link(pad, in);
@@ -101,8 +84,6 @@ class AedatPlayer : public Pipeline {
     auto& track = self->tracks_[GST_PAD_NAME(pad)];
     if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0)
       see(track, GST_PAD_PROBE_INFO_BUFFER(info), g_str_has_prefix(GST_PAD_NAME(pad), "events"));
-    else if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_FLUSH_STOP)
-      ++self->flushes;
     else
       see(track, GST_PAD_PROBE_INFO_EVENT(info));
     return GST_PAD_PROBE_OK;
@@ -160,5 +141,4 @@ class AedatPlayer : public Pipeline {
 
   std::mutex mutex_;
   std::map<std::string, Track> tracks_;
-  std::vector<GstElement*> after_;  ///< the pipeline's
 };

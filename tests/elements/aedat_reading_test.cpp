@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // aedatdemux gives the events and frames of AEDAT files as they were recorded.
-#include <map>
 
 #include "tests/elements/aedat_player.hpp"
 #include "tests/elements/aedat_recordings.hpp"
 #include "tests/formats/recordings.hpp"
-#include "tests/formats/shared_data.hpp"
 
 namespace {
 
@@ -75,44 +73,6 @@ TEST(AedatDemux, PutsFramesInSyncWithEvents) {
   }
 }
 
-TEST(AedatDemux, ReadsTheRecordingOfADavis) {
-  const auto bytes = shared_data::events_file(davis);
-  if (bytes.empty()) GTEST_SKIP() << "no shared data";
-  const TemporaryFile file(bytes);
-  for (const char* between : {"", "identity ! "}) {
-    AedatPlayer player(file.source() + between);
-    ASSERT_TRUE(player.play()) << player.error;
-    const auto track = player.track("events_0");
-    EXPECT_EQ(track.events.size(), 117'667U);
-    EXPECT_EQ(std::count_if(track.events.begin(), track.events.end(),
-                            [](const auto& e) { return e.polarity() == Polarity::on; }),
-              72'363);
-    const auto start = track.segment.start;
-    EXPECT_EQ(static_cast<GstClockTime>(track.events.front().t) * GST_USECOND, start);
-    const auto pictures = player.track("video_0").pictures;
-    ASSERT_EQ(pictures.size(), 3U);
-    EXPECT_EQ(pictures[1].pts - pictures[0].pts, 40 * GST_MSECOND);
-    EXPECT_EQ(pictures[2].pts - pictures[1].pts, 40 * GST_MSECOND);
-    EXPECT_LT(pictures[0].pts, start + 40 * GST_MSECOND);
-    EXPECT_EQ(player.stat("imu-samples"), 130U);
-    EXPECT_EQ(player.stat("triggers"), 15U);
-    EXPECT_EQ(player.stat("corrupt-places"), 0U);
-  }
-}
-
-TEST(AedatDemux, TellsOfSilenceInFewWords) {
-  Events events = steady_events(20'000, 100);
-  const auto later = steady_events(20'000, 100, 3'600'000'000);
-  events.insert(events.end(), later.begin(), later.end());
-  const TemporaryFile file(aedat4_file(events));
-  AedatPlayer player(file.source());
-  ASSERT_TRUE(player.play()) << player.error;
-  const auto track = player.track("events_0");
-  EXPECT_TRUE(track.events == events);
-  EXPECT_LE(track.buffers + track.gaps, 8U);
-  EXPECT_GE(track.gaps, 1U);
-}
-
 /// Frames continue after the end of events, and events after the end of frames.
 TEST(AedatDemux, KeepsSilentStreamsGoing) {
   const auto few = steady_events(10'000, 100);
@@ -128,48 +88,88 @@ TEST(AedatDemux, KeepsSilentStreamsGoing) {
   EXPECT_LE(other.track("video_0").gaps, 40U);
 }
 
-TEST(AedatDemux, ReadsStreamsThatAreWrittenOneAfterTheOther) {
-  const auto first = steady_events(5'000'000, 1'000);
-  const auto second = shifted(steady_events(5'000'000, 1'300), 5);
-  const TemporaryFile file(aedat4_of_two_streams(first, second));
-  for (const char* between : {"", "identity ! "}) {
-    Pipeline pipeline(
-        file.source() + between +
-        "aedatdemux name=d  d.events_0 ! queue ! fakesink name=a signal-handoffs=true "
-        " d.events_1 ! queue ! fakesink name=b signal-handoffs=true");
-    std::map<std::string, Events> events;
-    for (const char* name : {"a", "b"})
-      g_signal_connect(pipeline[name], "handoff",
-                       G_CALLBACK(+[](GstElement*, GstBuffer* buffer, GstPad*, Events* of_sink) {
-                         append_events(buffer, *of_sink);
-                       }),
-                       &events[name]);
-    ASSERT_TRUE(pipeline.play()) << pipeline.error;
-    EXPECT_TRUE(pipeline.warnings.empty()) << pipeline.warnings.front();
-    EXPECT_TRUE(events["a"] == first) << events["a"].size();
-    EXPECT_TRUE(events["b"] == second) << events["b"].size();
+TEST(AedatDemux, SaysWhereTheTableIsWrong) {
+  const auto events = steady_events(2'000'000, 50);
+  const auto whole = aedat4_file(events);
+  Aedat4Decoder decoder;
+  decoder.push(whole);
+  while (decoder.next()) continue;
+  const auto table_at = decoder.table_at().value();
+  Aedat4Encoder encoder({sensor, "a camera", Aedat4Compression::lz4, false, true});
+  Bytes ignored;
+  encoder.finish(ignored);
+  const auto field_at = encoder.patch().value().position;
+
+  struct Fault {
+    std::size_t at;
+    const char* what;
+    Bytes bytes;
+  };
+  auto overwritten = whole;
+  for (auto i = table_at + 8; i < overwritten.size(); ++i) overwritten[i] ^= 0x5a;
+  auto cut = whole;
+  cut.resize(table_at);
+  auto far = whole;
+  far[field_at + 5] = 1;
+  auto near = whole;
+  near[field_at] ^= 0x10;
+  const Fault faults[] = {
+      {table_at, "the packet table that the header states is missing", overwritten},
+      {table_at, "the file ends before its packet table", cut},
+      {field_at, "the header has a wrong position for the packet table", far},
+      {field_at, "the header has a wrong position for the packet table", near}};
+  for (const auto& fault : faults) {
+    const TemporaryFile file(fault.bytes);
+    AedatPlayer player(file.source());
+    ASSERT_TRUE(player.play()) << player.error;
+    ASSERT_EQ(player.warnings.size(), 1U);
+    EXPECT_TRUE(player.warnings.front().starts_with("Corrupt data at byte " +
+                                                    std::to_string(fault.at) + ": " + fault.what))
+        << player.warnings.front();
+    EXPECT_TRUE(player.track("events_0").events == events);
+    EXPECT_EQ(player.stat("corrupt-places"), 1U);
   }
 }
 
-TEST(AedatDemux, SeeksWhilePlayingAgainAndAgain) {
-  const auto events = steady_events(10'000'000, 100);
-  const TemporaryFile file(aedat4_with_frames(events, PixelFormat::bgr, 250));
-  AedatPlayer player(file.source());
-  player.preroll();
-  ASSERT_TRUE(player.seek(GST_SECOND));
-  EXPECT_EQ(player.flushes, 2) << "the bin sends a seek to both sinks; it is done once";
-  player.set(GST_STATE_PLAYING);
-  recordings::Random random(3);
-  for (int i = 0; i < 60; ++i) {
-    ASSERT_TRUE(
-        player.seek(static_cast<GstClockTime>(recordings::below(random, 9'000)) * GST_MSECOND));
-    if (i % 4 == 0) g_usleep(1000);
+/// What decodebin ends a file with.
+GstMessageType decoded(const TemporaryFile& file, const std::string& between = "") {
+  Player player(file.source() + between + "decodebin caps=application/x-event-camera,format=XYTP");
+  player.play();
+  return player.end;
+}
+
+/// decodebin drops errors while it is adding an element, whose state it locks.
+TEST(AedatDemux, TellsDecodebinOfErrors) {
+  auto bytes = aedat4_file(steady_events(100'000, 70));
+  bytes[17] = 0x7f;  // the size of the header
+  const TemporaryFile file(bytes);
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_EQ(decoded(file), GST_MESSAGE_ERROR) << i;
+    ASSERT_EQ(decoded(file, "queue ! "), GST_MESSAGE_ERROR) << i;
   }
-  ASSERT_TRUE(player.seek(8 * GST_SECOND));
-  while (player.track("events_0").eos == 0 || player.track("video_0").eos == 0)
-    ASSERT_TRUE(player.wait()) << player.error;
-  EXPECT_TRUE(player.track("events_0").events == from(shifted(events, 3'000), 8'000'000));
-  EXPECT_EQ(player.track("video_0").pictures.size(), 50U);
+
+  Pipeline pipeline(file.source() + "aedatdemux name=d");
+  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+  gst_element_set_locked_state(pipeline["d"], TRUE);
+  pipeline.set(GST_STATE_PAUSED);
+  gst_element_set_state(pipeline["d"], GST_STATE_PAUSED);
+  EXPECT_FALSE(Owned<GstMessage>(
+      gst_bus_timed_pop_filtered(bus.get(), 50 * GST_MSECOND, GST_MESSAGE_ERROR)));
+  gst_element_set_locked_state(pipeline["d"], FALSE);
+  EXPECT_FALSE(pipeline.wait());
+  EXPECT_EQ(pipeline.end, GST_MESSAGE_ERROR);
+}
+
+TEST(AedatDemux, SaysWhereAFileHasNoEvents) {
+  const TemporaryFile empty(aedat_files::aedat4_header(""));
+  AedatPlayer player(empty.source());
+  EXPECT_FALSE(player.play());
+  EXPECT_NE(player.error.find("neither events nor frames"), std::string::npos) << player.error;
+  // There is a stream of events here, though it is empty.
+  const TemporaryFile silent(aedat4_file({}));
+  AedatPlayer other(silent.source());
+  EXPECT_TRUE(other.play()) << other.error;
+  EXPECT_EQ(other.track("events_0").eos, 1U);
 }
 
 }  // namespace

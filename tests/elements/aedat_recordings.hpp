@@ -8,11 +8,9 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <string_view>
 #include <variant>
 #include <vector>
 
-#include "src/core/byte_order.hpp"
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
 #include "tests/formats/aedat_files.hpp"
@@ -26,8 +24,6 @@ using Events = std::vector<AbsoluteEvent>;
 inline constexpr SensorSize sensor{346, 260};
 /// Start time of a recording with absolute times.
 inline constexpr Microseconds of_1970 = 1'700'000'000'000'000;
-/// In the shared data.
-inline constexpr const char* davis = "davis346-frames-events-imu.aedat4";
 
 inline Events shifted(Events events, Microseconds by) {
   for (auto& event : events) event.t += by;
@@ -88,29 +84,6 @@ inline Bytes aedat4_with_frames(const Events& events, PixelFormat format, int fr
   }
   encoder.encode(rest, bytes);
   return finished(encoder, bytes);
-}
-
-/// Two streams of events, the second written after the first.
-inline Bytes aedat4_of_two_streams(const Events& first, const Events& second) {
-  Bytes bytes;
-  Aedat4Encoder encoder({sensor, "", Aedat4Compression::none, true});
-  encoder.flush(bytes);
-  const std::string_view of_frames = "FRME";
-  const auto type = std::search(bytes.begin(), bytes.end(), of_frames.begin(), of_frames.end());
-  std::ranges::copy(std::string_view("EVTS"), type);
-  encoder.encode(first, bytes);
-  encoder.finish(bytes);
-
-  Bytes more;
-  Aedat4Encoder other({sensor, "", Aedat4Compression::none});
-  other.flush(more);
-  const auto packets = more.size();
-  other.encode(second, more);
-  other.finish(more);
-  for (auto at = packets; at < more.size(); at += 8 + little_endian<std::uint32_t>(&more[at + 4]))
-    more[at] = 1;  // the stream
-  bytes.insert(bytes.end(), more.begin() + static_cast<std::ptrdiff_t>(packets), more.end());
-  return bytes;
 }
 
 /// Content of a file, as the decoder alone reads it.

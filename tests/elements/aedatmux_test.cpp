@@ -186,32 +186,6 @@ TEST(AedatMux, WritesFramesInTheSizeOfTheirCaps) {
   EXPECT_EQ(pictures[0].pixels, (Bytes{0, 1, 2, 3, 16, 17, 18, 19, 32, 33, 34, 35}));
 }
 
-TEST(AedatMux, EndsASegmentOnceBothInputsHave) {
-  const EventsAndVideo mux;
-  auto* const events = mux.first.get();
-  auto* const video = mux.second.get();
-  for (const GstClockTime base : {0 * GST_SECOND, 1 * GST_SECOND}) {
-    for (auto* h : {events, video}) push_segment(h, base, base);
-    gst_harness_push(events, buffer_of(base, {{7, 1, 2}}, 10 * GST_MSECOND));
-    end_segment(events);
-    mux.push_frame(base + 20 * GST_MSECOND);
-    end_segment(video);
-    ASSERT_TRUE(next_event(events, GST_EVENT_SEGMENT_DONE));
-  }
-  for (auto* h : {events, video}) gst_harness_push_event(h, gst_event_new_eos());
-  auto last = GST_EVENT_SEGMENT;
-  while (last != GST_EVENT_EOS) {
-    const Owned<GstEvent> event{gst_harness_pull_event(events)};
-    ASSERT_TRUE(event);
-    last = GST_EVENT_TYPE(event.get());
-    EXPECT_NE(last, GST_EVENT_SEGMENT_DONE);
-  }
-  const auto content = rest_of(events);
-  EXPECT_EQ(content.events, (Events{AbsoluteEvent::at(1, 2, 7, Polarity::off),
-                                    AbsoluteEvent::at(1, 2, 1'000'007, Polarity::off)}));
-  EXPECT_EQ(content.pictures.size(), 2U);
-}
-
 /// Pads come and go while another thread writes the header.
 TEST(AedatMux, TakesNoPadOnceTheHeaderIsWritten) {
   Mux mux;

@@ -17,7 +17,6 @@ namespace {
 using namespace harness;
 using eventcamera::AbsoluteEvent;
 using eventcamera::Event;
-using eventcamera::Microseconds;
 using eventcamera::Polarity;
 
 constexpr int width = 640;
@@ -116,24 +115,6 @@ TEST_P(EveryFormat, BringsEveryEvent) {
   EXPECT_EQ(stat_of(h.element(), "events"), sent.size());
 }
 
-TEST_P(EveryFormat, HasIntervalsThatFollowOneAnother) {
-  const std::string properties = GetParam().properties;
-  Harness h("eventdatagrampay " + properties + " ! eventdatagramdepay " + properties + depay_size);
-  h.caps(events_caps);
-  push_events(h, stream(5000));
-  GstClockTime end = 0;
-  int count = 0;
-  while (const auto buffer = h.pull()) {
-    EXPECT_GE(GST_BUFFER_PTS(buffer.get()), end);
-    end = GST_BUFFER_PTS(buffer.get()) + GST_BUFFER_DURATION(buffer.get());
-    const auto events = events_of(buffer.get());
-    EXPECT_EQ(events.back().t, GST_BUFFER_DURATION(buffer.get()) / GST_USECOND);
-    EXPECT_EQ(GST_BUFFER_IS_DISCONT(buffer.get()), count == 0);
-    ++count;
-  }
-  EXPECT_GT(count, 15);
-}
-
 /// Receives from a socket on this machine.
 class UdpReceiver {
  public:
@@ -228,53 +209,6 @@ TEST_P(EveryFormat, RejectsRandomDatagrams) {
   EXPECT_EQ(h.error(), "");
 }
 
-/// Loses 5 % of datagrams, repeats 5 %, and swaps 5 % with the next one.
-std::vector<Buffer> through_bad_network(Harness& pay) {
-  std::mt19937 random(3);
-  std::vector<Buffer> arrived;
-  while (auto buffer = pay.pull()) {
-    const auto chance = random() % 100;
-    if (chance < 5 && !arrived.empty()) continue;
-    if (chance < 10) arrived.emplace_back(gst_buffer_ref(buffer.get()));
-    arrived.push_back(std::move(buffer));
-    if (chance >= 95 && arrived.size() > 2) std::swap(arrived.back(), arrived[arrived.size() - 2]);
-  }
-  return arrived;
-}
-
-class TimedFormat : public testing::TestWithParam<Format> {};
-INSTANTIATE_TEST_SUITE_P(, TimedFormat,
-                         testing::ValuesIn(std::begin(formats) + 2, std::end(formats)),
-                         [](const auto& tested) { return std::string(tested.param.name); });
-
-TEST_P(TimedFormat, BringsNoWrongEventThroughABadNetwork) {
-  const std::string properties = GetParam().properties;
-  Harness pay("eventdatagrampay " + properties);
-  pay.caps(events_caps, "application/x-event-datagram");
-  const auto sent = stream(100'000);
-  push_events(pay, sent);
-  gst_harness_push_event(pay.get(), gst_event_new_eos());
-  Depay h(properties);
-  for (auto& buffer : through_bad_network(pay)) h.push(buffer.release());
-  const auto received = pull_events(h);
-  EXPECT_GT(received.size(), sent.size() * 8 / 10);
-  EXPECT_LT(received.size(), sent.size());
-  // Each once, and in order.
-  const auto by_time = [](const auto& a, const auto& b) { return a.t < b.t; };
-  EXPECT_EQ(std::ranges::adjacent_find(received, std::ranges::greater_equal(), &AbsoluteEvent::t),
-            received.end());
-  for (const auto& event : received) {
-    const auto original = std::ranges::lower_bound(sent, event, by_time);
-    ASSERT_NE(original, sent.end());
-    ASSERT_EQ(*original, event);
-  }
-  EXPECT_GT(stat_of(h.element(), "late-packets"), 0);
-  EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 0);
-  const bool is_numbered = properties == "format=jaer";
-  EXPECT_EQ(stat_of(h.element(), "lost-packets"),
-            is_numbered ? stat_of(pay.element(), "packets") - stat_of(h.element(), "packets") : 0);
-}
-
 /* payloader */
 
 /// One of successive buffers with 10 events each.
@@ -299,16 +233,6 @@ TEST(Payloader, LetsNoEventWaitForTheNextBuffer) {
     EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), (static_cast<guint>(i) + 1) / 4);
   }
   while (const auto buffer = h.pull()) EXPECT_EQ(gst_buffer_get_size(buffer.get()), 40 * 8);
-}
-
-TEST(Payloader, SendsEachBufferAtOnceIfNothingMayWait) {
-  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=0");
-  h.caps(events_caps, "application/x-event-datagram");
-  for (int i = 0; i < 3; ++i) {
-    h.push(ten_events(i));
-    ASSERT_EQ(gst_harness_buffers_in_queue(h.get()), 1);
-    EXPECT_EQ(gst_buffer_get_size(h.pull().get()), 10 * 8);
-  }
 }
 
 TEST(Payloader, LetsNoEventWaitIfNoBufferComes) {
@@ -435,24 +359,6 @@ TEST(Payloader, SkipsEventsOutsideTheSensor) {
   EXPECT_EQ(h.warning(), "Cannot send all events: some are outside the sensor; skipping them.");
 }
 
-TEST(Payloader, SkipsInvalidBuffers) {
-  Harness h("eventdatagrampay");
-  h.caps(events_caps, "application/x-event-datagram");
-  EXPECT_EQ(h.push(buffer_of(GST_CLOCK_TIME_NONE, {Event::at(1, 2, 3, Polarity::on)}, 0)),
-            GST_FLOW_OK);
-  EXPECT_EQ(h.push(datagram({1, 2, 3}, 0)), GST_FLOW_OK);
-  EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
-  EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
-  EXPECT_FALSE(h.pull());
-}
-
-TEST(Payloader, RefusesSensorsThatTheFormatDoesNotSupport) {
-  Harness h("eventdatagrampay format=jaer");
-  h.caps("application/x-event-camera, format=XYTP, width=1280, height=720",
-         "application/x-event-datagram");
-  EXPECT_NE(h.error().find("up to 1024x512 pixels"), std::string::npos);
-}
-
 /// A queue sends refused caps again, before the next buffer.
 TEST(Payloader, RefusesThemEachTime) {
   Harness h("eventdatagrampay format=jaer");
@@ -570,16 +476,6 @@ TEST(Depayloader, FollowsASenderWhoseClockDrifts) {
   }
 }
 
-TEST(Depayloader, FollowsASenderThatStartsOver) {
-  Depay h("format=t32-x16-y15-on1");
-  h.push(t32(50'000'000, 0, 2 * GST_SECOND));
-  h.push(t32(100, 1, 3 * GST_SECOND));
-  EXPECT_EQ(GST_BUFFER_PTS(h.pull().get()), 50 * GST_SECOND);
-  const auto second = h.pull();
-  EXPECT_EQ(GST_BUFFER_PTS(second.get()), 100 * GST_USECOND);
-  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(second.get()));
-}
-
 TEST(Depayloader, FillsSilenceWithGaps) {
   Depay h("format=t32-x16-y15-on1");
   h.push(t32(5'000'000, 0, 2 * GST_SECOND));
@@ -635,17 +531,6 @@ TEST(Depayloader, SaysThatItHearsNothing) {
   }
 }
 
-TEST(Depayloader, TellsOfLossesBeforeDatagramsWithoutEvents) {
-  Depay h("format=jaer");
-  h.push(jaer(1, 1000, GST_MSECOND));
-  h.push(datagram({0, 0, 0, 3}, 2 * GST_MSECOND));
-  h.push(jaer(4, 1500, 3 * GST_MSECOND));
-  ASSERT_TRUE(h.pull());
-  const auto buffer = h.pull();
-  ASSERT_TRUE(buffer);
-  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(buffer.get()));
-}
-
 TEST(Depayloader, GivesEventsWithoutTimesThatOfTheirArrival) {
   Depay h("format=spif");
   h.push(datagram({1, 0, 2, 0x80, 1, 0, 3, 0x80}, 7 * GST_MSECOND));
@@ -659,13 +544,6 @@ TEST(Depayloader, NeedsArrivalTimesForEventsWithoutTimes) {
   Depay h("format=spif");
   EXPECT_EQ(h.push(datagram({1, 0, 2, 0x80}, GST_CLOCK_TIME_NONE)), GST_FLOW_ERROR);
   EXPECT_NE(h.error().find("do-timestamp=true"), std::string::npos);
-}
-
-TEST(Depayloader, DoesWithoutArrivalTimes) {
-  Depay h("format=t32-x16-y15-on1");
-  EXPECT_EQ(h.push(t32(5'000'000, 0, GST_CLOCK_TIME_NONE)), GST_FLOW_OK);
-  EXPECT_EQ(h.push(t32(95'000'000, 1, GST_CLOCK_TIME_NONE)), GST_FLOW_OK);
-  EXPECT_EQ(pull_events(h).size(), 2);
 }
 
 TEST(Depayloader, ContinuesWithoutArrivalTimesWhenTheSenderStartsOver) {
@@ -684,35 +562,6 @@ TEST(Depayloader, ReportsItsLatency) {
   Depay h("latency=30000000");
   gst_harness_set_upstream_latency(h.get(), 40 * GST_MSECOND);
   EXPECT_EQ(gst_harness_query_latency(h.get()), 70 * GST_MSECOND);
-}
-
-/// One of faery with times of 64 bits, with an event at each of `times`.
-GstBuffer* t64(std::initializer_list<guint64> times, GstClockTime arrival) {
-  std::vector<guint8> bytes;
-  for (const auto t : times) {
-    bytes.resize(bytes.size() + 13);
-    const guint64 little = GUINT64_TO_LE(t);
-    std::memcpy(&bytes[bytes.size() - 13], &little, 8);
-  }
-  return datagram(bytes, arrival);
-}
-
-TEST(Depayloader, KeepsTimesOfEventsThatAreFarApart) {
-  constexpr guint64 first = 1'000'000;
-  constexpr guint64 next = first + 1000;  // the longest pause without a GAP event
-  constexpr guint64 longest = G_GUINT64_CONSTANT(71) * 60 * 1'000'000;
-  for (const guint64 span : {longest, longest + 1, guint64{G_MAXUINT32}}) {
-    Depay h("format=t64-x16-y16-on8");
-    h.push(t64({first}, 0));
-    h.push(t64({next, next + span}, GST_MSECOND));
-    std::vector<guint64> times;
-    for (const auto& event : pull_events(h)) times.push_back(static_cast<guint64>(event.t));
-    if (span == longest)
-      EXPECT_EQ(times, (std::vector{first, next, next + span}));
-    else
-      EXPECT_EQ(times, std::vector{first}) << span;
-    EXPECT_EQ(stat_of(h.element(), "rejected-packets"), span == longest ? 0 : 1);
-  }
 }
 
 TEST(Depayloader, SegmentsHaveTheSequenceNumberOfUpstream) {

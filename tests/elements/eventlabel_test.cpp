@@ -278,34 +278,6 @@ TEST_F(EventLabel, SkipsEventsWithoutATime) {
             "Cannot label all events: a buffer has no PTS; skipping them.");
 }
 
-TEST_F(EventLabel, EndsASegmentOnceBothHave) {
-  begin();
-  for (int i = 0; i < 2; ++i) {
-    push_image(0, 1);
-    push_events(0, {0});
-    end_segment(images.get());
-    EXPECT_EQ(classes(), Classes{1});
-    push_events(40 * ms, {0});
-    EXPECT_EQ(classes(), Classes{1});
-    end_segment(events.get());
-    ASSERT_TRUE(next_event(events.get(), GST_EVENT_SEGMENT_DONE));
-    for (auto* h : {events.get(), images.get()}) play_on(h, 80 * ms * static_cast<guint>(i + 1));
-  }
-}
-
-TEST_F(EventLabel, StartsOverAfterAFlush) {
-  begin();
-  push_image(0, 1);
-  push_events(0, {0, 20'000});
-  push_image(10 * ms, 2);
-  flush({events.get(), images.get()});
-  for (auto* h : {events.get(), images.get()}) push_segment(h);
-  push_events(0, {0, 20'000});
-  push_image(10 * ms, 5);
-  push_image(80 * ms, 6);
-  EXPECT_EQ(classes(), (Classes{-1, 5}));
-}
-
 TEST_F(EventLabel, StartsOverWithEventsThatAreFlushedAlone) {
   begin();
   push_image(0, 1);
@@ -342,26 +314,6 @@ TEST(LiveEventLabel, SaysThatImagesAreMissing) {
 
 const std::string moving_ball =
     "videotestsrc pattern=ball num-buffers=20 ! video/x-raw,width=64,height=48 ! ";
-
-TEST(EventLabelInPipelines, LabelsTheEventsOfATee) {
-  Pipeline pipeline(
-      "eventlabel name=label ! fakesink name=sink sync=false  " + moving_ball +
-      "tee name=t  t. ! queue ! eventsim-dvs ! label.event_sink  t. ! queue ! videoconvert ! "
-      "video/x-raw,format=GRAY8 ! label.video_sink");
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-  EXPECT_EQ(pipeline.stat("sink", "rendered"), 19U);
-}
-
-TEST(EventLabelInPipelines, SeeksBothInputs) {
-  Pipeline pipeline("eventlabel name=label ! eventcsvenc format=labels ! fakesink sync=false  " +
-                    moving_ball +
-                    "eventsim-dvs label=true ! label.event_sink  videotestsrc num-buffers=20 ! "
-                    "video/x-raw,format=GRAY8,width=64,height=48 ! label.video_sink");
-  ASSERT_TRUE(pipeline.reaches(GST_STATE_PAUSED));
-  EXPECT_TRUE(pipeline.seek(300 * ms));
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-  EXPECT_TRUE(pipeline.warnings.empty());
-}
 
 /// Lines of a CSV file of labelled events: the numbers of each. `source` outputs events of a sensor
 /// of 64x48 pixels, labelled here with their place: 1 + x + 64 y.
@@ -409,16 +361,6 @@ TEST(EventLabelInPipelines, KeepsTheCausesOfASimulator) {
     noise += row[4] == GST_EVENT_CAMERA_CAUSE_SHOT_NOISE ? 1 : 0;
   }
   EXPECT_GT(noise, 0);
-}
-
-TEST(EventLabelInPipelines, LabelsRecordings) {
-  const TemporaryFile recording;
-  Pipeline writer(moving_ball + "eventsim-diff ! evtenc" + recording.sink());
-  ASSERT_TRUE(writer.play()) << writer.error;
-  for (const auto& row : rows_of(recording.source() + "evtdec", "identity")) {
-    ASSERT_EQ(row[5], 1 + row[1] + 64 * row[2]);
-    ASSERT_EQ(row[4], GST_EVENT_CAMERA_CAUSE_UNKNOWN);
-  }
 }
 
 TEST(EventLabelInPipelines, ClassesStayWithTheirEventsInFilters) {

@@ -86,27 +86,6 @@ TEST(TableReaders, TakeTheSizeOfTheirProperties) {
   }
 }
 
-TEST(EventCsvDec, RefusesToGuessAnImpossibleSensor) {
-  // Coordinates in fixed point, as in some archives of rectified events.
-  auto events = some_events();
-  std::string text = "t,x,y,p\n";
-  for (auto& event : events) {
-    event = AbsoluteEvent::at(32 * event.x, 32 * event.y(), event.t, event.polarity());
-    for (const auto number : {event.t, Microseconds{event.x}, Microseconds{event.y()}})
-      text += std::to_string(number) + ",";
-    text += event.polarity() == Polarity::on ? "1\n" : "0\n";
-  }
-  const TemporaryFile file(text);
-  for (const std::string way : {"", "queue ! "}) {
-    Player guessed(file.source() + way + "eventcsvdec");
-    EXPECT_FALSE(guessed.play());
-    EXPECT_NE(guessed.error.find("set width and height"), std::string::npos) << guessed.error;
-    Player told(file.source() + way + "eventcsvdec width=16384 height=16384");
-    EXPECT_TRUE(told.play()) << told.error;
-    EXPECT_EQ(told.events, events);
-  }
-}
-
 TEST(EventCsvDec, KeepsItsGuessAfterASeek) {
   const TemporaryFile file(
       std::string("t,x,y,p\n1,10,10,1\n2,16000,16000,1\n3,5,5,1\n900000,6,6,0\n"));
@@ -131,19 +110,6 @@ TEST(EvtDec, LeavesOutEventsOutsideTheSensor) {
   EXPECT_EQ(stat_of(h.element(), "late-items") + stat_of(h.element(), "stray-items"), 0U);
 }
 
-/// As of the formats without a header.
-TEST(EventCsvDec, ReadsAFileWithNothingInIt) {
-  const Format rpg = {"rpg", "eventcsvenc format=rpg", "eventcsvdec", "application/x-event-csv"};
-  const TemporaryFile file(file_of(rpg, {}));
-  EXPECT_TRUE(file.bytes().empty());
-  for (const std::string way : {"", "queue ! "}) {
-    Player player(file.source() + way + "eventcsvdec");
-    EXPECT_TRUE(player.play()) << player.error;
-    EXPECT_EQ(player.warnings, std::vector<std::string>{"The file has no events."}) << way;
-    EXPECT_TRUE(player.events.empty());
-  }
-}
-
 TEST(EventCsvDec, TakesTimesInTheUnitThatIsFoundOrSet) {
   const Format esim = {"esim", "eventcsvenc format=esim", "eventcsvdec", "application/x-event-csv"};
   const auto file = file_of(esim, some_events());
@@ -162,17 +128,6 @@ TEST(EventCsvDec, TakesTimesInTheUnitThatIsFoundOrSet) {
   EXPECT_EQ(set.events, (Events{AbsoluteEvent::at(2, 3, 1, Polarity::on),
                                 AbsoluteEvent::at(4, 5, 2, Polarity::off),
                                 AbsoluteEvent::at(6, 7, 3, Polarity::on)}));
-}
-
-TEST(EventCsvDec, TakesColumnsInTheOrderThatIsSet) {
-  const TemporaryFile file(std::string("1,3,2,5\n0,5,4,7\n"));
-  Player player(file.source() + "eventcsvdec column-order=pyxt");
-  EXPECT_TRUE(player.play()) << player.error;
-  EXPECT_EQ(player.events, (Events{AbsoluteEvent::at(2, 3, 5, Polarity::on),
-                                   AbsoluteEvent::at(4, 5, 7, Polarity::off)}));
-  Player wrong(file.source() + "eventcsvdec column-order=pyxx");
-  EXPECT_FALSE(wrong.play());
-  EXPECT_NE(wrong.error.find("column-order \"pyxx\" must have"), std::string::npos);
 }
 
 }  // namespace

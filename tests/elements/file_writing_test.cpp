@@ -131,17 +131,6 @@ TEST(EventNpzEnc, TellsOfEventsThatAreLostWithoutTheEnd) {
   EXPECT_EQ(ended.warning(), "");
 }
 
-TEST(EventNpzEnc, SaysWhereToKeepEvents) {
-  g_setenv("TMPDIR", "/nowhere", TRUE);
-  Player player("videotestsrc num-buffers=3 ! eventsim-frame ! eventnpzenc");
-  EXPECT_FALSE(player.play());
-  EXPECT_TRUE(player.error.starts_with(
-      "Cannot keep events in a temporary file in /nowhere: No such file or directory. Set the "
-      "environment variable TMPDIR"))
-      << player.error;
-  g_unsetenv("TMPDIR");
-}
-
 TEST_P(EveryFormat, IsWrittenAnewAfterAFlush) {
   Writer h(format());
   const auto early = AbsoluteEvent::at(6, 6, 1000, Polarity::off);
@@ -156,17 +145,6 @@ TEST_P(EveryFormat, IsWrittenAnewAfterAFlush) {
   h.write(early, 0);
   EXPECT_EQ(events_in(format(), h.end()), std::vector{early});
   EXPECT_EQ(h.left_out(), "");
-}
-
-TEST_P(EveryFormat, IsWrittenWithoutAnyBuffer) {
-  Harness h(format().writer);
-  gst_harness_set_sink_caps_str(h.get(), format().caps.c_str());
-  const Owned<GstCaps> caps(gst_caps_from_string(events_caps.c_str()));
-  gst_harness_push_event(h.get(), gst_event_new_stream_start("empty"));
-  gst_harness_push_event(h.get(), gst_event_new_caps(caps.get()));
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  EXPECT_TRUE(h.pull_event(GST_EVENT_SEGMENT));
-  EXPECT_EQ(h.error(), "");
 }
 
 TEST_P(EveryFormat, IsOfOneSize) {
@@ -212,14 +190,6 @@ TEST(EventDatEnc, TellsOfAllPausesThatAreLeftOut) {
   EXPECT_TRUE(h.warning().starts_with("Left out a pause of 7200 s"));
   EXPECT_TRUE(h.warning().starts_with("Left out pauses of 25200 s in total"));
   EXPECT_EQ(h.warning(), "");
-}
-
-TEST_P(EveryFormat, RefusesBuffersThatAreNoEvents) {
-  Writer h(format());
-  GstBuffer* buffer = gst_buffer_new_memdup("seven b", 7);
-  GST_BUFFER_PTS(buffer) = 0;
-  EXPECT_EQ(h.push(buffer), GST_FLOW_ERROR);
-  EXPECT_NE(h.error(), "");
 }
 
 /// A client that joins late, as of tcpserversink, gets it from there.

@@ -64,15 +64,6 @@ TEST_F(FilterTest, DoesNotWriteToBuffersOfOthers) {
   EXPECT_EQ(bytes_of(buffer.get()), before);
 }
 
-TEST_F(FilterTest, WritesInPlace) {
-  GstBuffer* buffer = buffer_of(0, {on(0), on(5), on(6, 2)}, 20 * ms);
-  const GstMemory* memory = gst_buffer_peek_memory(buffer, 0);
-  h.push(buffer);
-  const auto out = h.pull();
-  EXPECT_EQ(out.get(), buffer);
-  EXPECT_EQ(gst_buffer_peek_memory(out.get(), 0), memory);
-}
-
 TEST_F(FilterTest, KeepsLabelsWithTheirEvents) {
   const std::vector events = {on(0), on(5), on(6, 2)};
   const GstEventCameraLabel labels[] = {{.object_class = 10, .cause = 1, .reserved = 0},
@@ -268,37 +259,6 @@ TEST(Trail, ForgetsBurstsWhereTimeGoesBack) {
   EXPECT_EQ(count_passed(h, 0, burst), 2U);
   g_object_set(h.element(), "mode", 0, nullptr);
   EXPECT_EQ(count_passed(h, 1000 * ms, burst), 1U);
-}
-
-TEST(Denoise, ForgetsNeighboursAfterAFlush) {
-  Harness h("eventdenoise method=baf");
-  h.caps(small_sensor);
-  EXPECT_EQ(count_passed(h, 0, {on(0, 1)}), 0U);
-  EXPECT_EQ(count_passed(h, 1 * ms, {on(0, 2)}), 1U);
-  flush({h.get()});
-  push_segment(h.get());
-  EXPECT_EQ(count_passed(h, 2 * ms, {on(0, 1)}), 0U);
-  // The default of each method applies at once.
-  EXPECT_EQ(count_passed(h, 22 * ms, {on(0, 2)}), 0U);
-  gst_util_set_object_arg(G_OBJECT(h.element()), "method", "stcf");
-  g_object_set(h.element(), "min-neighbours", 1, nullptr);
-  EXPECT_EQ(count_passed(h, 42 * ms, {on(0, 1)}), 1U);
-}
-
-TEST(AntiFlicker, ForgetsFlickerAfterAFlush) {
-  Harness h("eventantiflicker");
-  h.caps(small_sensor);
-  std::vector<Event> lamp;  // of 100 Hz
-  for (std::uint32_t t = 0; t < 400'000; t += 10'000) {
-    lamp.push_back(Event::at(0, 0, t, Polarity::on));
-    lamp.push_back(Event::at(0, 0, t + 5000, Polarity::off));
-  }
-  const auto first = count_passed(h, 0, lamp);
-  EXPECT_LT(first, 10U);
-  EXPECT_EQ(count_passed(h, 400 * ms, lamp), 0U);
-  flush({h.get()});
-  push_segment(h.get());
-  EXPECT_EQ(count_passed(h, 800 * ms, lamp), first);
 }
 
 TEST(RateControl, CountsWhatItDrops) {

@@ -133,18 +133,6 @@ TEST(Flip, MovesPixelsAsVideoflipDoes) {
   }
 }
 
-TEST(Flip, FollowsChanges) {
-  Harness h("eventflip");
-  h.caps(sensor);
-  EXPECT_EQ(passed(h, {on(1, 0)}), (Pixels{{1, 0}}));
-  gst_util_set_object_arg(G_OBJECT(h.element()), "video-direction", "90r");
-  EXPECT_EQ(passed(h, {on(1, 0)}), (Pixels{{3, 1}}));
-  EXPECT_EQ(size_of(h), "4x8");
-  EXPECT_NE(wanted("eventflip video-direction=90l", "width=20, height=30")
-                .find("width=(int)30, height=(int)20"),
-            std::string::npos);
-}
-
 /// From each direction to each other one, with and without a change of size.
 TEST(Flip, FollowsEveryChange) {
   const auto directed = [](Harness& h, int direction) {
@@ -234,15 +222,6 @@ TEST(Scale, CountsEvents) {
   EXPECT_EQ(passed(h, {on(1, 1, 0), on(1, 1, 1)}), Pixels{});
 }
 
-TEST(Polarity, IsKeptAndInverted) {
-  Harness h("eventpolarity keep=off invert=true");
-  h.caps(sensor);
-  h.push(buffer_of(0, {on(1, 1), Event::at(2, 2, 0, Polarity::off)}, ms));
-  const auto out = h.pull();
-  ASSERT_EQ(pixels_of(out), (Pixels{{2, 2}}));
-  EXPECT_TRUE(gst_event_camera_event_is_on(events_of(out.get()).data()));
-}
-
 /// A file of the name of the test.
 class FileTest : public testing::Test {
  protected:
@@ -330,29 +309,6 @@ TEST_F(FileTest, CalibrationOfAnotherSizeIsAnError) {
   EXPECT_NE(error_of("eventundistort" + location()).find("line"), std::string::npos);
   EXPECT_NE(error_of("eventundistort location=/nowhere/at/all.yaml").find("/nowhere"),
             std::string::npos);
-}
-
-TEST_F(FileTest, CalibrationMayHaveOneSideOnly) {
-  for (const char* side : {"image_width: 8\n", "image_height: 4\n"}) {
-    write(calibration("0.", side));
-    Harness h("eventundistort" + location());
-    h.caps(sensor);
-    EXPECT_EQ(passed(h, {on(1, 1)}), (Pixels{{1, 1}})) << side;
-  }
-}
-
-TEST(Geometry, CombinesInOneLine) {
-  Player player(
-      "videotestsrc num-buffers=5 pattern=ball ! video/x-raw, width=640, height=480 ! "
-      "eventsim-frame "
-      "! eventcrop left=100 ! eventflip video-direction=90r ! eventscale ! "
-      "application/x-event-camera,width=320,height=240");
-  ASSERT_TRUE(player.play()) << player.error;
-  EXPECT_GT(player.events.size(), 100U);
-  for (const auto& event : player.events) {
-    ASSERT_LT(event.x, 320);
-    ASSERT_LT(event.y(), 240);
-  }
 }
 
 }  // namespace

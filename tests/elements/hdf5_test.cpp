@@ -93,16 +93,6 @@ Events read(const std::string& path) {
   return events;
 }
 
-TEST_P(Hdf5, IsEmptyWhereThereAreNoEvents) {
-  const auto path = written({});
-  for (const char* way : {"", "queue ! "}) {
-    Player player("filesrc location=" + in_quotes(path) + " ! " + way + "eventhdf5dec");
-    EXPECT_TRUE(player.play()) << player.error;
-    EXPECT_TRUE(player.events.empty());
-    EXPECT_EQ(player.warnings.size(), 1U);
-  }
-}
-
 TEST_P(Hdf5, IsWritten) {
   const auto events = some_events();
   const auto path = folder_ / "out.h5";
@@ -220,14 +210,6 @@ TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
   EXPECT_EQ(sink.warning(), "");
   EXPECT_EQ(sink.error(), "");
   EXPECT_TRUE(read(path) == (Events{events[0], events[3]}));
-}
-
-TEST_P(Hdf5, IsNotWrittenBackwards) {
-  Sink sink("eventhdf5sink format=" + std::string(GetParam()) +
-            " location=" + in_quotes(folder_ / "out.h5"));
-  sink.caps(events_caps);
-  push_backwards_segment(sink.get());
-  EXPECT_EQ(sink.error(), "Cannot write events backwards; play at a positive rate.");
 }
 
 TEST_P(Hdf5, IsWrittenAnewAfterAFlush) {

@@ -68,58 +68,6 @@ class Log {
   std::vector<Line> lines_;
 };
 
-struct Case {
-  const char* category;
-  const char* launch;  ///< for events of 320x240 pixels; a path follows `location=` at its end
-};
-
-class EveryElement : public testing::TestWithParam<Case> {};
-
-#define EVENTS                                                      \
-  "videotestsrc pattern=ball num-buffers=4 ! "                      \
-  "video/x-raw,format=GRAY8,width=320,height=240,framerate=25/1 ! " \
-  "eventsim-diff ! application/x-event-camera,format=XYTP "
-
-constexpr Case cases[] = {
-    {"eventwriter", EVENTS "! evtenc ! fakesink"},
-    {"eventreader", EVENTS "! evtenc ! evtdec ! fakesink"},
-    {"evtparse", EVENTS "! evtenc ! application/x-event-camera,format=EVT3 ! evtparse ! fakesink"},
-    {"eventhdf5sink", EVENTS "! eventhdf5sink location="},
-    {"aedatmux", EVENTS "! aedatmux ! fakesink"},
-    {"eventstats", EVENTS "! eventstats ! fakesink"},
-    {"eventcompare", EVENTS "! tee name=t ! queue ! compare.reference eventcompare name=compare ! "
-                            "fakesink t. ! queue ! compare.candidate"},
-    {"eventmerge", EVENTS "! tee name=t ! queue ! merge. eventmerge name=merge ! fakesink t. ! "
-                          "queue ! merge."},
-    {"eventpictures", EVENTS "! eventrender ! fakesink"},
-    {"eventtensor", EVENTS "! eventtensor ! fakesink"},
-    {"eventoverlay",
-     EVENTS "! overlay.event_sink eventoverlay name=overlay ! fakesink videotestsrc "
-            "num-buffers=4 ! video/x-raw,width=320,height=240,framerate=25/1 ! "
-            "overlay.video_sink"},
-    {"eventdatagrampay", EVENTS "! eventdatagrampay ! fakesink"},
-    {"eventdatagramdepay", EVENTS "! eventdatagrampay format=es ! eventdatagramdepay format=es "
-                                  "width=320 height=240 ! fakesink"},
-    {"rtpeventpay", EVENTS "! rtpeventpay ! fakesink"},
-    {"rtpeventdepay", EVENTS "! rtpeventpay ! rtpeventdepay ! fakesink"},
-};
-INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(cases),
-                         [](const auto& test) { return std::string(test.param.category); });
-
-TEST_P(EveryElement, LogsItsFormatAndTheEventsOfEachBuffer) {
-  Log log(GetParam().category);
-  const TemporaryFile file;
-  const std::string launch = GetParam().launch;
-  {
-    Pipeline pipeline(launch.ends_with("=") ? launch + in_quotes(file.path()) : launch);
-    ASSERT_TRUE(pipeline.play()) << pipeline.error;
-  }
-  EXPECT_TRUE(std::ranges::any_of(
-      log.with("320"), [](const Log::Line& line) { return line.level == GST_LEVEL_DEBUG; }));
-  const auto buffers = log.with(" events ");
-  EXPECT_GE(std::ranges::count(buffers, GST_LEVEL_LOG, &Log::Line::level), 3);
-}
-
 TEST(Log, WarnsOnceOfSkippedEvents) {
   Log log("eventstats");
   Harness h("eventstats");

@@ -167,21 +167,6 @@ TEST_F(StatsTest, CountsASilenceBetweenBuffersAsTime) {
   EXPECT_NEAR(number_in(structure_of(message), "rate"), 20, 1e-9);
 }
 
-TEST_F(StatsTest, EndsWithoutAnyEvent) {
-  for (const bool with_caps : {true, false}) {
-    Harness h("eventstats location=" + in_quotes(path("f.json")) +
-              " map=" + in_quotes(path("map.png")));
-    if (with_caps) h.caps(small_sensor);
-    gst_harness_push_event(h.get(), gst_event_new_eos());
-    const auto message = h.message(GST_MESSAGE_ELEMENT);
-    ASSERT_TRUE(message);
-    EXPECT_EQ(count_in(structure_of(message)), 0U);
-    EXPECT_EQ(number_in(structure_of(message), "rate"), 0);
-    EXPECT_NE(text_in(path("f.json")).find("\"events\" : 0"), std::string::npos);
-    EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
-  }
-}
-
 TEST_F(StatsTest, ForgetsWhatLiesBeforeAFlush) {
   Harness h("eventstats");
   h.caps(small_sensor);
@@ -345,14 +330,6 @@ TEST_F(StatsTest, SaysBeforehandThatAFolderIsMissing) {
   }
 }
 
-TEST_F(StatsTest, SaysThatAFolderHasGoneMissing) {
-  Harness h("eventstats location=" + in_quotes(path("f.json")));
-  h.caps(small_sensor);
-  std::filesystem::remove_all(folder);
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
-}
-
 /* eventcompare */
 
 class CompareTest : public MeasureTest {
@@ -454,25 +431,6 @@ TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
   for (const char* field : {"map-correlation", "candidate-matches", "rate-curve", "std-dev"})
     EXPECT_NE(json.find(field), std::string::npos) << field;
   EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
-}
-
-TEST_F(CompareTest, FindsAStreamLikeItself) {
-  make();
-  begin();
-  for (GstClockTime t = 0; t < 100 * ms; t += 10 * ms) {
-    const std::vector events = {Event::at(static_cast<int>(t / ms / 13), 2, 700, Polarity::on),
-                                Event::at(1, 1, 7'000, Polarity::off)};
-    for (auto* h : {reference, candidate}) gst_harness_push(h, buffer_of(t, events, 10 * ms));
-  }
-  end(reference);
-  end(candidate);
-  const auto* figures = conclude();
-  ASSERT_TRUE(figures);
-  EXPECT_EQ(count_in(within(figures, "reference")), 20U);
-  EXPECT_EQ(count_in(within(figures, "candidate")), 20U);
-  EXPECT_DOUBLE_EQ(number_in(figures, "map-correlation"), 1);
-  EXPECT_EQ(number_in(within(figures, "reference-matches"), "within-1ms"), 1);
-  EXPECT_EQ(passed.size(), 10U);
 }
 
 TEST_F(CompareTest, PassesTheCandidateOnWhereTheReferenceHasEnded) {
@@ -585,21 +543,6 @@ TEST_F(CompareTest, PassesTheCustomEventsOfTheCandidateOn) {
                                       "of-candidate", "buffer", "eos"}));
 }
 
-TEST_F(CompareTest, PassesGapsBeforeTheFirstEventsOn) {
-  make();
-  const OutputOrder output(candidate);
-  begin();
-  for (const GstClockTime t : {0 * ms, 10 * ms})
-    for (auto* h : {reference, candidate}) gst_harness_push_event(h, gst_event_new_gap(t, 10 * ms));
-  for (auto* h : {reference, candidate}) end(h);
-  EXPECT_TRUE(conclude());
-  EXPECT_EQ(output.names(),
-            (std::vector<std::string>{"stream-start", "caps", "segment", "buffer", "gap", "eos"}));
-  ASSERT_EQ(passed.size(), 1U);
-  EXPECT_EQ(gst_buffer_get_size(passed[0].get()), 0U);
-  EXPECT_EQ(GST_BUFFER_DURATION(passed[0].get()), 10 * ms);
-}
-
 TEST_F(CompareTest, ClassifiesWhereNoEventIsLeft) {
   make();
   begin();
@@ -618,18 +561,6 @@ TEST_F(CompareTest, ClassifiesWhereNoEventIsLeft) {
   EXPECT_EQ(count_in(classification, "true-negatives"), 1U);
 }
 
-TEST_F(CompareTest, EndsWithoutAnyEvent) {
-  make("location=" + in_quotes(path("f.json")));
-  begin();
-  end(reference);
-  end(candidate);
-  const auto* figures = conclude();
-  ASSERT_TRUE(figures);
-  EXPECT_EQ(count_in(within(figures, "reference")), 0U);
-  EXPECT_EQ(number_in(figures, "map-correlation"), 0);
-  EXPECT_FALSE(text_in(path("f.json")).empty());
-}
-
 TEST_F(CompareTest, WritesWhatHasComeWhereItIsStopped) {
   make("location=" + in_quotes(path("f.json")) + " map=" + in_quotes(path("map.png")));
   begin();
@@ -645,13 +576,6 @@ TEST_F(CompareTest, WritesWhatHasComeWhereItIsStopped) {
   EXPECT_EQ(time_in(structure_of(message), "start"), 0);
 }
 
-TEST_F(CompareTest, WritesNothingAtAStopWhereNothingHasCome) {
-  make("location=" + in_quotes(path("f.json")));
-  begin();
-  gst_element_set_state(compare->element.get(), GST_STATE_READY);
-  EXPECT_FALSE(std::filesystem::exists(path("f.json")));
-}
-
 TEST_F(CompareTest, WritesNothingAtAStopWhereNothingHasComeSinceItDid) {
   make("location=" + in_quotes(path("f.json")));
   begin();
@@ -663,17 +587,6 @@ TEST_F(CompareTest, WritesNothingAtAStopWhereNothingHasComeSinceItDid) {
   EXPECT_TRUE(std::filesystem::remove(path("f.json")));
   gst_element_set_state(compare->element.get(), GST_STATE_READY);
   EXPECT_FALSE(std::filesystem::exists(path("f.json")));
-}
-
-TEST_F(CompareTest, RefusesSensorsOfTwoSizes) {
-  make();
-  begin(small_sensor, "application/x-event-camera, format=XYTP, width=9, height=4");
-  for (auto* h : {reference, candidate})
-    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
-  const Owned<GstMessage> message(
-      gst_bus_timed_pop_filtered(compare->bus.get(), 5 * GST_SECOND, GST_MESSAGE_ERROR));
-  ASSERT_TRUE(message);
-  EXPECT_NE(text_of(message.get()).find("8 x 4 pixels, the candidate 9 x 4"), std::string::npos);
 }
 
 /// Which asks for memory again. A tee waits for the answers of both of its branches.

@@ -3,11 +3,7 @@
 #include <gst/app/gstappsrc.h>
 
 #include <algorithm>
-#include <atomic>
-#include <chrono>
 #include <ctime>
-#include <future>
-#include <tuple>
 
 #include "src/core/label.hpp"
 #include "tests/elements/pipeline.hpp"
@@ -126,7 +122,6 @@ class MergeTest : public testing::Test {
     return output_.events;
   }
 
-  /// Caps of the next buffer, whose events are added to the output.
   std::string next_error() {
     const Owned<GstMessage> error(
         gst_bus_timed_pop_filtered(inputs_.bus.get(), 10 * GST_SECOND, GST_MESSAGE_ERROR));
@@ -134,6 +129,7 @@ class MergeTest : public testing::Test {
     return error ? text_of(error.get()) : "";
   }
 
+  /// Size in the caps of the next buffer, whose events are added to the output.
   std::string next_size() {
     const Buffer buffer(gst_harness_pull(a()));
     EXPECT_TRUE(buffer);
@@ -146,8 +142,6 @@ class MergeTest : public testing::Test {
     return std::to_string(width) + "x" + std::to_string(height);
   }
 
-  /// Running time of a buffer that was pulled before the next one was pushed, or all of the
-  /// segment.
   TwoInputs inputs_;
   MergedOutput output_;
 };
@@ -488,18 +482,6 @@ TEST_F(MergeTest, StartsOverOnceAllStreamsGoBackWithNewSegments) {
   EXPECT_EQ(stat_of(element(), "late-events"), 0U);
 }
 
-TEST_F(MergeTest, StartsOverAfterAFlush) {
-  begin();
-  push(a(), 50 * ms, {on(1, 0, 1)});
-  flush({a(), b()});
-  for (auto* h : {a(), b()}) push_segment(h);
-  push(a(), 0, {on(2, 0, 5)});
-  push(b(), 0, {on(3, 0, 6)});
-  end(a());
-  end(b());
-  EXPECT_EQ(rest(), (Events{on_at(2, 0, 5), on_at(3, 0, 6)}));
-}
-
 /// Two recordings, of which the second one starts earlier.
 TEST_F(MergeTest, MergesByTimestamps) {
   begin();
@@ -519,25 +501,6 @@ TEST_F(MergeTest, MergesByTimestamps) {
   gst_event_copy_segment(event.get(), &segment);
   EXPECT_EQ(segment.start, 10 * ms);
   EXPECT_EQ(segment.stop, GST_CLOCK_TIME_NONE);
-}
-
-TEST_F(MergeTest, IsDiscontinuousWhereAStreamIs) {
-  begin();
-  push(a(), 0, {on(1, 0, 1)});
-  push(b(), 0, {on(2, 0, 2)});
-  push(a(), 10 * ms, {on(1, 0, 1)});
-  GstBuffer* const discontinuous = buffer_of(25 * ms, {on(2, 0, 2)}, 5 * ms);
-  GST_BUFFER_FLAG_SET(discontinuous, GST_BUFFER_FLAG_DISCONT);
-  gst_harness_push(b(), discontinuous);
-  push(a(), 20 * ms, {on(1, 0, 1)});
-  push(a(), 30 * ms, {on(1, 0, 1)});
-  push(b(), 30 * ms, {on(2, 0, 2)});
-  for (const GstClockTime start : {0, 10, 20, 30}) {
-    const Buffer buffer(gst_harness_pull(a()));
-    ASSERT_TRUE(buffer);
-    EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), start * ms);
-    EXPECT_EQ(GST_BUFFER_IS_DISCONT(buffer.get()) != FALSE, start == 0 || start == 20) << start;
-  }
 }
 
 /// A GAP cannot tell it.
@@ -582,56 +545,6 @@ TEST_F(MergeTest, KeepsLabels) {
 
 /* pipelines */
 
-/// Two recordings, and their events.
-struct Recordings {
-  Recordings() {
-    write(a, "ball");
-    write(b, "bar");
-  }
-
-  static void write(const TemporaryFile& file, const std::string& pattern) {
-    Pipeline pipeline("videotestsrc num-buffers=30 pattern=" + pattern +
-                      (pattern == "bar" ? " horizontal-speed=2" : "") +
-                      " ! video/x-raw, width=64, height=48 ! eventsim-sparse ! evtenc" +
-                      file.sink());
-    EXPECT_TRUE(pipeline.play()) << pipeline.error;
-  }
-  static Events read(const TemporaryFile& file) {
-    Player player(file.source() + "evtdec");
-    EXPECT_TRUE(player.play()) << player.error;
-    return player.events;
-  }
-
-  TemporaryFile a;
-  TemporaryFile b;
-};
-
-auto order_of(const AbsoluteEvent& event) {
-  return std::tuple(event.t, event.x, event.y_p);
-}
-Events sorted(Events events) {
-  std::ranges::sort(events, {}, order_of);
-  return events;
-}
-
-TEST(Merge, WritesTwoRecordingsIntoOne) {
-  const Recordings recordings;
-  const TemporaryFile both;
-  Pipeline pipeline("eventmerge name=m ! evtenc" + both.sink() + "  " + recordings.a.source() +
-                    "evtdec ! m.sink_0  " + recordings.b.source() +
-                    "evtdec buffer-duration=7000000 ! m.sink_1");
-  ASSERT_TRUE(pipeline.play()) << pipeline.error;
-  EXPECT_TRUE(pipeline.warnings.empty());
-  auto expected = Recordings::read(recordings.a);
-  const auto second = Recordings::read(recordings.b);
-  ASSERT_GT(expected.size(), 100U);
-  ASSERT_GT(second.size(), 100U);
-  expected.insert(expected.end(), second.begin(), second.end());
-  const auto merged = Recordings::read(both);
-  EXPECT_TRUE(std::ranges::is_sorted(merged, {}, &AbsoluteEvent::t));
-  EXPECT_EQ(sorted(merged), sorted(expected));
-}
-
 TEST(Merge, GoesOnWithTheNextStream) {
   const std::string stream =
       "videotestsrc num-buffers=10 pattern=ball ! video/x-raw, width=64, height=48 ! eventsim-diff";
@@ -645,63 +558,6 @@ TEST(Merge, GoesOnWithTheNextStream) {
   ASSERT_TRUE(player.play()) << player.error;
   EXPECT_TRUE(player.warnings.empty());
   EXPECT_TRUE(player.events == expected) << player.events.size();
-}
-
-TEST(Merge, SeeksInAllRecordings) {
-  const Recordings recordings;
-  Player player("eventmerge name=m sink_1::xpos=64  " + recordings.a.source() +
-                "evtdec ! m.sink_0  " + recordings.b.source() + "evtdec ! m.sink_1  m.");
-  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-  EXPECT_GT(player.duration(), 900 * ms);
-  ASSERT_TRUE(player.seek(500 * ms, 700 * ms));
-  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-  ASSERT_TRUE(player.play()) << player.error;
-  // The recordings start with their first events.
-  const auto first = Recordings::read(recordings.a).front().t;
-  Events expected;
-  const auto expect = [&](const Events& events, int offset) {
-    for (auto event : events) {
-      event.x = static_cast<std::uint16_t>(event.x + offset);
-      if (event.t >= first + 500'000 && event.t < first + 700'000) expected.push_back(event);
-    }
-  };
-  expect(Recordings::read(recordings.a), 0);
-  expect(Recordings::read(recordings.b), 64);
-  ASSERT_GT(expected.size(), 100U);
-  EXPECT_EQ(sorted(player.events), sorted(expected));
-}
-
-TEST(Merge, EndsASegmentOfAllRecordings) {
-  const Recordings recordings;
-  Player player("eventmerge name=m  " + recordings.a.source() + "evtdec ! m.sink_0  " +
-                recordings.b.source() + "evtdec ! m.sink_1  m.");
-  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-  GstPad* const sink = gst_element_get_static_pad(player["sink"], "sink");
-  struct Segment {
-    const Player& player;
-    std::promise<std::size_t> end{};  // with the number of events
-  } segment{player};
-  gst_pad_add_probe(
-      sink, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
-      +[](GstPad*, GstPadProbeInfo* info, gpointer to) {
-        auto& played = *static_cast<Segment*>(to);
-        if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_SEGMENT_DONE)
-          played.end.set_value(played.player.events.size());
-        return GST_PAD_PROBE_OK;
-      },
-      &segment, nullptr);
-  gst_object_unref(sink);
-  ASSERT_TRUE(player.seek(500 * ms, 700 * ms, GST_SEEK_FLAG_SEGMENT));
-  ASSERT_TRUE(player.play()) << player.error;
-  EXPECT_EQ(player.end, GST_MESSAGE_SEGMENT_DONE);
-  auto end = segment.end.get_future();
-  ASSERT_EQ(end.wait_for(std::chrono::seconds(60)), std::future_status::ready);
-  Player all("eventmerge name=m  " + recordings.a.source() + "evtdec ! m.sink_0  " +
-             recordings.b.source() + "evtdec ! m.sink_1  m.");
-  ASSERT_TRUE(all.reaches(GST_STATE_PAUSED));
-  ASSERT_TRUE(all.seek(500 * ms, 700 * ms));
-  ASSERT_TRUE(all.play()) << all.error;
-  EXPECT_EQ(end.get(), all.events.size());
 }
 
 /// Recordings of one clock, the second of which starts 10 s later.
@@ -783,31 +639,12 @@ TEST(Merge, CountsASeekFromTheEndOfTheLastRecording) {
 
 /// Streams reach it at different times.
 TEST(Merge, RefusesASeekThatDoesNotFlush) {
-  const Recordings recordings;
-  Player player("eventmerge name=m  " + recordings.a.source() + "evtdec ! m.sink_0  " +
-                recordings.b.source() + "evtdec ! m.sink_1  m.");
+  const Distant recordings;
+  Player player(recordings.line());
   ASSERT_TRUE(player.reaches(GST_STATE_PAUSED)) << player.error;
   EXPECT_FALSE(gst_element_seek(player["m"], 1, GST_FORMAT_TIME, GST_SEEK_FLAG_NONE,
                                 GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_NONE, -1));
   EXPECT_TRUE(player.play()) << player.error;
-}
-
-TEST(Merge, WaitsForTheSecondStream) {
-  const Owned<GstHarness> first(gst_harness_new_with_padnames("eventmerge", "sink_0", "src"));
-  gst_harness_set_live(first.get(), FALSE);
-  gst_harness_set_src_caps_str(first.get(), small);
-  gst_harness_push(first.get(), buffer_of(0, {on(1, 0, 1)}, 10 * ms));
-  const std::clock_t before = std::clock();
-  g_usleep(300'000);
-  EXPECT_LT(std::clock() - before, CLOCKS_PER_SEC / 10) << "it waits without a pause";
-  EXPECT_EQ(gst_harness_buffers_in_queue(first.get()), 0U);
-  const Owned<GstHarness> second(gst_harness_new_with_element(first->element, "sink_1", nullptr));
-  gst_harness_set_live(second.get(), FALSE);
-  gst_harness_set_src_caps_str(second.get(), small);
-  gst_harness_push(second.get(), buffer_of(0, {on(2, 0, 0)}, 10 * ms));
-  const Buffer buffer(gst_harness_pull(first.get()));
-  ASSERT_TRUE(buffer);
-  EXPECT_EQ(events_of(buffer.get()).size(), 2U);
 }
 
 TEST(Merge, WaitsForTheSecondStreamWhereTheFirstIsEmpty) {
@@ -879,31 +716,6 @@ TEST(Merge, GoesOnWithoutALateLiveStream) {
     return done();
   };
   ASSERT_TRUE(wait_until([&] { return player.stat("m", "events") > 100; }));
-  // Buffers keep the latency that is reported, however late the other stream is.
-  struct Lateness {
-    GstElement* pipeline;
-    std::atomic<GstClockTimeDiff> min = G_MAXINT64;
-  } lateness{player.get()};
-  GstPad* const src = gst_element_get_static_pad(player["m"], "src");
-  const auto measure = +[](GstPad*, GstPadProbeInfo* info, gpointer data) {
-    auto& found = *static_cast<Lateness*>(data);
-    const GstClockTime now = gst_element_get_current_running_time(found.pipeline);
-    found.min = std::min(found.min.load(),
-                         GST_CLOCK_DIFF(GST_BUFFER_PTS(GST_PAD_PROBE_INFO_BUFFER(info)), now));
-    return GST_PAD_PROBE_OK;
-  };
-  const gulong probe =
-      gst_pad_add_probe(src, GST_PAD_PROBE_TYPE_BUFFER, measure, &lateness, nullptr);
-  EXPECT_TRUE(wait_until([&] { return lateness.min < G_MAXINT64; }));
-  g_usleep(300'000);
-  gst_pad_remove_probe(src, probe);
-  GstQuery* const query = gst_query_new_latency();
-  ASSERT_TRUE(gst_pad_query(src, query));
-  GstClockTime latency = 0;
-  gst_query_parse_latency(query, nullptr, &latency, nullptr);
-  gst_query_unref(query);
-  EXPECT_LT(lateness.min, static_cast<GstClockTimeDiff>(latency + 50 * GST_MSECOND));
-  gst_object_unref(src);
   gst_app_src_push_buffer(GST_APP_SRC(player["late"]), buffer_of(0, {on(1, 1, 1)}, 10 * ms));
   EXPECT_TRUE(wait_until([&] { return player.stat("m", "late-events") == 1; }));
   const auto before = player.stat("m", "events");

@@ -226,34 +226,6 @@ TEST_F(OverlayTest, GoesOnThroughGapsAndPastTheEndOfEvents) {
   EXPECT_EQ(rest, nullptr);
 }
 
-TEST_F(OverlayTest, EndsASegmentOnceBothHave) {
-  begin("width=8, height=4");
-  for (int i = 0; i < 2; ++i) {
-    push_frame(0);
-    push_events(0, {Event::at(1, 0, 5, Polarity::on)});
-    EXPECT_EQ(drawn(), (Places{{1, 255}}));
-    end_segment(events.get());
-    push_frame(40 * ms);
-    EXPECT_EQ(drawn(), Places{});
-    end_segment(video.get());
-    ASSERT_TRUE(next_event(video.get(), GST_EVENT_SEGMENT_DONE));
-
-    for (auto* h : {video.get(), events.get()}) play_on(h, 80 * ms);
-    end_segment(video.get());
-    push_events(0, {});
-    push_events(40 * ms, {});
-    end_segment(events.get());
-    ASSERT_TRUE(next_event(video.get(), GST_EVENT_SEGMENT_DONE));
-    for (auto* h : {video.get(), events.get()}) play_on(h, 160 * ms);
-  }
-  for (auto* h : {video.get(), events.get()}) gst_harness_push_event(h, gst_event_new_eos());
-  GstBuffer* rest = nullptr;
-  EXPECT_TRUE(gst_harness_pull_until_eos(video.get(), &rest));
-  EXPECT_EQ(rest, nullptr);
-  while (const Owned<GstEvent> event{gst_harness_try_pull_event(video.get())})
-    EXPECT_NE(GST_EVENT_TYPE(event.get()), GST_EVENT_SEGMENT_DONE);
-}
-
 TEST_F(OverlayTest, PassesGapsInTheVideoOn) {
   begin("width=8, height=4");
   gst_harness_push_event(video.get(), gst_event_new_gap(0, 40 * ms));  // before any frame
@@ -306,17 +278,6 @@ TEST_F(OverlayTest, SendsNoGapBeforeItsSegment) {
   const Owned<GstEvent> event(gst_harness_pull_event(video.get()));
   ASSERT_TRUE(event);
   EXPECT_EQ(GST_EVENT_TYPE(event.get()), GST_EVENT_SEGMENT);
-}
-
-TEST_F(OverlayTest, GoesOnThroughGapsWithoutCaps) {
-  gst_harness_set_src_caps_str(video.get(),
-                               "video/x-raw, format=GRAY8, width=8, height=4, framerate=25/1");
-  push_segment(events.get());
-  for (const GstClockTime pts : {0 * ms, 40 * ms, 80 * ms}) {
-    push_frame(pts);
-    gst_harness_push_event(events.get(), gst_event_new_gap(pts, 40 * ms));
-    EXPECT_EQ(drawn(), Places{});
-  }
 }
 
 TEST_F(OverlayTest, GoesOnWithoutEventsThatEndBeforeTheyBegin) {

@@ -218,7 +218,7 @@ TEST_P(EveryElement, TakesRandomPropertiesWhilePlaying) {
   const auto properties = writable_properties_of(playback.element());
   Random random(1);  // NOLINT(bugprone-random-generator-seed): reproducible
   playback.reach(GST_STATE_PLAYING);
-  for (int i = repetitions(400, 2'000); i > 0 && !HasFailure(); --i) {
+  for (int i = repetitions(200, 2'000); i > 0 && !HasFailure(); --i) {
     if (!properties.empty()) {
       GParamSpec* const spec = properties[random() % properties.size()];
       Value value(spec);

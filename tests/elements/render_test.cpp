@@ -138,17 +138,6 @@ TEST_F(Render, KeepsIntervalsApartThatAreRounded) {
         << i;
 }
 
-TEST_F(Render, IsIndependentOfHowEventsCome) {
-  begin(grey_at("50/1"));
-  // One column at 20 ms and the next at 60 ms, the limits of pictures.
-  push(0, column(5));
-  push(40 * ms, column(6));
-  expect(finish(), {{0, 20 * ms, accumulated(column(5))},
-                    {20 * ms, 20 * ms, blank},
-                    {40 * ms, 20 * ms, accumulated(column(6))},
-                    {60 * ms, 20 * ms, blank}});
-}
-
 class RenderOverlapping : public Render {
  protected:
   RenderOverlapping() : Render("eventrender accumulation-time=60000000") {}
@@ -245,11 +234,6 @@ TEST_F(Render, DrawsWhatThereIsAtTheEndOfASegment) {
   EXPECT_TRUE(finish().empty());
 }
 
-TEST_F(Render, EndsWithoutEvents) {
-  begin(grey_at("10/1"));
-  EXPECT_TRUE(finish().empty());
-}
-
 TEST_F(Render, TakesBuffersWithoutDuration) {
   begin(grey_at("50/1"));
   push(0, column(1), GST_CLOCK_TIME_NONE);
@@ -308,14 +292,6 @@ TEST_F(Render, ShowsNothingFromOutsideTheSegment) {
   std::ranges::copy(column(3), std::back_inserter(first));
   expect(pictures,
          {{100 * ms, 40 * ms, accumulated(first)}, {140 * ms, 40 * ms, accumulated(column(4))}});
-}
-
-TEST_F(Render, ShowsAnEventAtTheVeryStart) {
-  begin(grey_at("25/1"));
-  const std::vector first = {Event::at(2, 1, 0, Polarity::on)};
-  push(0, first);
-  push(40 * ms, column(1));
-  expect(finish(), {{0, 40 * ms, accumulated(first)}, {40 * ms, 40 * ms, accumulated(column(1))}});
 }
 
 TEST_F(Render, DrawsShorterIntervalsWhenPlayedSlower) {

@@ -127,7 +127,7 @@ TEST_P(EverySimulator, StandsBesideItsLikes) {
   const auto expected = intervals(h, 6);
   std::vector<std::thread> threads;
   std::atomic<int> equal = 0;
-  for (int i = 0; i < 16; ++i) {
+  for (int i = 0; i < 4; ++i) {
     threads.emplace_back([&, i] {
       Harness other(std::string(GetParam()) + " n-threads=" + std::to_string(i % 3));
       other.caps(video(61, 43));
@@ -135,7 +135,7 @@ TEST_P(EverySimulator, StandsBesideItsLikes) {
     });
   }
   for (auto& thread : threads) thread.join();
-  EXPECT_EQ(equal, 16);
+  EXPECT_EQ(equal, 4);
 }
 
 TEST_P(EverySimulator, TakesPropertiesWhilePlaying) {
@@ -160,19 +160,10 @@ TEST_P(EverySimulator, TakesPropertiesWhilePlaying) {
         g_object_set(h.element(), "flow", i % 3, nullptr);
     }
   });
-  intervals(h, 40);
+  intervals(h, 15);
   done = true;
   application.join();
   EXPECT_EQ(h.error(), "");
-}
-
-TEST(Stream, RefusesFramesThatAreTooSmall) {
-  Harness h("eventsim-frame");
-  h.caps(video(61, 43));
-  GstBuffer* buffer = gst_buffer_new_allocate(nullptr, 100, nullptr);
-  GST_BUFFER_PTS(buffer) = 0;
-  EXPECT_EQ(h.push(buffer), GST_FLOW_ERROR);
-  EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
 }
 
 /// A frame with an invalid meta.

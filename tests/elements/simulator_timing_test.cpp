@@ -57,20 +57,6 @@ class EverySimulatorAlone : public EverySimulator {
 };
 INSTANTIATE_TEST_SUITE_P(, EverySimulatorAlone, testing::ValuesIn(simulators));
 
-TEST_P(EverySimulator, MakesOneIntervalLessThanThereAreFrames) {
-  h.caps(video);
-  for (int i = 0; i < 5; ++i) ASSERT_EQ(flash(i * 40 * GST_MSECOND), GST_FLOW_OK);
-  for (int i = 1; i < 5; ++i) expect_interval((i - 1) * 40 * GST_MSECOND, i * 40 * GST_MSECOND);
-  EXPECT_FALSE(h.pull());
-}
-
-TEST_P(EverySimulator, StampsIntervalsOfUnevenFrames) {
-  h.caps(uneven);
-  const GstClockTime times[] = {7, 33'333'340, 40'000'000, 140'000'123};
-  for (const auto time : times) flash(time);
-  for (int i = 1; i < 4; ++i) expect_interval(times[i - 1], times[i]);
-}
-
 TEST_P(EverySimulator, SendsAGapForAnIntervalWithoutEvents) {
   h.caps(video);
   h.push(h.flat(0, 90));
@@ -168,19 +154,6 @@ TEST_P(EverySimulator, BeginsAnewAfterAFrameThatFails) {
     EXPECT_TRUE(discontinuous[0]);
     EXPECT_FALSE(discontinuous[1]);
   }
-}
-
-TEST_P(EverySimulator, BeginsAnewAfterAFlush) {
-  h.caps(video);
-  flash(0);
-  flush({h.get()});
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
-  flash(40 * GST_MSECOND);
-  EXPECT_FALSE(h.pull());
-  flash(80 * GST_MSECOND);
-  expect_interval(40 * GST_MSECOND, 80 * GST_MSECOND);
 }
 
 TEST_P(EverySimulator, BeginsAnewInAnotherSegmentButNotInTheSame) {
@@ -473,16 +446,6 @@ TEST_P(EverySimulator, RefusesToRunBackwards) {
   EXPECT_EQ(h.error(), "");  // one is enough
   push_segment(h.get());
   EXPECT_EQ(flash(120 * GST_MSECOND), GST_FLOW_OK);
-}
-
-TEST_P(EverySimulator, SendsEosAfterTheLastInterval) {
-  h.caps(video);
-  flash(0);
-  flash(40 * GST_MSECOND);
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  expect_interval(0, 40 * GST_MSECOND);
-  EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
-  EXPECT_FALSE(h.pull());
 }
 
 /// A bright square that moves down by a pixel a frame.

@@ -160,16 +160,6 @@ TEST_F(Tensor, IsNotMovedByEventsPastTheEndOfTheirBuffer) {
   expect_tensor(20 * ms, 20 * ms, 3, 7);
 }
 
-TEST_F(Tensor, IsDiscontinuousWhereItsEventsAre) {
-  begin("");
-  for (const GstClockTime start : {0, 10, 20}) {
-    GstBuffer* buffer = buffer_of(start * ms, column(0), 10 * ms);
-    if (start == 10) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
-    h->push(buffer);
-    EXPECT_EQ(GST_BUFFER_IS_DISCONT(h->pull().get()) != FALSE, start < 20) << start;
-  }
-}
-
 TEST_F(Tensor, GoesOnThroughGaps) {
   begin("accumulation-time=10000000");
   push_columns(0, 0);
@@ -196,23 +186,6 @@ TEST_F(Tensor, IsNotMadeOfLongPauses) {
   expect_tensor(day, 10 * ms, 2, 4);
   EXPECT_NE(h->warning().find("The events pause"), std::string::npos);
   EXPECT_EQ(h->warning(), "");
-}
-
-TEST_F(Tensor, PassesGapsOnBetweenWindowsByCount) {
-  begin("event-count=2");
-  push_columns(0, 0);
-  gst_harness_push_event(h->get(), gst_event_new_gap(10 * ms, 20 * ms));
-  EXPECT_TRUE(h->pull_event(GST_EVENT_GAP));
-}
-
-TEST_F(Tensor, ComesAfterNoGapThatIsLater) {
-  begin("event-count=3");
-  push_columns(0, 0);
-  for (const GstClockTime start : {10, 20, 30})
-    gst_harness_push_event(h->get(), gst_event_new_gap(start * ms, 10 * ms));
-  push_columns(4, 4);
-  expect_tensor(3'333'000, 40 * ms, 0, 3);
-  EXPECT_FALSE(h->pull_event(GST_EVENT_GAP));
 }
 
 TEST_F(Tensor, ComesAfterNoLaterGapOfUnknownLength) {
@@ -314,16 +287,6 @@ TEST_F(Tensor, RefusesToBeHuge) {
   EXPECT_NE(h->push(buffer_of(0, column(0), 10 * ms)), GST_FLOW_OK);
   EXPECT_EQ(h->error(),
             "Cannot make tensors that take more than 1 GiB; lower bins or the resolution.");
-}
-
-/// What a time surface is made from counts, too: 13 bytes for each number.
-TEST_F(Tensor, RefusesToNeedHugeMemory) {
-  h.emplace("eventtensor representation=time-surface data-type=uint8");
-  gst_harness_set_src_caps_str(
-      h->get(),
-      "application/x-event-camera, format=XYTP, width=8192, height=8192, framerate=100/1");
-  EXPECT_NE(h->push(buffer_of(0, column(0), 10 * ms)), GST_FLOW_OK);
-  EXPECT_NE(h->error().find("1 GiB"), std::string::npos);
 }
 
 TEST_F(Tensor, RefusesToRunBackwards) {

@@ -12,7 +12,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -235,68 +234,6 @@ TEST_F(Bags, EndWherePagesOfADatabaseRepeat) {
   EXPECT_GT(contents.events.size(), 0U);
   EXPECT_LT(contents.events.size(), expected.events.size() / 2);
   EXPECT_EQ(decoder.corruption().places, 1U);
-}
-
-/// What there is from `t` on.
-Contents from(Microseconds t, const Contents& all) {
-  Contents part;
-  for (const auto& event : all.events)
-    if (event.t >= t) part.events.push_back(event);
-  for (const auto& frame : all.frames)
-    if (frame.t >= t) part.frames.push_back(frame);
-  return part;
-}
-
-TEST_F(Bags, SeekExactly) {
-  const auto first = expected.events.front().t;
-  const auto length = expected.events.back().t - first;
-  for (const auto& name : names()) {
-    SCOPED_TRACE(name);
-    const auto bytes = bytes_of(folder / name);
-    const bool is_database = name.ends_with(".db3");
-    const bool has_index = name.find("-no-") == std::string::npos;
-    for (const bool pulled : {false, true}) {
-      if (is_database && !pulled) continue;  // it is pushed again as a whole
-      MemoryBytes source(bytes);
-      const auto decoder = std::make_unique<BagDecoder>("");
-      if (pulled) decoder->open(source);
-      decoded(*decoder, bytes);
-      const auto start = decoder->seek_point_before(std::numeric_limits<Microseconds>::min());
-      ASSERT_TRUE(start);
-      for (const auto t :
-           {first, first + 1, first + length / 3, first + length / 2, first + length}) {
-        const auto point = decoder->seek_point_before(t);
-        ASSERT_TRUE(point);
-        if (pulled && has_index && t > first + length / 4) {
-          EXPECT_GT(point->position, start->position);
-        }
-        decoder->restart(*point);
-        Contents contents;
-        push(*decoder,
-             is_database
-                 ? Bytes{}
-                 : Bytes(bytes.begin() + static_cast<std::ptrdiff_t>(point->position), bytes.end()),
-             contents);
-        const auto want = from(t, expected);
-        const auto got = from(t, contents);
-        EXPECT_EQ(got.events, want.events);
-        EXPECT_EQ(got.frames, want.frames);
-      }
-    }
-  }
-}
-
-TEST_F(Bags, StateTheirLastTime) {
-  for (const auto& name : names()) {
-    if (name.find("-no-") != std::string::npos) continue;
-    SCOPED_TRACE(name);
-    const auto bytes = bytes_of(folder / name);
-    MemoryBytes source(bytes);
-    const auto decoder = std::make_unique<BagDecoder>("");
-    decoder->open(source);
-    decoded(*decoder, bytes);
-    EXPECT_EQ(decoder->last_time(), expected.events.back().t);
-  }
 }
 
 /// A source that reads nothing more once it is stopped.
@@ -692,39 +629,6 @@ TEST(Mcap, BeginsItsWordsWithoutAWrap) {
                           std::end(last_time_high)),
               bytes.end());
   }
-}
-
-TEST(Mcap, IsAsSpecified) {
-  const auto path = std::filesystem::temp_directory_path() / ("mcap-" + std::to_string(getpid()));
-  const auto save = [](const std::filesystem::path& file, const Bytes& bytes) {
-    std::ofstream(file, std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
-  };
-  auto events = random_events::make({346, 260}, 30'000, 7, 1'700'000'000'000'000, {3'000'000});
-  // Vectors of EVT3 words.
-  for (int x = 64; x < 90; ++x)
-    events.push_back(AbsoluteEvent::at(x, 9, events.back().t, Polarity::on));
-  Bytes expected;
-  for (const auto& event : events) {
-    const std::uint16_t rest[] = {event.x, static_cast<std::uint16_t>(event.y()),
-                                  static_cast<std::uint16_t>(event.polarity())};
-    const auto* const t = reinterpret_cast<const std::uint8_t*>(&event.t);
-    const auto* const others = reinterpret_cast<const std::uint8_t*>(rest);
-    expected.insert(expected.end(), t, t + sizeof event.t);
-    expected.insert(expected.end(), others, others + sizeof rest);
-  }
-  save(path.string() + ".bin", expected);
-  for (const auto format : {BagEvents::evt3, BagEvents::mono})
-    for (const auto compression :
-         {BagCompression::none, BagCompression::lz4, BagCompression::zstd}) {
-      save(path.string() + ".mcap", encoded({{346, 260}, format, compression}, events));
-      const auto command = "/usr/bin/python3 '" BAG_CHECK "' '" + path.string() + ".mcap' '" +
-                           path.string() + ".bin'";
-      EXPECT_EQ(std::system(command.c_str()), 0);  // NOLINT(cert-env33-c)
-    }
-  std::filesystem::remove(path.string() + ".mcap");
-  std::filesystem::remove(path.string() + ".bin");
 }
 
 }  // namespace

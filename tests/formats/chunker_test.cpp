@@ -251,7 +251,7 @@ TEST(Chunker, RefusesImpossibleTimes) {
 
 TEST(Chunker, BoundsTheEventsOfAnInterval) {
   // More than a million pixels can fire within one microsecond, and some clocks stand still.
-  constexpr std::size_t count = 100 << 16;
+  constexpr std::size_t count = 40 << 16;
   constexpr Microseconds last = 20'000;
   const auto number_of = [](const AbsoluteEvent& event) {
     return static_cast<std::size_t>(event.x) << 14 | static_cast<std::size_t>(event.y());
@@ -300,7 +300,7 @@ TEST(Chunker, BoundsTheEventsOfAnInterval) {
 }
 
 TEST(Chunker, CutsAnOverfullIntervalWithoutLoss) {
-  constexpr std::size_t per_time = 1'000;
+  constexpr std::size_t per_time = 300;
   constexpr Microseconds end = 2 * length;
   Chunker chunker(length);
   std::vector<AbsoluteEvent> events;

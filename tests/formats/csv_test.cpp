@@ -505,34 +505,4 @@ TEST(Csv, TimesBelowZeroComeBack) {
   }
 }
 
-TEST(Csv, RealEventsOfTheEventCameraDataset) {
-  const char* shared = std::getenv("SHARED_DATA");
-  const auto path =
-      std::string(shared != nullptr ? shared : "") + "/slider-depth/events-t-x-y-p.txt.gz";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << "there is no " << path;
-  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(("gzip -dc '" + path + "'").c_str(), "r"),
-                                                   pclose);
-  ASSERT_NE(pipe, nullptr);
-  Bytes bytes(2'000'000);
-  bytes.resize(std::fread(bytes.data(), 1, bytes.size(), pipe.get()));
-  TableSettings settings;
-  settings.size = {240, 180};
-  CsvDecoder decoder(settings);
-  const auto events = decoded(decoder, bytes);
-  ASSERT_EQ(events.size(), 50'000U);
-  EXPECT_EQ(decoder.corruption().places + decoder.corruption().outside, 0U);
-  EXPECT_EQ(events.front(), off(96, 133, 3811));
-  EXPECT_EQ(events[1], off(127, 171, 3820));
-  EXPECT_EQ(events.back(), on(70, 103, 174'156));
-  // Between the frames of images.txt.
-  constexpr std::array<Microseconds, 5> frames = {0, 38766, 77531, 116296, 155062};
-  constexpr std::array<std::ptrdiff_t, 4> counts = {7778, 11318, 13497, 12327};
-  for (std::size_t i = 0; i < counts.size(); ++i)
-    EXPECT_EQ(std::ranges::count_if(events,
-                                    [&](const AbsoluteEvent& event) {
-                                      return event.t > frames[i] && event.t <= frames[i + 1];
-                                    }),
-              counts[i]);
-}
-
 }  // namespace

@@ -146,30 +146,6 @@ TEST_F(Hdf5, LabelsAreDatasets) {
   }
 }
 
-TEST_F(Hdf5, SeeksToTheFirstEventNotBefore) {
-  const auto events = random_events(200'000, {640, 480}, 11, 777'777);
-  for (const auto& settings : all_settings({640, 480})) {
-    Hdf5Reader reader(in_memory(contents(write(events, settings))));
-    std::mt19937 random(4);
-    std::vector<Microseconds> times = {
-        INT64_MIN, 0, events.front().t, events.back().t, events.back().t + 1, INT64_MAX};
-    for (int i = 0; i < 60; ++i) {
-      const auto t = events[random() % events.size()].t;
-      times.insert(times.end(), {t, t - 1, t + 1});
-    }
-    for (const auto t : times) {
-      reader.seek(t);
-      const auto expected = std::ranges::lower_bound(events, t, {}, &AbsoluteEvent::t);
-      Events found;
-      reader.read(500, found);
-      const auto count = std::min<std::ptrdiff_t>(500, events.end() - expected);
-      EXPECT_TRUE(found == Events(expected, expected + count)) << t;
-    }
-    reader.seek(0);
-    EXPECT_TRUE(read_all(reader) == events);
-  }
-}
-
 void write_numbers(hid_t file, const char* name, std::vector<hsize_t> extent,
                    const std::vector<std::uint32_t>& numbers) {
   const hid_t space = H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr);
@@ -365,7 +341,7 @@ Events left_by_a_killed_process(const std::filesystem::path& file, const Setting
 
 TEST_F(Hdf5, WhatWasCommittedSurvivesTheProcess) {
   for (const auto& settings : all_settings({640, 480})) {
-    for (const std::size_t count : {3000, 150'000}) {
+    for (const std::size_t count : {3000, 60'000}) {
       const auto events = random_events(count, settings.size, 21, 1'000'000);
       for (const int commits : {1, 20}) {
         const auto left = left_by_a_killed_process(path(), settings, events, commits);
@@ -386,7 +362,7 @@ std::size_t min_kept(std::size_t events) {
 TEST_F(Hdf5, MostEventsSurviveTheProcess) {
   for (auto settings : all_settings({640, 480})) {
     settings.commit_interval = std::chrono::hours(1);
-    for (const std::size_t count : {60'000, 500'000}) {
+    for (const std::size_t count : {60'000, 200'000}) {
       const auto events = random_events(count, settings.size, 21, 1'000'000);
       const auto left = left_by_a_killed_process(path(), settings, events, 0);
       EXPECT_GE(left.size(), min_kept(count));

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "src/formats/event_decoder.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/recording_reader.hpp"
 #include "tests/formats/recordings.hpp"

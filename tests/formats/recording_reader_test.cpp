@@ -17,8 +17,8 @@
 #include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/aedat/aedat_decoder.hpp"
 #include "src/formats/dat/dat.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/es/es.hpp"
-#include "src/formats/event_decoder.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
@@ -102,31 +102,6 @@ File aedat_file_with_a_table_of_zeros() {
   file.bytes.erase(file.bytes.begin() + table_at, file.bytes.end());
   Aedat4Compressor(decoder.compression()).compress(aedat4_table_content(*table), file.bytes);
   return file;
-}
-
-/// Less than a second of events, in a packet each, and a table of packets of another stream, which
-/// are not there.
-File aedat_file_with_a_false_table(int stream) {
-  constexpr int packets = 30'000;
-  constexpr int entries = 100'000;
-  Aedat4Encoder encoder({sensor, "", Aedat4Compression::none, true, true});
-  Bytes bytes;
-  for (int i = 0; i < packets; ++i) {
-    const auto event = AbsoluteEvent::at(i % sensor.width, 0, 30 * i, Polarity::on);
-    encoder.encode(std::span(&event, 1), bytes);
-    encoder.flush(bytes);
-  }
-  const auto table_at = bytes.size();
-  encoder.finish(bytes);
-  const auto patch = encoder.patch().value();
-  std::ranges::copy(patch.bytes, bytes.begin() + static_cast<std::ptrdiff_t>(patch.position));
-  bytes.resize(table_at);
-  std::vector<Aedat4TableEntry> table;
-  for (int i = 0; i < entries; ++i)
-    table.push_back({table_at, stream, 100, 1, 2'000'000, 2'000'000});
-  std::ranges::copy(aedat4_table_content(table), std::back_inserter(bytes));
-  return {"aedat_with_a_false_table", std::move(bytes),
-          [] { return std::make_unique<AedatDecoder>(); }};
 }
 
 std::vector<File> all_files() {
@@ -246,39 +221,6 @@ TEST_P(Recording, TellsItsDuration) {
   EXPECT_EQ(reader.duration(), 5'999'950 + 1 - origin());
 }
 
-TEST_P(Recording, IsSeekedIn) {
-  MemoryBytes bytes(GetParam().bytes);
-  RecordingReader reader(GetParam().make_decoder, chunk_length);
-  reader.open(bytes);
-  reader.seek(3'700'000, std::nullopt);  // before the survey
-  const auto expect_from = [&](Microseconds start, std::optional<Microseconds> stop) {
-    Outcome outcome;
-    outcome.starts = 1;
-    outcome.take_all(reader);
-    const auto end = origin() + stop.value_or(10'000'000);
-    EXPECT_EQ(outcome.events(origin()), from(some_events(), origin() + start, end));
-    for (const auto& [stream, chunk_start, duration, of_chunk] : outcome.chunks)
-      EXPECT_LE(origin() + chunk_start + duration, end);
-    EXPECT_EQ(reader.at_end(), !stop);
-    EXPECT_EQ(reader.is_past_stop(), stop.has_value());
-    for (const auto& [stream, time, number] : outcome.pictures) {
-      EXPECT_GE(time, start);
-      EXPECT_LT(time, stop.value_or(10'000'000));
-      EXPECT_EQ(time, 100'000 * number);
-    }
-    EXPECT_EQ(reader.counts().frames, outcome.pictures.size());
-  };
-  expect_from(3'700'000, std::nullopt);
-  for (const Microseconds start : {100'000, 0, 3'999'000}) {
-    reader.seek(start, std::nullopt);
-    expect_from(start, std::nullopt);
-  }
-  for (const Microseconds stop : {400'000, 404'321, 300'001}) {
-    reader.seek(300'000, stop);
-    expect_from(300'000, stop);
-  }
-}
-
 /// Events, and a frame every 100 ms; all of one before the first of the other.
 Bytes aedat_of_parts(bool frames_first) {
   Aedat4Encoder encoder({sensor, "a camera", Aedat4Compression::none, true, false});
@@ -391,20 +333,6 @@ TEST(RecordingReader, DoesNotReadOnWhileAStreamIsSilent) {
   }
 }
 
-TEST(RecordingReader, AStreamThatNeverComesTakesNoTimeToSpeakOf) {
-  for (const int stream : {Aedat4Encoder::frame_stream, 7}) {
-    const auto file = aedat_file_with_a_false_table(stream);
-    MemoryBytes bytes(file.bytes);
-    RecordingReader reader(file.make_decoder, chunk_length);
-    reader.open(bytes);
-    const std::clock_t before = std::clock();
-    Outcome outcome;
-    outcome.take_all(reader);
-    EXPECT_EQ(reader.counts().events, 30'000U);
-    EXPECT_LT(std::clock() - before, 5 * CLOCKS_PER_SEC);
-  }
-}
-
 TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
   const auto events = some_events();
   std::vector<Trigger> triggers{{1'900'000, 3, true}};  // before the origin
@@ -464,38 +392,6 @@ TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
     EXPECT_GE(trigger.t, 3'700'000);
     EXPECT_LT(trigger.t, 3'900'000);
   }
-}
-
-TEST(RecordingReader, DoesNotCollectTriggersWithoutEvents) {
-  constexpr std::size_t at_once = 10'000;
-  constexpr std::size_t max_waiting = std::size_t{1} << 17;
-  const auto events = some_events();
-  const auto half = events.size() / 2;  // before a silence
-  const auto encoder = make_prophesee_raw_encoder(EvtFormat::evt3, sensor);
-  RecordingReader reader([] { return make_prophesee_raw_decoder(); }, chunk_length);
-  Outcome outcome;
-  Bytes bytes;
-  const auto read = [&] {
-    reader.push(bytes);
-    outcome.take_all(reader);
-    bytes.clear();
-  };
-  encoder->encode(std::span(events).first(half), bytes);
-  read();
-  std::vector<Trigger> triggers;
-  for (auto t = events[half - 1].t; triggers.size() < 300'000; t += 10) {
-    triggers.push_back({t - events.front().t, 1, triggers.size() % 2 == 0});
-    encoder->encode_trigger({t, 1, triggers.back().rising}, bytes);
-    if (triggers.size() % at_once != 0) continue;
-    read();
-    ASSERT_LE(triggers.size() - outcome.triggers.size(), max_waiting);
-  }
-  encoder->encode(std::span(events).subspan(half), bytes);
-  read();
-  reader.finish();
-  outcome.take_all(reader);
-  EXPECT_EQ(outcome.triggers, triggers);
-  EXPECT_EQ(outcome.events(reader.origin()), events);
 }
 
 TEST(RecordingReader, GuessesTheSizeOfASensor) {

@@ -11,7 +11,6 @@
 #include "src/core/sensor_size.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
-#include "src/formats/event_decoder.hpp"
 #include "src/formats/unsupported_format.hpp"
 
 namespace recordings {

@@ -53,16 +53,6 @@ TEST_P(EveryFormat, ReturnsWhatWasWritten) {
   }
 }
 
-/// Times so far apart would be doubted in a table of unknown origin.
-TEST_P(EveryFormat, ReadsAQuietRecording) {
-  const SensorSize size{8, 8};
-  std::vector<AbsoluteEvent> events;
-  for (int i = 0; i < 200; ++i)
-    events.push_back(AbsoluteEvent::at(i % 8, i % 5, 40'001 * i, static_cast<Polarity>(i % 2)));
-  const auto decoder = GetParam().make_decoder(size);
-  EXPECT_EQ(decode(*decoder, encoded(size, events)).events, events);
-}
-
 TEST_P(EveryFormat, TakesTheSensorsLastPixel) {
   const int side = GetParam().max_side;
   const SensorSize size{side, side};

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <string>
 
-#include "src/formats/event_decoder.hpp"
+#include "src/formats/decoder.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {
@@ -324,18 +324,6 @@ TEST_P(EveryFormat, FindsWordsAgainAfterLostBytes) {
   EXPECT_LE(reader.counts().bytes + reader.counts().lost_bytes, bytes.size());
 }
 
-TEST_P(EveryFormat, StartsAmidTheStream) {
-  const auto sent = some_events(5'000, 1'000'000);
-  auto bytes = Camera(format).transfer_of(sent);
-  bytes.erase(bytes.begin(), bytes.begin() + 1001);
-  Reader reader(format, Framing::loose);
-  reader.scan(bytes);
-  reader.finish();
-  const auto [missing, wrong] = compare(sent, reader.events);
-  EXPECT_EQ(wrong, 0U);
-  EXPECT_LT(missing, 700U);
-}
-
 TEST_P(EveryFormat, KeepsTheTimeAcrossWraps) {
   // EVT3 wraps after 16 s, the others after 4.7 h.
   const Microseconds wrap =
@@ -428,19 +416,6 @@ TEST(WordScanner, KeepsThePaddingOfLucid) {
     reader.finish();
     EXPECT_EQ(reader.events, sent);
     EXPECT_EQ(reader.counts().lost_bytes, 0U);
-  }
-}
-
-TEST(WordScanner, TakesNothingFromNoise) {
-  Random random(1);
-  Bytes noise(1 << 18);
-  for (auto& byte : noise) byte = static_cast<std::uint8_t>(random());
-  for (const auto& format : formats) {
-    SCOPED_TRACE(format.name);
-    Reader reader(format, Framing::loose);
-    reader.scan(noise);
-    reader.finish();
-    EXPECT_LT(reader.counts().bytes, noise.size() / 50);
   }
 }
 

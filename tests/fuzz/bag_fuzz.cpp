@@ -6,7 +6,6 @@
 #include "src/formats/magic.hpp"
 #include "src/formats/recording_reader.hpp"
 #include "src/formats/ros/bag_decoder.hpp"
-#include "src/formats/ros/bag_magic.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 #include "tests/fuzz/item_sums.hpp"
 

@@ -13,7 +13,6 @@
 
 #include "src/core/sensor_size.hpp"
 #include "src/formats/decoder.hpp"
-#include "src/formats/event_decoder.hpp"
 #include "src/formats/unsupported_format.hpp"
 
 /// Invariants of every decoder for arbitrary bytes.

@@ -3,7 +3,6 @@
 # Runs the command lines of README.md and docs/.
 set -eu
 source "$SOURCE/tests/pipelines/scratch_folder.sh"
-source "$SOURCE/tests/pipelines/pixel_files.sh"
 source "$SOURCE/tests/pipelines/run_lines.sh"
 export PATH=$BUILD/pipelines:$PATH
 mkdir pipelines
@@ -15,7 +14,23 @@ eval "$GST_LAUNCH -q filesrc location=drive.mp4 ! decodebin ! eventsim-dvs ! evt
 eval "$GST_LAUNCH -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-dvs ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=davis.aedat4"
 eval "$GST_LAUNCH -q filesrc location=drive.raw ! evtdec ! eventcsvenc format=esim ! filesink location=events.txt"
 for name in in recording real simulated left right a b hd; do cp drive.raw $name.raw; done
-make_pixel_files .
+# A mask that leaves out the left half, and a calibration.
+"$GST_LAUNCH" -q videotestsrc pattern=white num-buffers=1 ! video/x-raw,width=160,height=240 ! \
+  videobox left=-160 ! video/x-raw,format=GRAY8 ! pngenc ! filesink location=mask.png
+cat >camera.yaml <<CALIBRATION
+%YAML:1.0
+---
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 300., 0., 160., 0., 300., 120., 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 5
+   cols: 1
+   dt: d
+   data: [ -0.2, 0.05, 0., 0., 0. ]
+CALIBRATION
 /usr/bin/python3 "$SOURCE/tests/formats/bag_files.py" .
 for ending in bag mcap; do mv evt3.$ending walk.$ending; done
 /usr/bin/python3 "$SOURCE/tests/formats/small_files.py" .
@@ -28,7 +43,8 @@ done
   printf '\x19\xe0'
 } >camera.grey
 truncate -s $((4096 * 391)) camera.grey
-mkdir videos recordings arrays
+mkdir videos recordings arrays pictures
+eval "$GST_LAUNCH -q $ball ! videoconvert ! pngenc snapshot=false ! multifilesink location=pictures/%d.png"
 cp drive.mp4 videos/first.mp4
 cp drive.mp4 "videos/second one.mp4"
 cp drive.raw recordings/first.raw
@@ -47,6 +63,7 @@ done
 [ $count -ge 60 ] || fail "found only $count lines"
 for file in events.webm events.mp4 ball.npz recording.h5 figures.json map.png maps.png out.raw events.npy received.raw \
   webcam.npz "videos/second one.h5" filtered.raw cropped.raw beside.raw quarter.raw turned.raw flat.raw both.raw both.webm rate.png part.raw "arrays/second one.npz" \
+  phone.raw pictures.raw talk.mp4 talk.gif sheet.png over.mp4 joined.raw backwards.raw drive.h5 \
   recipe/manifest.json "recipe/data/second one.npy"; do
   [ -s "$file" ] || fail "$file is missing or empty"
 done

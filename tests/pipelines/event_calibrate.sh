@@ -202,6 +202,7 @@ refused() { # WORDS ARGUMENT...
 }
 refused "no element" scene.mkv recorded.raw --element eventsim-nothing
 refused "only eventsim-dvs has profiles" scene.mkv recorded.raw --element eventsim-frame --profile frame.profile
+refused "recorded.raw: events without frames; give the video" recorded.raw
 refused "nowhere.mkv" nowhere.mkv recorded.raw
 cp scene.mkv $'lat\xfcin.mkv'
 refused 'lat\\xfcin.mkv is not UTF-8; rename it' $'lat\xfcin.mkv' recorded.raw

@@ -344,6 +344,88 @@ convert ball.raw link.csv
 [ -L link.csv ] || fail "the link is replaced"
 cmp ball.csv elsewhere/target || fail "the file that the link points to has other events"
 
+# Videos are simulated; the file has the events of the pipeline.
+timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=20 ! video/x-raw,format=I420,framerate=25/1 ! x264enc ! mp4mux ! filesink location=scene.mp4
+timeout 60 "$GST_LAUNCH" -q filesrc location=scene.mp4 ! decodebin ! eventsim-diff ! eventcsvenc ! filesink location=expected.csv
+convert scene.mp4 simulated.csv --simulator eventsim-diff
+cmp expected.csv simulated.csv || fail "the events of a video are others"
+convert scene.mp4 default.raw
+[ "$(stat -c %s default.raw)" -gt 1000 ] || fail "the default simulator finds no events"
+# Slow motion: recorded at 200 frames/s.
+convert scene.mp4 fast.csv --simulator eventsim-diff --speed 8
+awk -F, 'NR == 1 { print; next } { printf "%d,%s,%s,%s\n", $1 / 8, $2, $3, $4 }' OFS=, expected.csv | tail -1 >expected
+awk -F, -v want="$(cut -d, -f1 expected)" 'END { exit !($1 > want - 10 && $1 < want + 10) }' fast.csv ||
+  fail "the last event at 8 times the speed is $(tail -1 fast.csv)"
+[ "$(wc -l <fast.csv)" = "$(wc -l <expected.csv)" ] || fail "the speed changes the number of events"
+
+# Pictures, by a pattern and by a list.
+mkdir pictures
+timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=20 ! video/x-raw,format=GRAY8,framerate=25/1 ! pngenc snapshot=false ! multifilesink location="pictures/a %d.png"
+timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=20 ! video/x-raw,format=GRAY8,framerate=25/1 ! eventsim-diff ! eventcsvenc ! filesink location=expected.csv
+convert 'pictures/*.png' pictures.csv --framerate 25 --simulator eventsim-diff
+cmp expected.csv pictures.csv || fail "the events of pictures are others"
+for i in {0..19}; do echo "$(awk "BEGIN { print $i / 25 }") pictures/a $i.png"; done >pictures.txt
+convert pictures.txt listed.csv --simulator eventsim-diff
+cmp expected.csv listed.csv || fail "the events of a list of pictures are others"
+convert "videotestsrc pattern=ball num-buffers=20 ! video/x-raw,format=GRAY8,framerate=25/1" piped.csv --simulator eventsim-diff
+cmp expected.csv piped.csv || fail "the events of a pipeline are others"
+
+# Films that play everywhere, with even sides; slower, and larger.
+convert --crop=251x201+20+20 ball.raw odd.raw
+convert odd.raw film.mp4 --speed 0.5
+convert odd.raw film.webm --scale 2
+convert ball.raw part.mp4 --from 0.5 --to 1 --speed 0.5 | grep -q "^30 pictures" || fail "part.mp4 has other pictures"
+timeout 60 gst-discoverer-1.0 part.mp4 | grep -q "Duration: 0:00:01.000" || fail "part.mp4: $(timeout 60 gst-discoverer-1.0 part.mp4)"
+timeout 60 gst-discoverer-1.0 -v film.mp4 >discovered
+for found in "profile=(string)high" "chroma-format=(string)4:2:0" "Width: 252" "Height: 202" "Frame rate: 30/1" "Duration: 0:00:02.5"; do
+  grep -q "$found" discovered || fail "film.mp4 lacks $found: $(cat discovered)"
+done
+timeout 60 gst-discoverer-1.0 -v film.webm >discovered
+for found in "Width: 502" "Height: 402" "Duration: 0:00:01.2"; do
+  grep -q "$found" discovered || fail "film.webm lacks $found: $(cat discovered)"
+done
+# Each picture of a GIF, and a PNG, is one that eventrender draws.
+convert ball.raw ball.gif
+convert ball.raw ball.png
+convert ball.raw sheet.png --sheet 4x3 --scale 0.5
+convert scene.mp4 over.png --over-frames
+convert framed.aedat4 over.gif --over-frames
+for rate in 25 30; do
+  timeout 60 "$GST_LAUNCH" -q filesrc location=ball.raw ! evtdec ! eventrender ! video/x-raw,format=RGB,framerate=$rate/1 ! filesink location=drawn$rate
+done
+/usr/bin/python3 - <<'PYTHON'
+import numpy as np
+from PIL import Image, ImageSequence
+
+drawn, drawn30 = (np.fromfile(f"drawn{rate}", np.uint8).reshape(-1, 240, 320, 3) for rate in (25, 30))
+gif = np.stack([np.asarray(picture.convert("RGB")) for picture in ImageSequence.Iterator(Image.open("ball.gif"))])
+assert gif.shape == drawn.shape and (gif == drawn).all(), "the pictures of ball.gif are others"
+assert Image.open("ball.gif").info["duration"] == 40
+assert (np.asarray(Image.open("ball.png")) == drawn30).all((1, 2, 3)).any(), "ball.png is another picture"
+assert Image.open("sheet.png").size == (4 * 160 + 3 * 2, 3 * 120 + 2 * 2)
+over = np.asarray(Image.open("over.png").convert("RGB")).reshape(-1, 3).astype(int)
+coloured = (np.ptp(over, axis=1) > 20).mean()
+assert 0.001 < coloured < 0.2, f"{coloured} of the pixels over frames show events"
+assert Image.open("over.gif").n_frames > 20
+PYTHON
+
+# Recordings joined, merged and reversed.
+convert ball.raw odd.raw joined.csv --join
+[ "$(wc -l <joined.csv)" = $(($(wc -l <ball.csv) + $(convert odd.raw odd.csv | sed -n 's/ events.*//p'))) ] || fail "joined.csv has $(wc -l <joined.csv) lines"
+head -n "$(wc -l <ball.csv)" joined.csv | cmp ball.csv - || fail "the first of two joined recordings is changed"
+sort -t, -k1n -s joined.csv | cmp joined.csv - || fail "joined recordings go back in time"
+convert ball.raw odd.raw merged.npz --merge | grep -q "^$(($(wc -l <joined.csv) - 1)) events" || fail "merged.npz has other events"
+convert ball.raw reversed.raw --reverse
+convert reversed.raw again.csv --reverse
+/usr/bin/python3 - ball.csv again.csv <<'PYTHON'
+import sys
+
+import numpy as np
+
+first, again = (np.loadtxt(path, delimiter=",", skiprows=1, dtype=np.int64) for path in sys.argv[1:])
+assert (first[np.lexsort(first.T[::-1])] == again[np.lexsort(again.T[::-1])]).all(), "reversed twice, events are others"
+PYTHON
+
 # Errors say what is wrong.
 refused() { # WORDS ARGUMENT...
   local words=$1
@@ -423,6 +505,45 @@ refused "the same file" ball.raw ./ball.raw
 head -c 100001 ball.raw >short.raw
 convert short.raw short.dat 2>warnings
 grep -q "Corrupt data at byte " warnings || fail "no warning about a truncated file"
+printf '1 a.png\n0 b.png\n' >back.txt
+refused "needs IN and OUT.*--join" ball.raw ball.dat out.raw
+refused "need two IN" --join ball.raw out.raw
+refused "exclude each other" --join --reverse ball.raw ball.dat out.raw
+refused "no picture matches" 'none/*.png' out.raw
+refused "with --framerate" 'pictures/*.png' out.raw
+refused "later time than the one before" back.txt out.raw
+refused "no frames to draw over" --over-frames ball.raw out.mp4
+refused "no frames to draw over" --over-frames ball.aedat4 out.mp4
+refused "apply only to .mp4" --scale 2 ball.raw out.dat
+refused "--speed applies to films" --speed 2 ball.raw out.dat
+refused "scene.mp4 is not a recording" --reverse scene.mp4 out.raw
+refused "no element \"eventsim-none\"" --simulator eventsim-none scene.mp4 out.raw
+refused "only to reading files that may lack" --width 5 --height 5 scene.mp4 out.raw
+
+# What is in a file.
+timeout 60 "$BUILD/pipelines/event-info" --json ball.raw framed.aedat4 short.raw >info.json
+timeout 60 "$BUILD/pipelines/event-info" framed.aedat4 --plot rate.png | tee info
+grep -q "^  events  *[0-9,]*, [0-9.]* % ON" info || fail "the number of events is not told"
+/usr/bin/python3 - <<'PYTHON'
+import json
+
+import numpy as np
+from PIL import Image
+
+ball, framed, short = json.load(open("info.json"))
+t, x, y, p = np.loadtxt("ball.csv", delimiter=",", skiprows=1, dtype=np.int64).T
+assert (ball["width"], ball["height"], ball["events"]) == (320, 240, len(t)), ball
+assert ball["on-share"] == p.mean() and ball["active-share"] == len(np.unique(y * 320 + x)) / (320 * 240), ball
+assert ball["max-rate"] == np.bincount((t - t[0]) // 10000).max() * 100 and not ball["damage"], ball
+assert framed["frames"] == 40 and len(framed["streams"]) == 2, framed
+assert short["damage"] == {"corrupt-places": 1} and "Corrupt data at byte" in short["warnings"][0], short
+assert Image.open("rate.png").size[0] > 1000
+PYTHON
+{
+  echo t,x,y,p
+  for t in {1..400}; do printf '%d,%d,%d,1\n' $((2500 * t)) $((t % 40)) $((t % 30)) $((2500 * t)) 50 60; done
+} >hot.csv
+[ "$(timeout 60 "$BUILD/pipelines/event-info" hot.csv | grep "hot pixels")" = "  hot pixels  1: (50, 60)" ] || fail "the hot pixel is not found"
 
 # Interrupted, it completes the file.
 has_begun() { # PROCESS FILE: it has written 10 kB to the file, or keeps them in a temporary one

@@ -27,6 +27,9 @@ column() { # NUMBER TITLE: the cell of a row, with its mark
   sed -n "s/^$2  *//p" table | sed 's/ \*/*/g; s/ (/(/g; s/ ±/±/; s/ %/%/g' | awk -v column="$1" '{ print $column }'
 }
 [ "$(column 2 "map correlation")" = 1.000 ] || fail "a recording is unlike itself"
+[ "$(column 2 "similarity of reconstructions")" = 1.000 ] || fail "a reconstruction is unlike itself"
+awk -v second="$(column 3 "similarity of reconstructions")" -v dense="$(column 4 "similarity of reconstructions")" \
+  'BEGIN { exit !(second > 0.5 && dense < second - 0.1) }' || fail "reconstructions of dense interpolation are as similar"
 [ "$(column 2 "real events matched within 1 ms")" = 1.000 ] || fail "a recording does not match itself"
 [ "$(column 2 "nearest match of real events, ms")" = 0.00 ] || fail "a recording is far from itself"
 [ "$(grep -c '^[a-z].* \*$' table)" -ge 10 ] || fail "dense interpolation is within the noise ceiling"

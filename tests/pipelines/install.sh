@@ -71,7 +71,7 @@ completed() { # PROGRAM WORD...
     printf '%s\n' "${COMPREPLY[@]}"
   )
 }
-for program in event-convert event-thumbnail event-calibrate event-dataset event-realism web-events rtsp-events virtual-camera; do
+for program in event-convert event-info event-thumbnail event-calibrate event-dataset event-realism web-events rtsp-events virtual-camera; do
   "$root/usr/bin/$program" --help >"$root/help"
   grep -qi "^usage" "$root/help"
   [[ $(GST_PLUGIN_PATH= GST_REGISTRY=$root/none.bin "$root/usr/bin/$program" --version) =~ ^$program\ [0-9]+\.[0-9]+\.[0-9]+$ ]]

@@ -23,6 +23,14 @@ struct Line {
   std::string (*launch)(const File& file);
 };
 
+std::string player(const std::string& name, const File& file) {
+  gchar* const uri = gst_filename_to_uri(file.path().c_str(), nullptr);
+  const auto line =
+      name + " uri=" + in_quotes(uri) + " video-sink=\"fakesink name=sink sync=true\"";
+  g_free(uri);
+  return line;
+}
+
 const Line lines[] = {
     {"reader",
      [](const File& file) {
@@ -39,14 +47,8 @@ const Line lines[] = {
        return "filesrc location=" + in_quotes(file.path()) +
               " ! decodebin name=it  fakesink name=sink sync=true";
      }},
-    {"playbin3",
-     [](const File& file) {
-       gchar* const uri = gst_filename_to_uri(file.path().c_str(), nullptr);
-       const std::string line =
-           "playbin3 uri=" + in_quotes(uri) + " video-sink=\"fakesink name=sink sync=true\"";
-       g_free(uri);
-       return line;
-     }},
+    {"playbin", [](const File& file) { return player("playbin", file); }},
+    {"playbin3", [](const File& file) { return player("playbin3", file); }},
 };
 
 /// Checks what arrives at a sink: stream start, caps and segment in this order, then buffers within

@@ -7,7 +7,6 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "src/core/image.hpp"
 
@@ -69,17 +68,6 @@ void for_each_frame(const std::string& path, int count, int width, int height, c
         visit(eventcamera::ImageView<std::uint8_t>{map.data, width, width, height});
         gst_buffer_unmap(gst_sample_get_buffer(sample), &map);
       });
-}
-
-/// All of them.
-inline std::vector<eventcamera::Image<std::uint8_t>> frames_of(const std::string& path, int count,
-                                                               int width, int height) {
-  std::vector<eventcamera::Image<std::uint8_t>> frames;
-  for_each_frame(path, count, width, height, [&](const auto& frame) {
-    frames.emplace_back(width, height);
-    frames.back().assign(frame);
-  });
-  return frames;
 }
 
 }  // namespace video_frames

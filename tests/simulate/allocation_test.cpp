@@ -2,6 +2,10 @@
 // In steady state, a simulator allocates nothing per frame.
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <cerrno>
+#include <cstddef>
+
 #include "src/dvs/dvs_simulator.hpp"
 #include "src/render/accumulator.hpp"
 #include "src/simulate/dense_simulator.hpp"
@@ -9,7 +13,6 @@
 #include "src/simulate/frame_simulator.hpp"
 #include "src/simulate/interpolation.hpp"
 #include "src/simulate/sparse_simulator.hpp"
-#include "tests/core/allocations.hpp"
 #include "tests/simulate/scene.hpp"
 
 /// In place of src/core/thread_pool.cpp: deals the rounds of every loop out to the threads in turn,
@@ -27,6 +30,46 @@ void ThreadPool::run(int count, Round round, const void* body) {
 }
 
 }  // namespace eventcamera
+
+/// Heap allocations of the process, operator new included, on all threads.
+static std::atomic<int> allocations = 0;
+
+// Replace glibc's functions, and call these by their other names.
+extern "C" {
+
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* memory, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+__attribute__((visibility("default"))) void* malloc(std::size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+
+__attribute__((visibility("default"))) void* calloc(std::size_t count, std::size_t size) {
+  ++allocations;
+  return __libc_calloc(count, size);
+}
+
+__attribute__((visibility("default"))) void* realloc(void* memory, std::size_t size) {
+  ++allocations;
+  return __libc_realloc(memory, size);
+}
+
+__attribute__((visibility("default"))) void* aligned_alloc(std::size_t alignment,
+                                                           std::size_t size) {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+
+__attribute__((visibility("default"))) int posix_memalign(void** memory, std::size_t alignment,
+                                                          std::size_t size) {
+  ++allocations;
+  *memory = __libc_memalign(alignment, size);
+  return *memory == nullptr ? ENOMEM : 0;
+}
+}
 
 namespace {
 

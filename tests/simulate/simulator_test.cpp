@@ -93,20 +93,6 @@ TEST_P(EveryMethod, FiresEverywhereWhenTheLightGoesOn) {
   EXPECT_EQ(events.back().t, frame_time / 1000);
 }
 
-TEST_P(EveryMethod, FiresEverywhereWhenTheLightGoesOff) {
-  const auto events =
-      events_of({scene::flat<std::uint8_t>(70, 50, 200), scene::flat<std::uint8_t>(70, 50, 50)});
-  EXPECT_GE(events.size(), 70U * 50U);
-  for (const auto& event : events) ASSERT_EQ(event.polarity(), Polarity::off);
-}
-
-TEST_P(EveryMethod, WorksOnOnePixel) {
-  const auto events =
-      events_of({scene::flat<std::uint8_t>(1, 1, 10), scene::flat<std::uint8_t>(1, 1, 90)});
-  ASSERT_FALSE(events.empty());
-  EXPECT_EQ(events.back(), Event::at(0, 0, frame_time / 1000, Polarity::on));
-}
-
 TEST_P(EveryMethod, DrawsTheOutlineOfAMovingSquare) {
   const auto at = [](int left) { return scene::square(160, 90, left, 30, 24, 220, 30); };
   // It moves to the right by 8 pixels per interval: the band that it enters, [72, 80), fires ON,
@@ -231,50 +217,6 @@ TEST_P(EveryMethod, HoldsTheLastFrame) {
   EXPECT_EQ(events.back().t, 10'000U);
 }
 
-TEST(FrameSimulator, NeedsAChangeOfMoreThanTheThreshold) {
-  Image<std::uint8_t> last(5, 1);
-  Image<std::uint8_t> now(5, 1);
-  for (int x = 0; x < 5; ++x) last.at(x, 0) = 100;
-  now.at(0, 0) = 120;
-  now.at(1, 0) = 121;
-  now.at(2, 0) = 100;
-  now.at(3, 0) = 90;
-  now.at(4, 0) = 89;
-  Settings settings;
-  settings.positive_threshold = 20;
-  settings.negative_threshold = 10;
-  const auto simulator = make_frame_simulator({5, 1, 8});
-  const auto events =
-      scene::last_interval(*simulator, settings, {scene::luma(last), scene::luma(now)});
-  const std::vector<Event> expected = {Event::at(1, 0, 40'000, Polarity::on),
-                                       Event::at(4, 0, 40'000, Polarity::off)};
-  EXPECT_EQ(events, expected);
-}
-
-TEST(DiffSimulator, MovesTheEdgesOfASquareEvenly) {
-  Settings settings;
-  settings.interpolated_frames = 3;
-  const auto at = [](int left) { return scene::square(160, 90, left, 30, 24, 220, 30); };
-  const auto a = at(40);
-  const auto b = at(48);
-  const auto c = at(56);
-  const auto simulator = make_diff_simulator({160, 90, 8});
-  const auto events =
-      scene::last_interval(*simulator, settings, {scene::luma(a), scene::luma(b), scene::luma(c)});
-  // D(i-1) is ON in [64, 72) and OFF in [40, 48); each step moves both by two pixels.
-  for (int j = 1; j <= 4; ++j) {
-    double sum = 0;
-    int count = 0;
-    for (const auto& event : events) {
-      if (event.t != 10'000U * j || event.polarity() != Polarity::on) continue;
-      sum += event.x;
-      ++count;
-    }
-    ASSERT_GE(count, 24 * 5) << "step " << j;
-    EXPECT_NEAR(sum / count, 67.5 + 2 * j, 0.75) << "step " << j;
-  }
-}
-
 TEST(DiffSimulator, ForgetsWhatMovedBeforeAStop) {
   const auto at = [](int left) { return scene::square(160, 90, left, 30, 24, 220, 30); };
   const auto a = at(20);
@@ -288,35 +230,6 @@ TEST(DiffSimulator, ForgetsWhatMovedBeforeAStop) {
       {scene::luma(a), scene::luma(b), scene::luma(b), scene::luma(c), scene::luma(d)});
   EXPECT_EQ(events,
             scene::last_interval(*without, {}, {scene::luma(b), scene::luma(c), scene::luma(d)}));
-}
-
-TEST(SparseSimulator, CarriesATexturedPatchAlong) {
-  // A textured patch moves 8 pixels to the right in front of a flat background.
-  const auto patch = scene::texture<std::uint8_t>(24, 24, 8, 5, 9);
-  const auto at = [&](int left) {
-    auto picture = scene::flat<std::uint8_t>(120, 80, 128);
-    for (int y = 0; y < 24; ++y)
-      for (int x = 0; x < 24; ++x) picture.at(left + x, 28 + y) = patch.at(x, y);
-    return picture;
-  };
-  Settings settings;
-  settings.positive_threshold = settings.negative_threshold = 10;
-  settings.interpolated_frames = 7;
-  const auto a = at(40);
-  const auto b = at(48);
-  const auto simulator = make_sparse_simulator({120, 80, 8});
-  const auto events = scene::last_interval(*simulator, settings, {scene::luma(a), scene::luma(b)});
-  // Columns that the patch leaves show the background once it is gone: column 40 from step 1,
-  // column 41 from step 2, and so on.
-  for (int column = 0; column < 8; ++column) {
-    std::map<int, int> last_step;
-    for (const auto& event : events)
-      if (event.x == 40 + column) last_step[event.y()] = static_cast<int>(event.t / 5'000);
-    ASSERT_GT(last_step.size(), 12U) << "column " << column;
-    double sum = 0;
-    for (const auto& [y, step] : last_step) sum += step;
-    EXPECT_NEAR(sum / static_cast<double>(last_step.size()), column + 1, 1) << "column " << column;
-  }
 }
 
 TEST(Thresholds, ScaleWithTheDepth) {

@@ -288,54 +288,6 @@ TEST_P(EveryFormat, RejectsEventsOutsideTheSensor) {
   }
 }
 
-TEST_P(EveryFormat, SurvivesRandomDatagrams) {
-  const auto& settings = GetParam().settings;
-  std::mt19937 random(1);
-  const auto good = random_stream(1, 1'000'000'000);
-  const auto packets = datagrams::packets_of(settings, good);
-  Receiver receiver(settings);
-  Microseconds latest = 0;
-  for (int i = 0; i < 20'000; ++i) {
-    Bytes bytes;
-    if (i % 2 == 0) {
-      bytes.resize(random() % 200);
-      std::ranges::generate(bytes, [&] { return static_cast<std::uint8_t>(random()); });
-    } else {
-      bytes = packets[random() % packets.size()].bytes;
-      for (auto flips = random() % 3; flips > 0; --flips)
-        bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1U << random() % 8);
-    }
-    const auto reception = receiver.take(bytes, i);
-    if (reception.restarted) latest = 0;
-    for (const auto& event : receiver.events) {
-      ASSERT_LT(event.x, settings.width);
-      ASSERT_LT(event.y(), settings.height);
-      ASSERT_GE(event.t, latest);
-      latest = event.t;
-    }
-  }
-}
-
-TEST_P(EveryFormat, IsUndisturbedByAFloodOfRandomDatagrams) {
-  const auto& settings = GetParam().settings;
-  std::mt19937 random(2);
-  const auto good = random_stream(2, 1'000'000'000);
-  const auto packets = datagrams::packets_of(settings, good);
-  Receiver receiver(settings);
-  std::size_t count = 0;
-  for (const auto& packet : packets) {
-    for (int i = 0; i < 3; ++i) {
-      Bytes bytes(100 + random() % 1000);
-      std::ranges::generate(bytes, [&] { return static_cast<std::uint8_t>(random()); });
-      receiver.take(bytes, packet.first);
-    }
-    receiver.take(packet.bytes, packet.first);
-    ASSERT_EQ(receiver.events.size(), packet.events);
-    count += packet.events;
-    ASSERT_EQ(receiver.all.size(), count);
-  }
-}
-
 TEST_P(EveryFormat, DropsWhatIsLate) {
   const auto& settings = GetParam().settings;
   std::vector<AbsoluteEvent> events;
@@ -364,16 +316,6 @@ TEST_P(TimedFormat, FollowsASenderThatStartsOver) {
   EXPECT_EQ(receiver.events, again);
 }
 
-TEST_P(WrappingFormat, FollowsWraps) {
-  const auto& settings = GetParam().settings;
-  std::vector<AbsoluteEvent> events;
-  for (Microseconds t = 4'294'967'000; t < 30'000'000'000; t += 1'999'999'999)
-    for (int i = 0; i < 5; ++i) events.push_back(AbsoluteEvent::at(i, 2, t + 100 * i, on));
-  Receiver receiver(settings);
-  for (const auto& packet : datagrams::packets_of(settings, events)) receiver.take(packet.bytes);
-  EXPECT_EQ(receiver.all, events);
-}
-
 TEST_P(WrappingFormat, FollowsWrapsDuringHoursOfSilence) {
   const auto& settings = GetParam().settings;
   constexpr Microseconds hour = 3'600'000'000;
@@ -388,21 +330,6 @@ TEST_P(WrappingFormat, FollowsWrapsDuringHoursOfSilence) {
   EXPECT_TRUE(receiver.all == sent);
 }
 
-TEST(Datagrams, OfFaeryMayBeLarge) {
-  // Before February 2026 faery sent as many events as bytes were allowed.
-  for (const auto& [format, count] : {std::pair{t64_x16_y16_on8, 1209}, {t32_x16_y15_on1, 1208}}) {
-    const DatagramSettings settings{.format = format, .width = 640, .height = 480};
-    std::vector<AbsoluteEvent> events;
-    for (int i = 0; i < count; ++i) events.push_back(AbsoluteEvent::at(i % 640, 3, 100 + i, on));
-    Bytes large;
-    for (const auto& packet : datagrams::packets_of(settings, events)) large += packet.bytes;
-    EXPECT_GT(large.size(), 9600);
-    Receiver receiver(settings);
-    EXPECT_EQ(receiver.take(large).fault, nullptr);
-    EXPECT_EQ(receiver.events, events);
-  }
-}
-
 TEST(Datagrams, OfSpifMayStateTimesOfSomeEvents) {
   const Bytes mixed{0x01, 0x00, 0x01, 0x00, 0x10, 0x00, 0x00, 0x00,  //
                     0x02, 0x00, 0x02, 0x80};
@@ -412,14 +339,6 @@ TEST(Datagrams, OfSpifMayStateTimesOfSomeEvents) {
             (std::vector{AbsoluteEvent::at(1, 1, 77, off), AbsoluteEvent::at(2, 2, 77, off)}));
   Receiver timed({.format = spif_timestamps, .width = 640, .height = 480});
   EXPECT_STREQ(timed.take(mixed, 77).fault, "an event has no time");
-}
-
-TEST(Datagrams, AreSorted) {
-  Receiver receiver({.format = t32_x16_y15_on1, .width = 640, .height = 480});
-  receiver.take({9, 0, 0, 0, 1, 0, 2, 0, 8, 0, 0, 0, 3, 0, 2, 0, 9, 0, 0, 0, 0, 0, 2, 0});
-  EXPECT_EQ(receiver.events,
-            (std::vector{AbsoluteEvent::at(3, 1, 8, off), AbsoluteEvent::at(1, 1, 9, off),
-                         AbsoluteEvent::at(0, 1, 9, off)}));
 }
 
 TEST(Datagrams, WithImpossibleTimesAreRejected) {
@@ -435,24 +354,6 @@ TEST(Datagrams, WithImpossibleTimesAreRejected) {
     leaps += Bytes{0, 0, 0, static_cast<std::uint8_t>(i * 0x70), 1, 0, 2, 0};
   Receiver t32({.format = t32_x16_y15_on1, .width = 640, .height = 480});
   EXPECT_STREQ(t32.take(leaps).fault, "its events are more than 71 minutes apart");
-}
-
-TEST(Datagrams, MaySpan71Minutes) {
-  const DatagramSettings settings{
-      .format = t64_x16_y16_on8, .width = 640, .height = 480, .byte_order = std::endian::little};
-  for (const Microseconds over : {0, 1}) {
-    const std::vector events{AbsoluteEvent::at(1, 2, 5, on),
-                             AbsoluteEvent::at(1, 2, 5 + 71 * 60'000'000LL + over, on)};
-    const auto packer = make_datagram_packer(settings);
-    Receiver receiver(settings);
-    const auto packets = datagrams::packets_of(*packer, events);
-    ASSERT_EQ(packets.size(), 1);
-    const auto* fault = receiver.take(packets[0].bytes).fault;
-    if (over == 0)
-      EXPECT_EQ(receiver.events, events);
-    else
-      EXPECT_STREQ(fault, "its events are more than 71 minutes apart");
-  }
 }
 
 /// A datagram of jAER with an event at `t`.

@@ -79,38 +79,6 @@ TEST_P(EveryFormat, GivesBackEveryIntervalOfAnySensorInPacketsOfAnySize) {
   }
 }
 
-TEST_P(EveryFormat, FillsPackets) {
-  std::vector<Event> events;
-  for (std::uint32_t i = 0; i < 100'000; ++i)
-    events.push_back(Event::at(static_cast<int>(i * 7919 % 346), static_cast<int>(i * 104729 % 260),
-                               i / 4, i % 2 == 0 ? Polarity::on : Polarity::off));
-  RtpPacker packer(davis, GetParam());
-  std::size_t packets = 0;
-  std::size_t bytes = 0;
-  packer.pack(0, 40'000'000, events, 1460, [&](std::span<const std::uint8_t> payload, bool) {
-    ++packets;
-    bytes += payload.size();
-  });
-  EXPECT_GT(bytes, 1440 * (packets - 1));
-  EXPECT_LT(bytes, events.size() * (GetParam() == RtpEventFormat::evt3 ? 6 : 9));
-}
-
-TEST_P(EveryFormat, EveryPacketIsDecodedByItself) {
-  const auto intervals = random_intervals(davis, 20, 1);
-  const auto sent = events_of(intervals);
-  RtpPacker packer(davis, GetParam());
-  for (const auto& packet : packets_of(intervals, packer, 536, 0)) {
-    Receiver receiver(davis, GetParam());
-    receiver.push(packet);
-    receiver.finish();
-    ASSERT_EQ(receiver.intervals.size(), 1U);
-    const auto header = RtpPayloadHeader::read(packet.payload);
-    const auto events = events_of(receiver.intervals);
-    ASSERT_TRUE(std::equal(events.begin(), events.end(), sent.begin() + header->first_event));
-    ASSERT_EQ(events.size(), header->event_count);
-  }
-}
-
 TEST_P(EveryFormat, CountsWhatIsLostReorderedOrDuplicated) {
   for (unsigned seed = 0; seed < 40; ++seed) {
     std::mt19937 random(seed);
@@ -141,17 +109,6 @@ TEST_P(EveryFormat, CountsWhatIsLostReorderedOrDuplicated) {
     EXPECT_EQ(statistics.rejected_packets, 0U);
     EXPECT_EQ(receiver.discontinuities > 1, statistics.lost_packets > 0);
   }
-}
-
-TEST_P(EveryFormat, AReceiverThatJoinsLateHasLostNothing) {
-  const auto intervals = random_intervals(davis, 20, 5);
-  RtpPacker packer(davis, GetParam());
-  auto packets = packets_of(intervals, packer, 536, 7);
-  packets.erase(packets.begin(), packets.begin() + 10);
-  Receiver receiver(davis, GetParam());
-  receiver.push(packets);
-  EXPECT_EQ(receiver.unpacker.statistics().lost_events, 0U);
-  EXPECT_EQ(receiver.unpacker.statistics().lost_packets, 0U);
 }
 
 TEST_P(EveryFormat, FollowsASenderThatRestarts) {

@@ -1,10 +1,23 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// Device provider: event cameras that Linux knows as video devices.
+#include <fcntl.h>
+#include <glob.h>
 #include <gst/gst.h>
+#include <linux/media.h>
+#include <linux/videodev2.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
+#include <unistd.h>
 
+#include <cctype>
+#include <cstdint>
+#include <cstring>
+#include <optional>
 #include <string>
+#include <vector>
 
-#include "elements/eventcam/cameras/video_devices.hpp"
+#include "elements/eventcam/cameras/event_camera.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -14,6 +27,163 @@ GST_DEBUG_CATEGORY_STATIC(event_camera_provider_debug);
 #define GST_CAT_DEFAULT event_camera_provider_debug
 
 using eventcamera::EventCamera;
+using eventcamera::VideoDevice;
+
+namespace {
+
+/// An open device; all requests fail if it cannot be opened.
+class Device {
+ public:
+  explicit Device(const std::string& path)
+      : descriptor_(open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)) {}
+  ~Device() {
+    if (descriptor_ >= 0) close(descriptor_);
+  }
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+
+  template <class Argument>
+  bool ask(unsigned long request, Argument& argument) const {
+    return descriptor_ >= 0 && ioctl(descriptor_, request, &argument) >= 0;
+  }
+
+  /// Its number, which entities of media devices state, too.
+  std::optional<dev_t> number() const {
+    struct stat status {};
+    if (descriptor_ < 0 || fstat(descriptor_, &status) != 0) return std::nullopt;
+    return status.st_rdev;
+  }
+
+ private:
+  int descriptor_;
+};
+
+std::vector<std::string> paths_of(const char* pattern) {
+  glob_t found{};
+  std::vector<std::string> paths;
+  if (glob(pattern, 0, nullptr, &found) == 0)
+    paths.assign(found.gl_pathv, found.gl_pathv + found.gl_pathc);
+  globfree(&found);
+  return paths;
+}
+
+/// Text of a field, which may lack the zero at its end.
+template <class Character, std::size_t size>
+std::string text_of(const Character (&field)[size]) {
+  const auto* const text = reinterpret_cast<const char*>(field);
+  return {text, strnlen(text, size)};
+}
+
+std::string fourcc_of(std::uint32_t code) {
+  std::string text;
+  for (int shift = 0; shift < 32; shift += 8) text += static_cast<char>(code >> shift & 0xff);
+  return text;
+}
+
+/// Name of a control as tools write it: "Evt Format" is evt_format.
+std::string control_name(std::string text) {
+  for (char& character : text) {
+    const auto byte = static_cast<unsigned char>(character);
+    character = std::isalnum(byte) != 0 ? static_cast<char>(std::tolower(byte)) : '_';
+  }
+  return text;
+}
+
+/// Value of a control: a text, or the name of an item of a menu.
+std::string value_of(const Device& device, const v4l2_query_ext_ctrl& control) {
+  constexpr std::size_t max_text = 256;
+  if (control.type == V4L2_CTRL_TYPE_MENU) {
+    v4l2_control item{.id = control.id, .value = 0};
+    v4l2_querymenu menu{};
+    if (!device.ask(VIDIOC_G_CTRL, item)) return {};
+    menu.id = control.id;
+    menu.index = static_cast<std::uint32_t>(item.value);
+    return device.ask(VIDIOC_QUERYMENU, menu) ? text_of(menu.name) : std::string();
+  }
+  if (control.type != V4L2_CTRL_TYPE_STRING || control.elem_size > max_text) return {};
+  std::string text(max_text, '\0');
+  v4l2_ext_control one{};
+  one.id = control.id;
+  one.size = max_text;
+  one.string = text.data();
+  v4l2_ext_controls all{};
+  all.which = V4L2_CTRL_WHICH_CUR_VAL;
+  all.count = 1;
+  all.controls = &one;
+  if (!device.ask(VIDIOC_G_EXT_CTRLS, all)) return {};
+  return text.c_str();  // up to its zero
+}
+
+/// Value of the control of this name; empty if there is none.
+std::string value_of(const Device& device, const char* name) {
+  constexpr std::uint32_t next = V4L2_CTRL_FLAG_NEXT_CTRL;
+  v4l2_query_ext_ctrl control{};
+  for (control.id = next; device.ask(VIDIOC_QUERY_EXT_CTRL, control); control.id |= next)
+    if (control_name(text_of(control.name)) == name) return value_of(device, control);
+  return {};
+}
+
+/// Fills in the sensor, of which there should be one, if one of the media device's entities is the
+/// video device.
+void find_sensor(const Device& media, dev_t video, VideoDevice& found) {
+  bool is_of_video = false;
+  std::optional<media_entity_desc> sensor;
+  media_entity_desc entity{};
+  for (entity.id = MEDIA_ENT_ID_FLAG_NEXT; media.ask(MEDIA_IOC_ENUM_ENTITIES, entity);
+       entity.id |= MEDIA_ENT_ID_FLAG_NEXT) {
+    if (entity.type == MEDIA_ENT_F_CAM_SENSOR) sensor = entity;
+    is_of_video |= makedev(entity.dev.major, entity.dev.minor) == video;
+  }
+  if (!is_of_video || !sensor) return;
+  found.sensor = text_of(sensor->name);
+  const Device node("/dev/char/" + std::to_string(sensor->dev.major) + ":" +
+                    std::to_string(sensor->dev.minor));
+  found.word_format = value_of(node, "evt_format");
+}
+
+std::optional<VideoDevice> described(const Device& video) {
+  v4l2_capability capability{};
+  if (!video.ask(VIDIOC_QUERYCAP, capability)) return std::nullopt;
+  const auto capabilities = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0
+                                ? capability.device_caps
+                                : capability.capabilities;
+  v4l2_format format{};
+  if ((capabilities & V4L2_CAP_VIDEO_CAPTURE) != 0)
+    format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  else if ((capabilities & V4L2_CAP_VIDEO_CAPTURE_MPLANE) != 0)
+    format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE;
+  else
+    return std::nullopt;
+  if (!video.ask(VIDIOC_G_FMT, format)) return std::nullopt;
+  // The fields of both types begin alike.
+  const auto& buffers = format.fmt.pix;
+  return VideoDevice{
+      .driver = text_of(capability.driver),
+      .card = text_of(capability.card),
+      .fourcc = fourcc_of(buffers.pixelformat),
+      .buffers = {static_cast<int>(buffers.width), static_cast<int>(buffers.height)}};
+}
+
+struct FoundDevice {
+  std::string path;
+  eventcamera::VideoDevice device;
+};
+
+/// The devices of Linux that capture video, /dev/video*.
+static std::vector<FoundDevice> find_video_devices() {
+  std::vector<FoundDevice> found;
+  for (const auto& path : paths_of("/dev/video*")) {
+    const Device video(path);
+    const auto number = video.number();
+    auto device = described(video);
+    if (!number || !device) continue;
+    for (const auto& media : paths_of("/dev/media*")) find_sensor(Device(media), *number, *device);
+    found.push_back({path, *std::move(device)});
+  }
+  return found;
+}
+
+}  // namespace
 
 #define DEVICE_CLASS "EventCamera/Source"
 

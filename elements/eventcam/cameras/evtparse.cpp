@@ -42,6 +42,7 @@
  * Since: 0.1
  */
 #include <gst/gst.h>
+#include <gst/video/video.h>
 
 #include <algorithm>
 #include <memory>
@@ -51,9 +52,8 @@
 #include <utility>
 #include <vector>
 
-#include "elements/eventcam/cameras/camera_buffers.hpp"
-#include "elements/eventcam/cameras/camera_segment.hpp"
 #include "elements/eventcam/cameras/event_camera.hpp"
+#include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/element_type.hpp"
@@ -69,6 +69,7 @@
 #include "gst/recording/evt_caps.hpp"
 #include "src/formats/chunker.hpp"
 #include "src/formats/evt/word_scanner.hpp"
+#include "src/wire/arrival_clock.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(evt_parse_debug);
 #define GST_CAT_DEFAULT evt_parse_debug
@@ -80,6 +81,127 @@ using eventcamera::Microseconds;
 using eventcamera::WordScanner;
 
 namespace {
+
+/// Reads the transfers of a camera from its buffers: padded ones of a V4L2 driver, or loose bytes.
+class CameraBuffers {
+ public:
+  struct Transfer {
+    eventcamera::WordScanner::Transfer words;
+    GstClockTime arrival;  ///< running time, if the buffer has a time
+    guint64 lost;          ///< buffers that the driver dropped before this one
+  };
+
+  explicit CameraBuffers(eventcamera::Framing framing) : framing_(framing) {}
+
+  /// Returns the transfer of a buffer of a segment, which holds `bytes`. Valid as long as these,
+  /// and until the next call. May throw.
+  Transfer transfer_of(GstBuffer* buffer, std::span<const guint8> bytes,
+                       const GstSegment& segment) {
+    const auto arrival = arrival_of(buffer, segment);
+    const auto last = std::exchange(last_arrival_, arrival);
+    const auto lost = lost_before(buffer, segment);
+    Transfer transfer{.words = {.bytes = without_padding(buffer, bytes),
+                                .is_discontinuous = GST_BUFFER_IS_DISCONT(buffer) || lost > 0,
+                                .elapsed = {}},
+                      .arrival = arrival,
+                      .lost = lost};
+    if (GST_CLOCK_TIME_IS_VALID(arrival) && GST_CLOCK_TIME_IS_VALID(last) && arrival >= last &&
+        arrival - last <= max_gap)
+      transfer.words.elapsed =
+          static_cast<eventcamera::Microseconds>((arrival - last) / GST_USECOND);
+    return transfer;
+  }
+
+ private:
+  /// A camera that was silent for longer may have started over.
+  static constexpr GstClockTime max_gap = GST_SECOND * 3600 * 24;
+
+  static GstClockTime arrival_of(GstBuffer* buffer, const GstSegment& segment) {
+    const auto pts = GST_BUFFER_PTS(buffer);
+    // Sources of bytes stamp with running time.
+    const auto arrival = segment.format == GST_FORMAT_TIME
+                             ? gst_segment_to_running_time(&segment, GST_FORMAT_TIME, pts)
+                             : pts;
+    constexpr auto max = static_cast<GstClockTime>(eventcamera::Chunker::max_time) * GST_USECOND;
+    return arrival <= max ? arrival : GST_CLOCK_TIME_NONE;
+  }
+
+  /// Offsets of camera buffers are numbers; offsets of file buffers are in bytes.
+  guint64 lost_before(GstBuffer* buffer, const GstSegment& segment) {
+    if (framing_ != eventcamera::Framing::padded || segment.format != GST_FORMAT_TIME) return 0;
+    const auto offset = GST_BUFFER_OFFSET(buffer);
+    const auto last = std::exchange(last_offset_, offset);
+    if (offset == GST_BUFFER_OFFSET_NONE || last == GST_BUFFER_OFFSET_NONE || offset <= last)
+      return 0;
+    return offset - last - 1;
+  }
+
+  /// The bytes of a buffer, without the padding of its rows.
+  std::span<const guint8> without_padding(GstBuffer* buffer, std::span<const guint8> bytes) {
+    const GstVideoMeta* const meta = gst_buffer_get_video_meta(buffer);
+    if (meta == nullptr || meta->n_planes != 1 || meta->stride[0] <= static_cast<gint>(meta->width))
+      return bytes;
+    const auto stride = static_cast<gsize>(meta->stride[0]);
+    rows_.clear();
+    gsize at = meta->offset[0];
+    for (guint y = 0; y < meta->height && at < bytes.size(); ++y, at += stride) {
+      const auto row = bytes.subspan(at, std::min<gsize>(meta->width, bytes.size() - at));
+      rows_.insert(rows_.end(), row.begin(), row.end());
+    }
+    return rows_;
+  }
+
+  eventcamera::Framing framing_;
+  std::vector<guint8> rows_;
+  GstClockTime last_arrival_ = GST_CLOCK_TIME_NONE;
+  guint64 last_offset_ = GST_BUFFER_OFFSET_NONE;
+};
+
+/// Segments of a camera's stream: they map the camera's clock to running time, as its transfers
+/// arrive.
+class CameraSegment {
+ public:
+  using Nanoseconds = eventcamera::Nanoseconds;
+
+  /// Records the arrival of data up to the time `sent`. After a gap, the camera's clock may have
+  /// been reset.
+  void arrive(eventcamera::Microseconds sent, GstClockTime arrival, bool after_gap) {
+    is_due_ |= clock_.arrive(sent, static_cast<Nanoseconds>(arrival), after_gap);
+  }
+
+  /// Pushes a segment from `start` before data of these times, unless the last segment still holds.
+  /// Returns the running time of `start` if it did. Data before running time 0, as in a first
+  /// transfer, is late: the next data corrects the mapping.
+  std::optional<GstClockTime> begin(GstPad* src, guint32 seqnum, GstClockTime start,
+                                    GstClockTime end) {
+    std::optional<GstClockTime> mapped;
+    if (is_due_ || !segment_.continues(start, GST_CLOCK_TIME_NONE)) {
+      const auto running = running_time_of(start);
+      is_due_ = running && *running < 0;
+      mapped = segment_.begin(src, seqnum, start,
+                              running ? static_cast<GstClockTime>(std::max(*running, Nanoseconds{}))
+                                      : GST_CLOCK_TIME_NONE,
+                              start);
+    }
+    segment_.reach(end);
+    return mapped;
+  }
+
+  bool has_begun() const { return segment_.has_begun(); }
+  /// Running time of a camera time; none before the first transfer.
+  std::optional<Nanoseconds> running_time_of(GstClockTime time) const {
+    const auto offset = clock_.offset();
+    return offset ? std::optional(static_cast<Nanoseconds>(time) + *offset) : std::nullopt;
+  }
+
+  /// Parts per million by which the camera's clock is slow.
+  double drift() const { return clock_.drift(); }
+
+ private:
+  eventcamera::ArrivalClock clock_;
+  ArrivalSegment segment_{0};
+  bool is_due_ = false;  ///< a segment that corrects the mapping
+};
 
 constexpr int max_side = 2048;
 

@@ -61,33 +61,270 @@ struct Settings {
   GstClockTime accumulation_time = 0;
 };
 
+/// Converts an interval to running time.
+std::optional<EventInterval> running_interval(GstAggregatorPad* pad,
+                                              const EventInterval& interval) {
+  const auto start = running_time(pad, interval.start);
+  if (!start) return std::nullopt;
+  constexpr auto max = static_cast<double>(G_MAXINT64);
+  const auto length = static_cast<double>(interval.end - interval.start) / segment_of(pad).rate;
+  return EventInterval{*start, *start + static_cast<GstClockTime>(std::min(length, max))};
+}
+
+static bool is_grey(const GstStructure* video) {
+  return g_strcmp0(gst_structure_get_string(video, "format"), "GRAY8") == 0;
+}
+
 class EventOverlay final : public EventAggregator {
  public:
   explicit EventOverlay(GstAggregator* element)
       : EventAggregator(element, {.verb = "draw", .main_pad = "video_sink"}) {}
 
-  void stop() override;
-  void flush() noexcept override;
+  void stop() override {
+    flush();
+    video_.reset();
+    drawn_.reset();
+    sensor_.reset();
+    warn_of_missing_.reset();
+  }
+
+  void flush() noexcept override {
+    overlay_.reset();
+    begun_.reset();
+    known_ = 0;
+    shown_.reset();
+  }
+
   void release_memory() noexcept override { flush(); }
-  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
-  OwnedCaps output_caps(GstCaps* input) override;
-  OwnedCaps input_caps(OwnedCaps output) const override;
-  GstFlowReturn aggregate(bool timed_out) override;
-  GstClockTime next_time() override;
+
+  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
+    return pad == main_pad() ? handle_video_caps(caps) : handle_event_caps(caps);
+  }
+
+  /// Grey video is drawn on in colour, unless downstream takes only grey.
+  OwnedCaps output_caps(GstCaps* input) override {
+    OwnedCaps output(gst_caps_ref(input));
+    if (is_grey(gst_caps_get_structure(input, 0))) {
+      const OwnedCaps colours(gst_caps_copy(input));
+      const OwnedCaps formats(
+          gst_caps_from_string("video/x-raw, format = (string) " COLOUR_FORMATS));
+      GstStructure* const fields = gst_caps_get_structure(colours.get(), 0);
+      gst_structure_set_value(
+          fields, "format",
+          gst_structure_get_value(gst_caps_get_structure(formats.get(), 0), "format"));
+      gst_structure_remove_field(fields, "colorimetry");
+      OwnedCaps taken(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(element()), colours.get()));
+      if (!gst_caps_is_empty(taken.get())) output.reset(gst_caps_fixate(taken.release()));
+    }
+    GstVideoInfo drawn;
+    if (gst_video_info_from_caps(&drawn, output.get())) drawn_ = drawn;
+    return output;
+  }
+
+  OwnedCaps input_caps(OwnedCaps output) const override {
+    OwnedCaps input(gst_caps_copy(output.get()));
+    for (guint i = 0; i < gst_caps_get_size(output.get()); ++i) {
+      GstStructure* const grey = gst_structure_copy(gst_caps_get_structure(output.get(), i));
+      gst_structure_set(grey, "format", G_TYPE_STRING, "GRAY8", nullptr);
+      gst_structure_remove_field(grey, "colorimetry");
+      input.reset(gst_caps_merge_structure(input.release(), grey));
+    }
+    return input;
+  }
+
+  GstFlowReturn aggregate(bool timed_out) override {
+    auto frame = next_buffer(main_pad());
+    if (!frame) return has_ended(main_pad()) ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
+    const auto interval = video_ ? interval_of_frame(frame.get()) : std::nullopt;
+    frame.reset();  // otherwise it would not be writable in place
+    return video_ ? handle_frame(interval, timed_out) : GST_FLOW_NOT_NEGOTIATED;
+  }
+
+  /// Time at which a live frame is pushed without waiting for events: at once if it has no time,
+  /// and at the end of the video.
+  GstClockTime next_time() override { return next_main_time(); }
 
   Guarded<Settings> settings;
 
  private:
-  bool handle_video_caps(const GstCaps* caps);
-  bool handle_event_caps(const GstCaps* caps);
-  std::optional<EventInterval> interval_of_frame(GstBuffer* frame) const;
-  std::span<const Event> in_running_time(std::span<const Event> events, double rate);
-  bool add_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end);
-  bool handle_buffer(GstBuffer* buffer, GstClockTime end);
-  bool add_events_until(GstClockTime end);
-  OwnedBuffer in_colour(GstBuffer* grey) const;
-  GstFlowReturn draw(const EventInterval& interval, GstBuffer* buffer);
-  GstFlowReturn handle_frame(const std::optional<EventInterval>& interval, bool timed_out);
+  bool handle_video_caps(const GstCaps* caps) {
+    GstVideoInfo video;
+    if (!gst_video_info_from_caps(&video, caps)) return false;
+    if (!video_ || GST_VIDEO_INFO_WIDTH(&*video_) != GST_VIDEO_INFO_WIDTH(&video) ||
+        GST_VIDEO_INFO_HEIGHT(&*video_) != GST_VIDEO_INFO_HEIGHT(&video))
+      overlay_.reset();
+    video_ = video;
+    const GstClockTime latency = frame_duration(video);
+    GST_DEBUG_OBJECT(element(), "latency %" GST_TIME_FORMAT ", one frame", GST_TIME_ARGS(latency));
+    gst_aggregator_set_latency(element(), latency, latency);
+    if (!gst_pad_is_linked(GST_PAD(events_pad_)))
+      warn_of_missing_(
+          element(),
+          {GST_CORE_ERROR_PAD,
+           "No events to draw: link a source of events to the pad \"event_sink\". Until "
+           "then, video from a live source passes unchanged, and other video waits."},
+          "the pad \"event_sink\" is not linked");
+    return true;
+  }
+
+  bool handle_event_caps(const GstCaps* caps) {
+    GstEventCameraInfo info;
+    if (!gst_event_camera_info_from_caps(&info, caps)) return false;
+    const SensorSize sensor{info.width, info.height};
+    if (sensor_ != sensor) overlay_.reset();
+    sensor_ = sensor;
+    return true;
+  }
+
+  /// Interval during which a frame is shown, in running time; since the last frame if its end is
+  /// unknown.
+  std::optional<EventInterval> interval_of_frame(GstBuffer* frame) const {
+    const GstClockTime start = GST_BUFFER_PTS(frame);
+    if (!GST_CLOCK_TIME_IS_VALID(start) || start > G_MAXINT64) return std::nullopt;
+    const GstClockTime duration =
+        GST_BUFFER_DURATION_IS_VALID(frame) ? GST_BUFFER_DURATION(frame) : frame_duration(*video_);
+    auto interval = running_interval(
+        main_pad(), {start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)});
+    if (interval && duration == 0)
+      interval->start = std::min(shown_.value_or(interval->end), interval->end);
+    return interval;
+  }
+
+  /// The events of a buffer, with times scaled by the rate to differences of running time.
+  std::span<const Event> in_running_time(std::span<const Event> events, double rate) {
+    if (rate == 1) return events;
+    constexpr double max = std::numeric_limits<std::uint32_t>::max();
+    scaled_.assign(events.begin(), events.end());
+    for (auto& event : scaled_) event.t = static_cast<std::uint32_t>(std::min(event.t / rate, max));
+    return scaled_;
+  }
+
+  /// Adds the events of a buffer, whose `interval` is in running time, up to running time `end`.
+  /// Returns true if these were all. May throw.
+  bool add_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end) {
+    const MappedEvents mapped(buffer);
+    if (!mapped) {
+      warn(EventFault::partial_event, buffer);
+      return true;
+    }
+    const auto origin = static_cast<Microseconds>(interval.start / 1000);
+    const double rate = segment_of(events_pad_).rate;
+    const auto rest = mapped.events().subspan(std::min(taken_, mapped.events().size()));
+    if (taken_ == 0)
+      GST_LOG_OBJECT(events_pad_, "%" G_GSIZE_FORMAT " events at running time %" GST_TIME_FORMAT,
+                     rest.size(), GST_TIME_ARGS(interval.start));
+    const auto length = static_cast<double>(static_cast<Microseconds>(end / 1000) - origin) * rate;
+    const auto due =
+        end < interval.end ? events_until(rest, 0, static_cast<Microseconds>(length)) : rest;
+    taken_ += due.size();
+    if (overlay_)
+      warn(overlay_->add(in_running_time(due, rate), origin, length_of(interval)), buffer);
+    return due.size() == rest.size();
+  }
+
+  /// Adds the events of the first queued buffer up to running time `end`. Returns true if more are
+  /// needed to reach `end`. May throw.
+  bool handle_buffer(GstBuffer* buffer, GstClockTime end) {
+    const auto interval = interval_of(buffer);
+    const auto running = interval ? running_interval(events_pad_, *interval) : std::nullopt;
+    if (!interval)
+      warn(interval_fault(buffer), buffer);
+    else if (!running)
+      GST_LOG_OBJECT(events_pad_, "outside the segment: dropped %" GST_PTR_FORMAT, buffer);
+    if (begun_.get() != buffer) taken_ = 0;
+    if (running) {
+      if (running->start >= end) return false;
+      if (!add_events(buffer, *running, end)) {
+        begun_.reset(gst_buffer_ref(buffer));
+        return false;
+      }
+      known_ = std::max(known_, running->end);
+    }
+    begun_.reset();
+    gst_aggregator_pad_drop_buffer(events_pad_);
+    return known_ + event_resolution <= end;
+  }
+
+  /// Adds the events up to running time `end`. Returns true if no more are expected before `end`.
+  /// May throw.
+  bool add_events_until(GstClockTime end) {
+    while (known_ + event_resolution <= end) {
+      const auto buffer = next_buffer(events_pad_);
+      if (!buffer) return has_ended(events_pad_);
+      if (!handle_buffer(buffer.get(), end)) return true;
+    }
+    return true;
+  }
+
+  /// A copy of a grey frame in the format of the output; the frame itself if it cannot be read.
+  OwnedBuffer in_colour(GstBuffer* grey) const {
+    OwnedBuffer colour(gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(&*drawn_), nullptr));
+    if (!colour) throw std::bad_alloc();
+    gst_buffer_copy_into(
+        colour.get(), grey,
+        static_cast<GstBufferCopyFlags>(GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS), 0,
+        static_cast<gsize>(-1));
+    keep_metas(grey, colour.get());
+    const VideoFrame from(*video_, grey, GST_MAP_READ);
+    const VideoFrame to(*drawn_, colour.get(), GST_MAP_WRITE);
+    if (!from || !to) return OwnedBuffer(gst_buffer_ref(grey));
+    const auto layout = pixel_layout_of(*drawn_);
+    for (int y = 0; y < GST_VIDEO_INFO_HEIGHT(&*drawn_); ++y) {
+      const std::byte* in = from.data() + y * from.stride();
+      std::byte* out = to.data() + y * to.stride();
+      std::fill_n(out, GST_VIDEO_INFO_WIDTH(&*drawn_) * layout.bytes, std::byte{255});  // opaque
+      for (int x = 0; x < GST_VIDEO_INFO_WIDTH(&*drawn_); ++x, ++in, out += layout.bytes)
+        out[layout.red] = out[layout.green] = out[layout.blue] = *in;
+    }
+    return colour;
+  }
+
+  GstFlowReturn draw(const EventInterval& interval, GstBuffer* buffer) {
+    const Settings current = settings.copy();
+    const VideoFrame frame(*drawn_, buffer, static_cast<GstMapFlags>(GST_MAP_READWRITE));
+    if (!frame) {
+      GST_ELEMENT_ERROR(
+          element(), RESOURCE, FAILED,
+          ("Cannot draw on a video frame: %s. Check the element upstream.", frame.fault().c_str()),
+          ("%" GST_PTR_FORMAT, buffer));
+      return GST_FLOW_ERROR;
+    }
+    const auto end = static_cast<Microseconds>(interval.end / 1000);
+    const auto start = current.accumulation_time > 0
+                           ? end - static_cast<Microseconds>(current.accumulation_time / 1000)
+                           : static_cast<Microseconds>(interval.start / 1000);
+    overlay_->draw(start, end, eventcamera::palette(current.palette), current.opacity,
+                   pixel_layout_of(*drawn_), frame.data(), frame.stride());
+    return GST_FLOW_OK;
+  }
+
+  /// Draws on the first queued frame and pushes it. May throw.
+  GstFlowReturn handle_frame(const std::optional<EventInterval>& interval, bool timed_out) {
+    if (interval) {
+      if (sensor_ && !overlay_) {
+        const SensorSize frame{GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)};
+        GST_DEBUG_OBJECT(element(), "drawing the events of %dx%d pixels on frames of %dx%d",
+                         sensor_->width, sensor_->height, frame.width, frame.height);
+        overlay_.emplace(*sensor_, frame);
+      }
+      if (!add_events_until(interval->end) && !timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
+    }
+    OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
+    if (interval) shown_ = interval->end;
+    if (is_gap(out.get()))
+      return is_segment_sent() ? push_gap(GST_BUFFER_PTS(out.get()), GST_BUFFER_DURATION(out.get()))
+                               : GST_FLOW_OK;
+    GST_LOG_OBJECT(main_pad(),
+                   "frame at %" GST_TIME_FORMAT "; events are known until %" GST_TIME_FORMAT,
+                   GST_TIME_ARGS(GST_BUFFER_PTS(out.get())), GST_TIME_ARGS(known_));
+    if (GST_VIDEO_INFO_FORMAT(&*drawn_) != GST_VIDEO_INFO_FORMAT(&*video_))
+      out = in_colour(out.get());
+    if (interval && overlay_) {
+      const GstFlowReturn result = draw(*interval, out.get());
+      if (result != GST_FLOW_OK) return result;
+    }
+    return push(std::move(out));
+  }
 
   GstAggregatorPad* const events_pad_ = pad("event_sink");
 
@@ -103,273 +340,6 @@ class EventOverlay final : public EventAggregator {
   WarnOnce warn_of_missing_{GST_CAT_DEFAULT};
 };
 
-/* time */
-
-/// Converts an interval to running time.
-std::optional<EventInterval> running_interval(GstAggregatorPad* pad,
-                                              const EventInterval& interval) {
-  const auto start = running_time(pad, interval.start);
-  if (!start) return std::nullopt;
-  constexpr auto max = static_cast<double>(G_MAXINT64);
-  const auto length = static_cast<double>(interval.end - interval.start) / segment_of(pad).rate;
-  return EventInterval{*start, *start + static_cast<GstClockTime>(std::min(length, max))};
-}
-
-/// Interval during which a frame is shown, in running time; since the last frame if its end is
-/// unknown.
-std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) const {
-  const GstClockTime start = GST_BUFFER_PTS(frame);
-  if (!GST_CLOCK_TIME_IS_VALID(start) || start > G_MAXINT64) return std::nullopt;
-  const GstClockTime duration =
-      GST_BUFFER_DURATION_IS_VALID(frame) ? GST_BUFFER_DURATION(frame) : frame_duration(*video_);
-  auto interval = running_interval(
-      main_pad(), {start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)});
-  if (interval && duration == 0)
-    interval->start = std::min(shown_.value_or(interval->end), interval->end);
-  return interval;
-}
-
-/* events */
-
-/// The events of a buffer, with times scaled by the rate to differences of running time.
-std::span<const Event> EventOverlay::in_running_time(std::span<const Event> events, double rate) {
-  if (rate == 1) return events;
-  constexpr double max = std::numeric_limits<std::uint32_t>::max();
-  scaled_.assign(events.begin(), events.end());
-  for (auto& event : scaled_) event.t = static_cast<std::uint32_t>(std::min(event.t / rate, max));
-  return scaled_;
-}
-
-/// Adds the events of a buffer, whose `interval` is in running time, up to running time `end`.
-/// Returns true if these were all. May throw.
-bool EventOverlay::add_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end) {
-  const MappedEvents mapped(buffer);
-  if (!mapped) {
-    warn(EventFault::partial_event, buffer);
-    return true;
-  }
-  const auto origin = static_cast<Microseconds>(interval.start / 1000);
-  const double rate = segment_of(events_pad_).rate;
-  const auto rest = mapped.events().subspan(std::min(taken_, mapped.events().size()));
-  if (taken_ == 0)
-    GST_LOG_OBJECT(events_pad_, "%" G_GSIZE_FORMAT " events at running time %" GST_TIME_FORMAT,
-                   rest.size(), GST_TIME_ARGS(interval.start));
-  const auto length = static_cast<double>(static_cast<Microseconds>(end / 1000) - origin) * rate;
-  const auto due =
-      end < interval.end ? events_until(rest, 0, static_cast<Microseconds>(length)) : rest;
-  taken_ += due.size();
-  if (overlay_)
-    warn(overlay_->add(in_running_time(due, rate), origin, length_of(interval)), buffer);
-  return due.size() == rest.size();
-}
-
-/// Adds the events of the first queued buffer up to running time `end`. Returns true if more are
-/// needed to reach `end`. May throw.
-bool EventOverlay::handle_buffer(GstBuffer* buffer, GstClockTime end) {
-  const auto interval = interval_of(buffer);
-  const auto running = interval ? running_interval(events_pad_, *interval) : std::nullopt;
-  if (!interval)
-    warn(interval_fault(buffer), buffer);
-  else if (!running)
-    GST_LOG_OBJECT(events_pad_, "outside the segment: dropped %" GST_PTR_FORMAT, buffer);
-  if (begun_.get() != buffer) taken_ = 0;
-  if (running) {
-    if (running->start >= end) return false;
-    if (!add_events(buffer, *running, end)) {
-      begun_.reset(gst_buffer_ref(buffer));
-      return false;
-    }
-    known_ = std::max(known_, running->end);
-  }
-  begun_.reset();
-  gst_aggregator_pad_drop_buffer(events_pad_);
-  return known_ + event_resolution <= end;
-}
-
-/// Adds the events up to running time `end`. Returns true if no more are expected before `end`. May
-/// throw.
-bool EventOverlay::add_events_until(GstClockTime end) {
-  while (known_ + event_resolution <= end) {
-    const auto buffer = next_buffer(events_pad_);
-    if (!buffer) return has_ended(events_pad_);
-    if (!handle_buffer(buffer.get(), end)) return true;
-  }
-  return true;
-}
-
-/* frames */
-
-/// A copy of a grey frame in the format of the output; the frame itself if it cannot be read.
-OwnedBuffer EventOverlay::in_colour(GstBuffer* grey) const {
-  OwnedBuffer colour(gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(&*drawn_), nullptr));
-  if (!colour) throw std::bad_alloc();
-  gst_buffer_copy_into(
-      colour.get(), grey,
-      static_cast<GstBufferCopyFlags>(GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS), 0,
-      static_cast<gsize>(-1));
-  keep_metas(grey, colour.get());
-  const VideoFrame from(*video_, grey, GST_MAP_READ);
-  const VideoFrame to(*drawn_, colour.get(), GST_MAP_WRITE);
-  if (!from || !to) return OwnedBuffer(gst_buffer_ref(grey));
-  const auto layout = pixel_layout_of(*drawn_);
-  for (int y = 0; y < GST_VIDEO_INFO_HEIGHT(&*drawn_); ++y) {
-    const std::byte* in = from.data() + y * from.stride();
-    std::byte* out = to.data() + y * to.stride();
-    std::fill_n(out, GST_VIDEO_INFO_WIDTH(&*drawn_) * layout.bytes, std::byte{255});  // opaque
-    for (int x = 0; x < GST_VIDEO_INFO_WIDTH(&*drawn_); ++x, ++in, out += layout.bytes)
-      out[layout.red] = out[layout.green] = out[layout.blue] = *in;
-  }
-  return colour;
-}
-
-GstFlowReturn EventOverlay::draw(const EventInterval& interval, GstBuffer* buffer) {
-  const Settings current = settings.copy();
-  const VideoFrame frame(*drawn_, buffer, static_cast<GstMapFlags>(GST_MAP_READWRITE));
-  if (!frame) {
-    GST_ELEMENT_ERROR(
-        element(), RESOURCE, FAILED,
-        ("Cannot draw on a video frame: %s. Check the element upstream.", frame.fault().c_str()),
-        ("%" GST_PTR_FORMAT, buffer));
-    return GST_FLOW_ERROR;
-  }
-  const auto end = static_cast<Microseconds>(interval.end / 1000);
-  const auto start = current.accumulation_time > 0
-                         ? end - static_cast<Microseconds>(current.accumulation_time / 1000)
-                         : static_cast<Microseconds>(interval.start / 1000);
-  overlay_->draw(start, end, eventcamera::palette(current.palette), current.opacity,
-                 pixel_layout_of(*drawn_), frame.data(), frame.stride());
-  return GST_FLOW_OK;
-}
-
-/// Draws on the first queued frame and pushes it. May throw.
-GstFlowReturn EventOverlay::handle_frame(const std::optional<EventInterval>& interval,
-                                         bool timed_out) {
-  if (interval) {
-    if (sensor_ && !overlay_) {
-      const SensorSize frame{GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)};
-      GST_DEBUG_OBJECT(element(), "drawing the events of %dx%d pixels on frames of %dx%d",
-                       sensor_->width, sensor_->height, frame.width, frame.height);
-      overlay_.emplace(*sensor_, frame);
-    }
-    if (!add_events_until(interval->end) && !timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
-  }
-  OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
-  if (interval) shown_ = interval->end;
-  if (is_gap(out.get()))
-    return is_segment_sent() ? push_gap(GST_BUFFER_PTS(out.get()), GST_BUFFER_DURATION(out.get()))
-                             : GST_FLOW_OK;
-  GST_LOG_OBJECT(main_pad(),
-                 "frame at %" GST_TIME_FORMAT "; events are known until %" GST_TIME_FORMAT,
-                 GST_TIME_ARGS(GST_BUFFER_PTS(out.get())), GST_TIME_ARGS(known_));
-  if (GST_VIDEO_INFO_FORMAT(&*drawn_) != GST_VIDEO_INFO_FORMAT(&*video_))
-    out = in_colour(out.get());
-  if (interval && overlay_) {
-    const GstFlowReturn result = draw(*interval, out.get());
-    if (result != GST_FLOW_OK) return result;
-  }
-  return push(std::move(out));
-}
-
-GstFlowReturn EventOverlay::aggregate(bool timed_out) {
-  auto frame = next_buffer(main_pad());
-  if (!frame) return has_ended(main_pad()) ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
-  const auto interval = video_ ? interval_of_frame(frame.get()) : std::nullopt;
-  frame.reset();  // otherwise it would not be writable in place
-  return video_ ? handle_frame(interval, timed_out) : GST_FLOW_NOT_NEGOTIATED;
-}
-
-/// Time at which a live frame is pushed without waiting for events: at once if it has no time, and
-/// at the end of the video.
-GstClockTime EventOverlay::next_time() {
-  const auto frame = next_buffer(main_pad());
-  if (!frame) return has_ended(main_pad()) ? 0 : GST_CLOCK_TIME_NONE;
-  if (!GST_BUFFER_PTS_IS_VALID(frame.get())) return 0;
-  return running_time(main_pad(), GST_BUFFER_PTS(frame.get())).value_or(0);
-}
-
-/* negotiation, states */
-
-bool EventOverlay::handle_video_caps(const GstCaps* caps) {
-  GstVideoInfo video;
-  if (!gst_video_info_from_caps(&video, caps)) return false;
-  if (!video_ || GST_VIDEO_INFO_WIDTH(&*video_) != GST_VIDEO_INFO_WIDTH(&video) ||
-      GST_VIDEO_INFO_HEIGHT(&*video_) != GST_VIDEO_INFO_HEIGHT(&video))
-    overlay_.reset();
-  video_ = video;
-  const GstClockTime latency = frame_duration(video);
-  GST_DEBUG_OBJECT(element(), "latency %" GST_TIME_FORMAT ", one frame", GST_TIME_ARGS(latency));
-  gst_aggregator_set_latency(element(), latency, latency);
-  if (!gst_pad_is_linked(GST_PAD(events_pad_)))
-    warn_of_missing_(element(),
-                     {GST_CORE_ERROR_PAD,
-                      "No events to draw: link a source of events to the pad \"event_sink\". Until "
-                      "then, video from a live source passes unchanged, and other video waits."},
-                     "the pad \"event_sink\" is not linked");
-  return true;
-}
-
-static bool is_grey(const GstStructure* video) {
-  return g_strcmp0(gst_structure_get_string(video, "format"), "GRAY8") == 0;
-}
-
-/// Grey video is drawn on in colour, unless downstream takes only grey.
-OwnedCaps EventOverlay::output_caps(GstCaps* input) {
-  OwnedCaps output(gst_caps_ref(input));
-  if (is_grey(gst_caps_get_structure(input, 0))) {
-    const OwnedCaps colours(gst_caps_copy(input));
-    const OwnedCaps formats(gst_caps_from_string("video/x-raw, format = (string) " COLOUR_FORMATS));
-    GstStructure* const fields = gst_caps_get_structure(colours.get(), 0);
-    gst_structure_set_value(
-        fields, "format",
-        gst_structure_get_value(gst_caps_get_structure(formats.get(), 0), "format"));
-    gst_structure_remove_field(fields, "colorimetry");
-    OwnedCaps taken(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(element()), colours.get()));
-    if (!gst_caps_is_empty(taken.get())) output.reset(gst_caps_fixate(taken.release()));
-  }
-  GstVideoInfo drawn;
-  if (gst_video_info_from_caps(&drawn, output.get())) drawn_ = drawn;
-  return output;
-}
-
-OwnedCaps EventOverlay::input_caps(OwnedCaps output) const {
-  OwnedCaps input(gst_caps_copy(output.get()));
-  for (guint i = 0; i < gst_caps_get_size(output.get()); ++i) {
-    GstStructure* const grey = gst_structure_copy(gst_caps_get_structure(output.get(), i));
-    gst_structure_set(grey, "format", G_TYPE_STRING, "GRAY8", nullptr);
-    gst_structure_remove_field(grey, "colorimetry");
-    input.reset(gst_caps_merge_structure(input.release(), grey));
-  }
-  return input;
-}
-
-bool EventOverlay::handle_event_caps(const GstCaps* caps) {
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-  const SensorSize sensor{info.width, info.height};
-  if (sensor_ != sensor) overlay_.reset();
-  sensor_ = sensor;
-  return true;
-}
-
-bool EventOverlay::handle_caps(GstAggregatorPad* pad, GstCaps* caps) {
-  return pad == main_pad() ? handle_video_caps(caps) : handle_event_caps(caps);
-}
-
-void EventOverlay::flush() noexcept {
-  overlay_.reset();
-  begun_.reset();
-  known_ = 0;
-  shown_.reset();
-}
-
-void EventOverlay::stop() {
-  flush();
-  video_.reset();
-  drawn_.reset();
-  sensor_.reset();
-  warn_of_missing_.reset();
-}
-
 }  // namespace
 
 DEFINE_EVENT_AGGREGATOR(GstEventOverlay, gst_event_overlay, EVENT_OVERLAY, EventOverlay,
@@ -377,7 +347,7 @@ DEFINE_EVENT_AGGREGATOR(GstEventOverlay, gst_event_overlay, EVENT_OVERLAY, Event
 
 static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
   const Settings defaults;
-  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  Properties<aggregator_settings<EventOverlay>> properties(G_OBJECT_CLASS(klass));
   properties.add(&Settings::palette,
                  g_param_spec_enum(
                      "palette", "Palette", "Colours of pixels with ON events, OFF events, and both",

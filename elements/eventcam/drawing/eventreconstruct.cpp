@@ -58,7 +58,7 @@ DEFINE_EVENT_AGGREGATOR(GstEventReconstruct, gst_event_reconstruct, EVENT_RECONS
 
 static void gst_event_reconstruct_class_init(GstEventReconstructClass* klass) {
   constexpr Reconstruction::Settings defaults;
-  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  Properties<aggregator_settings<EventReconstruct>> properties(G_OBJECT_CLASS(klass));
   properties.add(&Reconstruction::Settings::cutoff,
                  g_param_spec_double(
                      "cutoff", "Cutoff",

@@ -65,7 +65,7 @@ DEFINE_EVENT_AGGREGATOR(GstEventRender, gst_event_render, EVENT_RENDER, EventRen
                         GST_RANK_PRIMARY, "events drawn as video")
 
 static void gst_event_render_class_init(GstEventRenderClass* klass) {
-  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  Properties<aggregator_settings<EventRender>> properties(G_OBJECT_CLASS(klass));
   add_render_properties(properties);
   init_pictures_class(GST_EVENT_AGGREGATOR_CLASS(klass), DRAWN_VIDEO_FORMATS);
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event renderer",

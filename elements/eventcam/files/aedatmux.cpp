@@ -40,7 +40,6 @@
 #include <utility>
 
 #include "elements/eventcam/files/aedat_file.hpp"
-#include "gst/aggregator/segment_end.hpp"
 #include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"

@@ -15,7 +15,7 @@
 #include "src/formats/aedat/aedat_decoder.hpp"
 #endif
 #ifdef HAVE_HDF5
-#include "src/formats/hdf5/hdf5_decoder.hpp"
+#include "src/formats/hdf5/hdf5_reader.hpp"
 #endif
 #ifdef HAVE_NPZ
 #include "src/formats/numpy/npz_decoder.hpp"

@@ -106,16 +106,166 @@ class EventMerge final : public EventAggregator {
       : EventAggregator(element, {.verb = "merge", .main_pad = nullptr, .passes_main_pad = false}),
         timeline(GST_ELEMENT(element)) {}
 
-  void stop() override;
-  void flush() noexcept override;
+  void stop() override {
+    flush();
+    for (const auto& pad : numbered_pads(element())) stream_of(pad).stop();
+    timeline.reset();
+    buffers_.reset();
+    latency_ = 0;
+    gst_aggregator_set_latency(element(), latency_, latency_);
+    warn_of_late_.reset();
+    warn_of_missing_.reset();
+    *counts_.lock() = {};
+  }
+
+  void flush() noexcept override {
+    for_each_sink_pad(element(),
+                      [](GstAggregatorPad* pad) { GST_EVENT_MERGE_PAD(pad)->priv->flush(); });
+    merger_.restart();
+    segment_chosen_ = false;
+    discontinuous_ = true;
+    waiting_since_ = 0;
+  }
+
   void release_memory() noexcept override { flush(); }
-  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
-  GstFlowReturn aggregate(bool timed_out) override;
-  GstClockTime next_time() override;
+
+  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
+    GstEventCameraInfo info;
+    if (!gst_event_camera_info_from_caps(&info, caps)) return false;
+    GST_EVENT_MERGE_PAD(pad)->priv->sensor = {info.width, info.height};
+    gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
+    return true;
+  }
+
+  GstFlowReturn aggregate(bool timed_out) override {
+    auto pads = numbered_pads(element());
+    std::vector<MergeInput*> inputs;
+    std::vector<MergeInput*> returned;
+    bool waiting = false;
+    for (const auto& pad : pads) {
+      auto& stream = stream_of(pad);
+      if (stream.sensor != SensorSize{} && stream.placed != stream.position.copy()) {
+        gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
+        return GST_FLOW_OK;
+      }
+      const bool is_loaded = load(pad);
+      stream.goes_back = is_loaded && stream.segment_is_new && merger_.goes_back(stream.input);
+      if (is_loaded)
+        (stream.goes_back ? returned : inputs).push_back(&stream.input);
+      else if (!has_ended(pad.get()))
+        waiting = true;
+    }
+    if (inputs.empty() && !waiting && !returned.empty()) {
+      GST_DEBUG_OBJECT(element(), "all streams go back");
+      std::erase_if(pads, [](const auto& pad) { return !stream_of(pad).input.is_loaded(); });
+      inputs.swap(returned);
+      merger_.restart();
+      segment_chosen_ = false;
+      discontinuous_ = true;
+      choose_segment(pads);
+    }
+    const bool all_have_ended = inputs.empty() && !waiting;
+    if (!segment_chosen_ && pads.size() < settings.copy().min_streams) {
+      if (!inputs.empty() || all_have_ended) timed_out = timed_out || wait_for_streams(pads.size());
+      waiting = true;
+    }
+    if (all_have_ended && (!waiting || timed_out)) {
+      choose_segment(pads);
+      return GST_FLOW_EOS;
+    }
+    if (inputs.empty() || (waiting && !timed_out)) return GST_AGGREGATOR_FLOW_NEED_DATA;
+    choose_segment(pads);
+    const auto interval = merger_.next(inputs);
+    count(interval);
+    for (const auto& pad : pads) {
+      auto& stream = stream_of(pad);
+      if (!stream.input.is_loaded() || stream.input.start() >= interval.end || stream.goes_back)
+        continue;
+      discontinuous_ |= std::exchange(stream.discontinuous, false);
+      if (std::exchange(stream.segment_is_new, false) && stream.has_output_segment)
+        set_segment(MergedTimeline::longest_segment(pad, pads));
+    }
+    const GstFlowReturn result = push_interval(interval, inputs);
+    for (const auto& pad : pads) {
+      auto& stream = stream_of(pad);
+      if (!stream.input.is_loaded() || !stream.input.is_merged(interval.end) || stream.goes_back)
+        continue;
+      stream.unload();
+      gst_aggregator_pad_drop_buffer(pad.get());
+    }
+    return result;
+  }
+
+  /// The start of the first queued interval, from which the latency counts.
+  GstClockTime next_time() override {
+    GstClockTime next = GST_CLOCK_TIME_NONE;
+    for (const auto& pad : numbered_pads(element())) {
+      const auto buffer = next_buffer(pad.get());
+      const auto interval = buffer ? interval_of(buffer.get()) : std::nullopt;
+      if (!buffer || stream_of(pad).goes_back) continue;
+      const auto start = interval ? running_time(pad.get(), interval->start) : std::nullopt;
+      next = std::min(next, start.value_or(0));
+    }
+    return next;
+  }
+
   void prepare_seek(const SeekRequest& request) override { timeline.seek(request); }
 
-  GstFlowReturn choose_caps(GstCaps* downstream, GstCaps** result);
-  GstStructure* stats() const;
+  /// Places the sensors, and chooses an output size that contains them.
+  GstFlowReturn choose_caps(GstCaps* downstream, GstCaps** result) {
+    SensorSize needed;
+    for (const auto& pad : numbered_pads(element())) {
+      auto& stream = stream_of(pad);
+      if (stream.sensor == SensorSize{}) continue;
+      stream.placed = stream.position.copy();
+      needed.width =
+          std::max(needed.width, static_cast<int>(stream.placed.x) + stream.sensor.width);
+      needed.height =
+          std::max(needed.height, static_cast<int>(stream.placed.y) + stream.sensor.height);
+    }
+    if (needed == SensorSize{}) return GST_AGGREGATOR_FLOW_NEED_DATA;
+    const auto text = in_pixels(needed);
+    if (std::max(needed.width, needed.height) > max_side) {
+      GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
+                        ("Cannot merge: the output would have %s, more than %d a side. Lower "
+                         "xpos and ypos of the pads.",
+                         text.c_str(), max_side),
+                        ("xpos + width or ypos + height of a pad is too large"));
+      return GST_FLOW_NOT_NEGOTIATED;
+    }
+    GST_DEBUG_OBJECT(element(), "the sensors need %s", text.c_str());
+    const auto at_least = [](int size) {
+      GValue range = G_VALUE_INIT;
+      g_value_init(&range, GST_TYPE_INT_RANGE);
+      gst_value_set_int_range(&range, size, max_side);
+      return range;
+    };
+    const OwnedCaps ours(event_caps(needed.width, needed.height));
+    GstStructure* const structure = gst_caps_get_structure(ours.get(), 0);
+    if (needed.width < max_side) {
+      GValue width = at_least(needed.width);
+      gst_structure_take_value(structure, "width", &width);
+    }
+    if (needed.height < max_side) {
+      GValue height = at_least(needed.height);
+      gst_structure_take_value(structure, "height", &height);
+    }
+    *result = gst_caps_intersect_full(downstream, ours.get(), GST_CAPS_INTERSECT_FIRST);
+    if (!gst_caps_is_empty(*result)) return GST_FLOW_OK;
+    GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
+                      ("Cannot merge: the sensors need %s, and downstream does not take that "
+                       "size. Do not set a smaller one downstream.",
+                       text.c_str()),
+                      ("downstream takes %" GST_PTR_FORMAT, downstream));
+    return GST_FLOW_NOT_NEGOTIATED;
+  }
+
+  GstStructure* stats() const {
+    const Counts counts = counts_.copy();
+    return gst_structure_new("application/x-event-merge-stats", "events", G_TYPE_UINT64,
+                             counts.events, "late-events", G_TYPE_UINT64, counts.late,
+                             "rejected-events", G_TYPE_UINT64, counts.rejected, nullptr);
+  }
 
   Guarded<Settings> settings;
   MergedTimeline timeline;
@@ -126,14 +276,140 @@ class EventMerge final : public EventAggregator {
   Guarded<std::map<std::string, SensorPosition>> unlinked_positions;
 
  private:
-  bool wait_for_streams(std::size_t linked);
-  bool load(const OwnedAggregatorPad& pad);
-  bool load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer, Microseconds length);
-  void raise_latency(GstClockTime needed);
-  void count(const MergedInterval& interval);
-  void choose_segment(std::span<const OwnedAggregatorPad> pads);
-  GstFlowReturn push_interval(const MergedInterval& interval, EventMerger::Inputs inputs);
-  GstFlowReturn push_empty_interval(GstClockTime start, GstClockTime duration);
+  /// Pauses while streams are missing: gst_aggregator_aggregate_func() waits for data of the
+  /// existing pads only, and calls aggregate() again without a pause if all have some. Returns
+  /// false if more pauses are needed, true once the latency of live streams has passed.
+  bool wait_for_streams(std::size_t linked) {
+    constexpr gint64 pause = 10'000;
+    constexpr gint64 patience = G_USEC_PER_SEC;  // decodebin adds its pads late
+    const GstClockTime latency = gst_aggregator_get_latency(element());
+    const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(element()));
+    const GstClockTime next = next_time();
+    const GstClockTime start = GST_CLOCK_TIME_IS_VALID(next) ? next : 0;
+    if (GST_CLOCK_TIME_IS_VALID(latency) && GST_CLOCK_TIME_IS_VALID(now) && now >= start + latency)
+      return true;
+    if (waiting_since_ == 0) waiting_since_ = g_get_monotonic_time();
+    if (g_get_monotonic_time() - waiting_since_ > patience)
+      warn_of_missing_(element(),
+                       {GST_CORE_ERROR_PAD,
+                        "Waiting for another stream to merge: link one, or set "
+                        "min-streams to the number of streams."},
+                       std::to_string(linked) + " pads are linked");
+    g_usleep(pause);
+    return false;
+  }
+
+  /// Loads the next queued interval of a pad if it is not loaded yet. Returns false if there is
+  /// none. May throw.
+  bool load(const OwnedAggregatorPad& pad) {
+    auto& stream = stream_of(pad);
+    while (const auto buffer = next_buffer(pad.get())) {
+      if (stream.loaded != buffer) stream.discontinuous |= GST_BUFFER_IS_DISCONT(buffer.get());
+      if (const auto interval = interval_of(buffer.get())) {
+        const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
+        const auto end = static_cast<Microseconds>(interval->end / GST_USECOND);
+        if (stream.loaded == buffer || load_events(pad, buffer.get(), end - start)) {
+          stream.input.place(start, static_cast<int>(stream.placed.x),
+                             static_cast<int>(stream.placed.y));
+          return true;
+        }
+      } else {
+        warn(interval_fault(buffer.get()), buffer.get());
+      }
+      gst_aggregator_pad_drop_buffer(pad.get());
+    }
+    stream.unload();
+    return false;
+  }
+
+  /// Loads the events of a queued buffer. Returns false if it cannot be mapped as events. May
+  /// throw.
+  bool load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer, Microseconds length) {
+    auto& stream = stream_of(pad);
+    const MappedEvents mapped(buffer);
+    if (!mapped) {
+      warn(EventFault::partial_event, buffer);
+      return false;
+    }
+    GST_LOG_OBJECT(pad.get(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+                   mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
+    const auto invalid =
+        stream.input.load(mapped.events(), labels_of(buffer), stream.sensor, length);
+    stream.loaded.reset(gst_buffer_ref(buffer));
+    warn(invalid, buffer);
+    counts_.lock()->rejected += invalid.outside + invalid.unsorted;
+    if (!mapped.events().empty()) raise_latency(static_cast<GstClockTime>(length) * GST_USECOND);
+    return true;
+  }
+
+  /// A live buffer arrives one interval after its PTS; adds that to the latency.
+  void raise_latency(GstClockTime needed) {
+    needed = std::min(needed, max_latency);
+    if (needed <= latency_) return;
+    latency_ = needed;
+    GST_DEBUG_OBJECT(element(), "latency %" GST_TIME_FORMAT ", the longest interval",
+                     GST_TIME_ARGS(latency_));
+    gst_aggregator_set_latency(element(), latency_, latency_);
+  }
+
+  void count(const MergedInterval& interval) {
+    {
+      const auto counts = counts_.lock();
+      counts->events += interval.events;
+      counts->late += interval.late;
+    }
+    if (interval.late > 0)
+      warn_of_late_(element(),
+                    {GST_STREAM_ERROR_FAILED,
+                     "Dropped events that arrived too late. Increase the property latency."},
+                    std::to_string(interval.late) + " events are earlier than " +
+                        std::to_string(interval.start) + " us, up to which events were sent");
+  }
+
+  /// Sets the segment of the output, once.
+  void choose_segment(std::span<const OwnedAggregatorPad> pads) {
+    if (pads.empty() || std::exchange(segment_chosen_, true)) return;
+    const auto& first = *std::ranges::min_element(
+        pads, {}, [](const OwnedAggregatorPad& pad) { return segment_of(pad.get()).start; });
+    for (const auto& pad : pads) {
+      stream_of(pad).has_output_segment = pad == first;
+      stream_of(pad).segment_is_new = stream_of(pad).goes_back = false;
+    }
+    set_segment(timeline.segment(first, pads));
+  }
+
+  /// Pushes the events of an interval. May throw.
+  GstFlowReturn push_interval(const MergedInterval& interval, EventMerger::Inputs inputs) {
+    if (!gst_pad_has_current_caps(GST_AGGREGATOR_SRC_PAD(element()))) return GST_FLOW_OK;
+    const auto start = static_cast<GstClockTime>(interval.start) * GST_USECOND;
+    const auto duration = static_cast<GstClockTime>(interval.end - interval.start) * GST_USECOND;
+    if (interval.events == 0) return push_empty_interval(start, duration);
+    const gsize size = interval.events * sizeof(eventcamera::Event);
+    OwnedBuffer buffer;
+    const GstFlowReturn result = buffers_.acquire(size, buffer);
+    if (result != GST_FLOW_OK) return result;
+    {
+      const WritableBytes mapped(buffer.get());
+      LabelledEvents events{.events = mapped.events(), .labels = {}};
+      if (interval.labelled) events.labels = add_labels(buffer.get(), interval.events);
+      EventMerger::merge(inputs, interval, events);
+    }
+    GST_BUFFER_PTS(buffer.get()) = start;
+    GST_BUFFER_DURATION(buffer.get()) = duration;
+    if (std::exchange(discontinuous_, false))
+      GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
+    GST_LOG_OBJECT(element(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, interval.events,
+                   GST_TIME_ARGS(start));
+    return push(std::move(buffer));
+  }
+
+  GstFlowReturn push_empty_interval(GstClockTime start, GstClockTime duration) {
+    if (duration == 0) return GST_FLOW_OK;
+    GST_LOG_OBJECT(element(), "no events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
+                   GST_TIME_ARGS(start), GST_TIME_ARGS(duration));
+    if (!is_segment_sent()) discontinuous_ = false;
+    return push_gap(start, duration);
+  }
 
   Guarded<Counts> counts_;
   EventMerger merger_;
@@ -145,303 +421,6 @@ class EventMerge final : public EventAggregator {
   WarnOnce warn_of_late_{GST_CAT_DEFAULT};
   WarnOnce warn_of_missing_{GST_CAT_DEFAULT};
 };
-
-/* input */
-
-/// Pauses while streams are missing: gst_aggregator_aggregate_func() waits for data of the existing
-/// pads only, and calls aggregate() again without a pause if all have some. Returns false if more
-/// pauses are needed, true once the latency of live streams has passed.
-bool EventMerge::wait_for_streams(std::size_t linked) {
-  constexpr gint64 pause = 10'000;
-  constexpr gint64 patience = G_USEC_PER_SEC;  // decodebin adds its pads late
-  const GstClockTime latency = gst_aggregator_get_latency(element());
-  const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(element()));
-  const GstClockTime next = next_time();
-  const GstClockTime start = GST_CLOCK_TIME_IS_VALID(next) ? next : 0;
-  if (GST_CLOCK_TIME_IS_VALID(latency) && GST_CLOCK_TIME_IS_VALID(now) && now >= start + latency)
-    return true;
-  if (waiting_since_ == 0) waiting_since_ = g_get_monotonic_time();
-  if (g_get_monotonic_time() - waiting_since_ > patience)
-    warn_of_missing_(element(),
-                     {GST_CORE_ERROR_PAD,
-                      "Waiting for another stream to merge: link one, or set "
-                      "min-streams to the number of streams."},
-                     std::to_string(linked) + " pads are linked");
-  g_usleep(pause);
-  return false;
-}
-
-/// A live buffer arrives one interval after its PTS; adds that to the latency.
-void EventMerge::raise_latency(GstClockTime needed) {
-  needed = std::min(needed, max_latency);
-  if (needed <= latency_) return;
-  latency_ = needed;
-  GST_DEBUG_OBJECT(element(), "latency %" GST_TIME_FORMAT ", the longest interval",
-                   GST_TIME_ARGS(latency_));
-  gst_aggregator_set_latency(element(), latency_, latency_);
-}
-
-/// Loads the events of a queued buffer. Returns false if it cannot be mapped as events. May throw.
-bool EventMerge::load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer,
-                             Microseconds length) {
-  auto& stream = stream_of(pad);
-  const MappedEvents mapped(buffer);
-  if (!mapped) {
-    warn(EventFault::partial_event, buffer);
-    return false;
-  }
-  GST_LOG_OBJECT(pad.get(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
-                 mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
-  const auto invalid = stream.input.load(mapped.events(), labels_of(buffer), stream.sensor, length);
-  stream.loaded.reset(gst_buffer_ref(buffer));
-  warn(invalid, buffer);
-  counts_.lock()->rejected += invalid.outside + invalid.unsorted;
-  if (!mapped.events().empty()) raise_latency(static_cast<GstClockTime>(length) * GST_USECOND);
-  return true;
-}
-
-/// Loads the next queued interval of a pad if it is not loaded yet. Returns false if there is none.
-/// May throw.
-bool EventMerge::load(const OwnedAggregatorPad& pad) {
-  auto& stream = stream_of(pad);
-  while (const auto buffer = next_buffer(pad.get())) {
-    if (stream.loaded != buffer) stream.discontinuous |= GST_BUFFER_IS_DISCONT(buffer.get());
-    if (const auto interval = interval_of(buffer.get())) {
-      const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
-      const auto end = static_cast<Microseconds>(interval->end / GST_USECOND);
-      if (stream.loaded == buffer || load_events(pad, buffer.get(), end - start)) {
-        stream.input.place(start, static_cast<int>(stream.placed.x),
-                           static_cast<int>(stream.placed.y));
-        return true;
-      }
-    } else {
-      warn(interval_fault(buffer.get()), buffer.get());
-    }
-    gst_aggregator_pad_drop_buffer(pad.get());
-  }
-  stream.unload();
-  return false;
-}
-
-/* output */
-
-/// Sets the segment of the output, once.
-void EventMerge::choose_segment(std::span<const OwnedAggregatorPad> pads) {
-  if (pads.empty() || std::exchange(segment_chosen_, true)) return;
-  const auto& first = *std::ranges::min_element(
-      pads, {}, [](const OwnedAggregatorPad& pad) { return segment_of(pad.get()).start; });
-  for (const auto& pad : pads) {
-    stream_of(pad).has_output_segment = pad == first;
-    stream_of(pad).segment_is_new = stream_of(pad).goes_back = false;
-  }
-  set_segment(timeline.segment(first, pads));
-}
-
-void EventMerge::count(const MergedInterval& interval) {
-  {
-    const auto counts = counts_.lock();
-    counts->events += interval.events;
-    counts->late += interval.late;
-  }
-  if (interval.late > 0)
-    warn_of_late_(element(),
-                  {GST_STREAM_ERROR_FAILED,
-                   "Dropped events that arrived too late. Increase the property latency."},
-                  std::to_string(interval.late) + " events are earlier than " +
-                      std::to_string(interval.start) + " us, up to which events were sent");
-}
-
-GstFlowReturn EventMerge::push_empty_interval(GstClockTime start, GstClockTime duration) {
-  if (duration == 0) return GST_FLOW_OK;
-  GST_LOG_OBJECT(element(), "no events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
-                 GST_TIME_ARGS(start), GST_TIME_ARGS(duration));
-  if (!is_segment_sent()) discontinuous_ = false;
-  return push_gap(start, duration);
-}
-
-/// Pushes the events of an interval. May throw.
-GstFlowReturn EventMerge::push_interval(const MergedInterval& interval,
-                                        EventMerger::Inputs inputs) {
-  if (!gst_pad_has_current_caps(GST_AGGREGATOR_SRC_PAD(element()))) return GST_FLOW_OK;
-  const auto start = static_cast<GstClockTime>(interval.start) * GST_USECOND;
-  const auto duration = static_cast<GstClockTime>(interval.end - interval.start) * GST_USECOND;
-  if (interval.events == 0) return push_empty_interval(start, duration);
-  const gsize size = interval.events * sizeof(eventcamera::Event);
-  OwnedBuffer buffer;
-  const GstFlowReturn result = buffers_.acquire(size, buffer);
-  if (result != GST_FLOW_OK) return result;
-  {
-    const WritableBytes mapped(buffer.get());
-    LabelledEvents events{.events = mapped.events(), .labels = {}};
-    if (interval.labelled) events.labels = add_labels(buffer.get(), interval.events);
-    EventMerger::merge(inputs, interval, events);
-  }
-  GST_BUFFER_PTS(buffer.get()) = start;
-  GST_BUFFER_DURATION(buffer.get()) = duration;
-  if (std::exchange(discontinuous_, false))
-    GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
-  GST_LOG_OBJECT(element(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, interval.events,
-                 GST_TIME_ARGS(start));
-  return push(std::move(buffer));
-}
-
-GstFlowReturn EventMerge::aggregate(bool timed_out) {
-  auto pads = numbered_pads(element());
-  std::vector<MergeInput*> inputs;
-  std::vector<MergeInput*> returned;
-  bool waiting = false;
-  for (const auto& pad : pads) {
-    auto& stream = stream_of(pad);
-    if (stream.sensor != SensorSize{} && stream.placed != stream.position.copy()) {
-      gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
-      return GST_FLOW_OK;
-    }
-    const bool is_loaded = load(pad);
-    stream.goes_back = is_loaded && stream.segment_is_new && merger_.goes_back(stream.input);
-    if (is_loaded)
-      (stream.goes_back ? returned : inputs).push_back(&stream.input);
-    else if (!has_ended(pad.get()))
-      waiting = true;
-  }
-  if (inputs.empty() && !waiting && !returned.empty()) {
-    GST_DEBUG_OBJECT(element(), "all streams go back");
-    std::erase_if(pads, [](const auto& pad) { return !stream_of(pad).input.is_loaded(); });
-    inputs.swap(returned);
-    merger_.restart();
-    segment_chosen_ = false;
-    discontinuous_ = true;
-    choose_segment(pads);
-  }
-  const bool all_have_ended = inputs.empty() && !waiting;
-  if (!segment_chosen_ && pads.size() < settings.copy().min_streams) {
-    if (!inputs.empty() || all_have_ended) timed_out = timed_out || wait_for_streams(pads.size());
-    waiting = true;
-  }
-  if (all_have_ended && (!waiting || timed_out)) {
-    choose_segment(pads);
-    return GST_FLOW_EOS;
-  }
-  if (inputs.empty() || (waiting && !timed_out)) return GST_AGGREGATOR_FLOW_NEED_DATA;
-  choose_segment(pads);
-  const auto interval = merger_.next(inputs);
-  count(interval);
-  for (const auto& pad : pads) {
-    auto& stream = stream_of(pad);
-    if (!stream.input.is_loaded() || stream.input.start() >= interval.end || stream.goes_back)
-      continue;
-    discontinuous_ |= std::exchange(stream.discontinuous, false);
-    if (std::exchange(stream.segment_is_new, false) && stream.has_output_segment)
-      set_segment(MergedTimeline::longest_segment(pad, pads));
-  }
-  const GstFlowReturn result = push_interval(interval, inputs);
-  for (const auto& pad : pads) {
-    auto& stream = stream_of(pad);
-    if (!stream.input.is_loaded() || !stream.input.is_merged(interval.end) || stream.goes_back)
-      continue;
-    stream.unload();
-    gst_aggregator_pad_drop_buffer(pad.get());
-  }
-  return result;
-}
-
-/// The start of the first queued interval, from which the latency counts.
-GstClockTime EventMerge::next_time() {
-  GstClockTime next = GST_CLOCK_TIME_NONE;
-  for (const auto& pad : numbered_pads(element())) {
-    const auto buffer = next_buffer(pad.get());
-    const auto interval = buffer ? interval_of(buffer.get()) : std::nullopt;
-    if (!buffer || stream_of(pad).goes_back) continue;
-    const auto start = interval ? running_time(pad.get(), interval->start) : std::nullopt;
-    next = std::min(next, start.value_or(0));
-  }
-  return next;
-}
-
-/* negotiation, states */
-
-bool EventMerge::handle_caps(GstAggregatorPad* pad, GstCaps* caps) {
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-  GST_EVENT_MERGE_PAD(pad)->priv->sensor = {info.width, info.height};
-  gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
-  return true;
-}
-
-/// Places the sensors, and chooses an output size that contains them.
-GstFlowReturn EventMerge::choose_caps(GstCaps* downstream, GstCaps** result) {
-  SensorSize needed;
-  for (const auto& pad : numbered_pads(element())) {
-    auto& stream = stream_of(pad);
-    if (stream.sensor == SensorSize{}) continue;
-    stream.placed = stream.position.copy();
-    needed.width = std::max(needed.width, static_cast<int>(stream.placed.x) + stream.sensor.width);
-    needed.height =
-        std::max(needed.height, static_cast<int>(stream.placed.y) + stream.sensor.height);
-  }
-  if (needed == SensorSize{}) return GST_AGGREGATOR_FLOW_NEED_DATA;
-  const auto text = in_pixels(needed);
-  if (std::max(needed.width, needed.height) > max_side) {
-    GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
-                      ("Cannot merge: the output would have %s, more than %d a side. Lower "
-                       "xpos and ypos of the pads.",
-                       text.c_str(), max_side),
-                      ("xpos + width or ypos + height of a pad is too large"));
-    return GST_FLOW_NOT_NEGOTIATED;
-  }
-  GST_DEBUG_OBJECT(element(), "the sensors need %s", text.c_str());
-  const auto at_least = [](int size) {
-    GValue range = G_VALUE_INIT;
-    g_value_init(&range, GST_TYPE_INT_RANGE);
-    gst_value_set_int_range(&range, size, max_side);
-    return range;
-  };
-  const OwnedCaps ours(event_caps(needed.width, needed.height));
-  GstStructure* const structure = gst_caps_get_structure(ours.get(), 0);
-  if (needed.width < max_side) {
-    GValue width = at_least(needed.width);
-    gst_structure_take_value(structure, "width", &width);
-  }
-  if (needed.height < max_side) {
-    GValue height = at_least(needed.height);
-    gst_structure_take_value(structure, "height", &height);
-  }
-  *result = gst_caps_intersect_full(downstream, ours.get(), GST_CAPS_INTERSECT_FIRST);
-  if (!gst_caps_is_empty(*result)) return GST_FLOW_OK;
-  GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
-                    ("Cannot merge: the sensors need %s, and downstream does not take that "
-                     "size. Do not set a smaller one downstream.",
-                     text.c_str()),
-                    ("downstream takes %" GST_PTR_FORMAT, downstream));
-  return GST_FLOW_NOT_NEGOTIATED;
-}
-
-void EventMerge::flush() noexcept {
-  for_each_sink_pad(element(),
-                    [](GstAggregatorPad* pad) { GST_EVENT_MERGE_PAD(pad)->priv->flush(); });
-  merger_.restart();
-  segment_chosen_ = false;
-  discontinuous_ = true;
-  waiting_since_ = 0;
-}
-
-void EventMerge::stop() {
-  flush();
-  for (const auto& pad : numbered_pads(element())) stream_of(pad).stop();
-  timeline.reset();
-  buffers_.reset();
-  latency_ = 0;
-  gst_aggregator_set_latency(element(), latency_, latency_);
-  warn_of_late_.reset();
-  warn_of_missing_.reset();
-  *counts_.lock() = {};
-}
-
-GstStructure* EventMerge::stats() const {
-  const Counts counts = counts_.copy();
-  return gst_structure_new("application/x-event-merge-stats", "events", G_TYPE_UINT64,
-                           counts.events, "late-events", G_TYPE_UINT64, counts.late,
-                           "rejected-events", G_TYPE_UINT64, counts.rejected, nullptr);
-}
 
 }  // namespace
 

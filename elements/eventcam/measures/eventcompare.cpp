@@ -57,7 +57,6 @@
  */
 #include <optional>
 
-#include "elements/eventcam/measures/clipped_events.hpp"
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/authors.hpp"
@@ -85,41 +84,6 @@ namespace {
 const char* name_of(StreamRole role) {
   return role == StreamRole::reference ? "reference" : "candidate";
 }
-
-class EventCompare final : public EventAggregator {
- public:
-  explicit EventCompare(GstAggregator* element)
-      : EventAggregator(element, {.verb = "compare", .main_pad = "candidate"}) {}
-
-  bool start() override { return can_report(element(), settings.copy()); }
-  void stop() override;
-  void flush() noexcept override { comparison_.reset(); }
-  void release_memory() noexcept override { flush(); }
-  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
-  GstFlowReturn aggregate(bool timed_out) override;
-
-  Guarded<ReportFiles> settings;
-
- private:
-  bool goes_back(StreamRole role) const;
-  bool is_over(StreamRole role) const;
-  bool waits_for_reference() const;
-  bool begin();
-  bool has_one_size() const;
-  void compare(StreamRole role, GstBuffer* buffer);
-  GstFlowReturn aggregate_next();
-  void conclude();
-
-  const PerRole<GstAggregatorPad*> pads_{pad("reference"), pad("candidate")};
-
-  PerRole<std::optional<SensorSize>> sensors_;
-  std::optional<StreamComparison> comparison_;  // set once both sensors are known
-  bool concluded_ = true;                       // no events since the last report
-  bool reported_ = false;                       // and there was one
-  WarnOnce warn_of_missing_{GST_CAT_DEFAULT};
-};
-
-/* figures */
 
 /// Moves a structure into a field of another one.
 void put_structure(GstStructure* structure, const char* field, GstStructure* value) {
@@ -197,164 +161,181 @@ GstStructure* structure_of(const StreamComparison& comparison) {
   return structure;
 }
 
-/// Posts and writes the statistics, as of empty streams if there is no comparison yet.
-void EventCompare::conclude() {
-  concluded_ = reported_ = true;
-  const StreamComparison nothing(1, 1);
-  const auto& comparison = comparison_ ? *comparison_ : nothing;
-  GST_DEBUG_OBJECT(element(), "concluding%s",
-                   comparison_ ? "" : ": the caps of one of the streams never came");
-  report(element(), settings.copy(), structure_of(comparison), [&] {
-    return eventcamera::draw_maps(comparison.map(StreamRole::reference),
-                                  comparison.map(StreamRole::candidate));
-  });
-}
+class EventCompare final : public EventAggregator {
+ public:
+  explicit EventCompare(GstAggregator* element)
+      : EventAggregator(element, {.verb = "compare", .main_pad = "candidate"}) {}
 
-/* events */
+  bool start() override { return can_report(element(), settings.copy()); }
 
-/// Adds a buffer to the comparison. May throw.
-void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
-  const auto interval = interval_of(buffer);
-  const MappedEvents mapped(buffer);
-  if (!interval || !mapped) {
-    warn(interval ? EventFault::partial_event : interval_fault(buffer), buffer);
-    return;
-  }
-  GST_LOG_OBJECT(pads_[role], "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
-                 mapped.events().size(), GST_TIME_ARGS(interval->start));
-  const GstSegment segment = segment_of(pads_[role]);
-  const auto clipped = clip(*interval, segment);
-  if (!clipped) return;
-  const auto [events, labels] = ClippedEvents(mapped, buffer, *interval, *clipped);
-  if (!events.empty()) concluded_ = reported_ = false;
-  const auto skipped = comparison_->add(role, events, stream_time(segment, interval->start) / 1000,
-                                        stream_time(segment, clipped->start),
-                                        stream_time(segment, clipped->end), labels);
-  warn(skipped, buffer);
-}
-
-/// True if the next buffer of a stream is earlier than its compared part.
-bool EventCompare::goes_back(StreamRole role) const {
-  const auto end = comparison_ ? comparison_->end_of(role) : std::nullopt;
-  const auto buffer = next_buffer(pads_[role]);
-  const auto interval = end && buffer ? interval_of(buffer.get()) : std::nullopt;
-  if (!interval) return false;
-  const GstSegment segment = segment_of(pads_[role]);
-  const auto clipped = clip(*interval, segment);
-  return clipped && stream_time(segment, clipped->start) < *end - Nanoseconds{event_resolution};
-}
-
-/// True if a stream has no more events in the comparison.
-bool EventCompare::is_over(StreamRole role) const {
-  return has_ended(pads_[role]) || goes_back(role);
-}
-
-/// True if the reference does not cover the candidate's buffers so far yet.
-bool EventCompare::waits_for_reference() const {
-  return comparison_ && comparison_->behind() == StreamRole::reference &&
-         !is_over(StreamRole::reference);
-}
-
-/// Starts the comparison once both sensors, of one size, are known. Returns true if it is running.
-/// May throw.
-bool EventCompare::begin() {
-  const auto& reference = sensors_[StreamRole::reference];
-  const auto& candidate = sensors_[StreamRole::candidate];
-  if (!reference || !candidate) return false;
-  if (!comparison_) {
-    GST_DEBUG_OBJECT(element(), "comparing sensors of %dx%d pixels", reference->width,
-                     reference->height);
-    comparison_.emplace(reference->width, reference->height);
-    concluded_ = true;
-  }
-  return true;
-}
-
-/// Processes the next buffer of either stream. May throw.
-GstFlowReturn EventCompare::aggregate_next() {
-  const bool comparing = begin();
-  const auto behind = comparing ? comparison_->behind() : StreamRole::candidate;
-  if (behind == StreamRole::reference && !is_over(StreamRole::reference)) {
-    const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pads_[StreamRole::reference]));
-    if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
-    compare(StreamRole::reference, buffer.get());
-    return GST_FLOW_OK;
-  }
-  if (goes_back(StreamRole::candidate)) {
-    if (!is_over(StreamRole::reference))
-      return gst_aggregator_pad_drop_buffer(pads_[StreamRole::reference])
-                 ? GST_FLOW_OK
-                 : GST_AGGREGATOR_FLOW_NEED_DATA;
-    GST_DEBUG_OBJECT(element(), "stream time goes back: starting over");
-    if (!concluded_) conclude();
+  void stop() override {
+    if (comparison_ && !concluded_) conclude();
     flush();
-    return GST_FLOW_OK;
+    reported_ = false;
+    sensors_ = {};
+    warn_of_missing_.reset();
   }
-  {
-    const auto buffer = next_buffer(main_pad());
-    if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
-    if (comparing && behind == StreamRole::candidate) compare(StreamRole::candidate, buffer.get());
+
+  void flush() noexcept override { comparison_.reset(); }
+  void release_memory() noexcept override { flush(); }
+
+  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
+    GstEventCameraInfo info;
+    if (!gst_event_camera_info_from_caps(&info, caps)) return false;
+    auto& sensor = sensors_[pad == main_pad() ? StreamRole::candidate : StreamRole::reference];
+    const SensorSize next{info.width, info.height};
+    if (sensor == next) return true;
+    for (GstAggregatorPad* other : {pads_[StreamRole::reference], pads_[StreamRole::candidate]})
+      if (!gst_pad_is_linked(GST_PAD(other)))
+        warn_of_missing_(element(),
+                         {GST_CORE_ERROR_PAD,
+                          std::string("Nothing to compare with: link a stream to the pad \"") +
+                              GST_OBJECT_NAME(other) + "\"."},
+                         "the pad is not linked");
+    const bool has_begun = comparison_.has_value();
+    if (has_begun && !concluded_) conclude();
+    flush();
+    sensor = next;
+    // At once, because aggregate() waits for both streams, and a source whose size changes may wait
+    // for one of them. Before the comparison, caps may change until there are events.
+    return !has_begun || has_one_size();
   }
-  OwnedBuffer passed(gst_aggregator_pad_pop_buffer(main_pad()));
-  return is_gap(passed.get())
-             ? push_gap(GST_BUFFER_PTS(passed.get()), GST_BUFFER_DURATION(passed.get()))
-             : push(std::move(passed));
-}
 
-GstFlowReturn EventCompare::aggregate(bool) {
-  if (has_ended(main_pad()) && !waits_for_reference()) {
-    if (!reported_) conclude();
-    return GST_FLOW_EOS;
+  GstFlowReturn aggregate(bool) override {
+    if (has_ended(main_pad()) && !waits_for_reference()) {
+      if (!reported_) conclude();
+      return GST_FLOW_EOS;
+    }
+    return has_one_size() ? aggregate_next() : GST_FLOW_NOT_NEGOTIATED;
   }
-  return has_one_size() ? aggregate_next() : GST_FLOW_NOT_NEGOTIATED;
-}
 
-/* negotiation, states */
+  Guarded<ReportFiles> settings;
 
-/// False, after an error message, if both sensors are known and differ.
-bool EventCompare::has_one_size() const {
-  const auto& reference = sensors_[StreamRole::reference];
-  const auto& candidate = sensors_[StreamRole::candidate];
-  if (reference && candidate && *reference != *candidate) {
-    GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
-                      ("Cannot compare sensors of different sizes: the reference has %s, the "
-                       "candidate %s; scale one of them.",
-                       in_pixels(*reference).c_str(), in_pixels(*candidate).c_str()),
-                      ("width or height differ in the caps of the two sink pads"));
-    return false;
+ private:
+  /// True if the next buffer of a stream is earlier than its compared part.
+  bool goes_back(StreamRole role) const {
+    const auto end = comparison_ ? comparison_->end_of(role) : std::nullopt;
+    const auto buffer = next_buffer(pads_[role]);
+    const auto interval = end && buffer ? interval_of(buffer.get()) : std::nullopt;
+    if (!interval) return false;
+    const GstSegment segment = segment_of(pads_[role]);
+    const auto clipped = clip(*interval, segment);
+    return clipped && stream_time(segment, clipped->start) < *end - Nanoseconds{event_resolution};
   }
-  return true;
-}
 
-bool EventCompare::handle_caps(GstAggregatorPad* pad, GstCaps* caps) {
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-  auto& sensor = sensors_[pad == main_pad() ? StreamRole::candidate : StreamRole::reference];
-  const SensorSize next{info.width, info.height};
-  if (sensor == next) return true;
-  for (GstAggregatorPad* other : {pads_[StreamRole::reference], pads_[StreamRole::candidate]})
-    if (!gst_pad_is_linked(GST_PAD(other)))
-      warn_of_missing_(
-          element(),
-          {GST_CORE_ERROR_PAD, std::string("Nothing to compare with: link a stream to the pad \"") +
-                                   GST_OBJECT_NAME(other) + "\"."},
-          "the pad is not linked");
-  const bool has_begun = comparison_.has_value();
-  if (has_begun && !concluded_) conclude();
-  flush();
-  sensor = next;
-  // At once, because aggregate() waits for both streams, and a source whose size changes may wait
-  // for one of them. Before the comparison, caps may change until there are events.
-  return !has_begun || has_one_size();
-}
+  /// True if a stream has no more events in the comparison.
+  bool is_over(StreamRole role) const { return has_ended(pads_[role]) || goes_back(role); }
 
-void EventCompare::stop() {
-  if (comparison_ && !concluded_) conclude();
-  flush();
-  reported_ = false;
-  sensors_ = {};
-  warn_of_missing_.reset();
-}
+  /// True if the reference does not cover the candidate's buffers so far yet.
+  bool waits_for_reference() const {
+    return comparison_ && comparison_->behind() == StreamRole::reference &&
+           !is_over(StreamRole::reference);
+  }
+
+  /// Starts the comparison once both sensors, of one size, are known. Returns true if it is
+  /// running. May throw.
+  bool begin() {
+    const auto& reference = sensors_[StreamRole::reference];
+    const auto& candidate = sensors_[StreamRole::candidate];
+    if (!reference || !candidate) return false;
+    if (!comparison_) {
+      GST_DEBUG_OBJECT(element(), "comparing sensors of %dx%d pixels", reference->width,
+                       reference->height);
+      comparison_.emplace(reference->width, reference->height);
+      concluded_ = true;
+    }
+    return true;
+  }
+
+  /// False, after an error message, if both sensors are known and differ.
+  bool has_one_size() const {
+    const auto& reference = sensors_[StreamRole::reference];
+    const auto& candidate = sensors_[StreamRole::candidate];
+    if (reference && candidate && *reference != *candidate) {
+      GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
+                        ("Cannot compare sensors of different sizes: the reference has %s, the "
+                         "candidate %s; scale one of them.",
+                         in_pixels(*reference).c_str(), in_pixels(*candidate).c_str()),
+                        ("width or height differ in the caps of the two sink pads"));
+      return false;
+    }
+    return true;
+  }
+
+  /// Adds a buffer to the comparison. May throw.
+  void compare(StreamRole role, GstBuffer* buffer) {
+    const auto interval = interval_of(buffer);
+    const MappedEvents mapped(buffer);
+    if (!interval || !mapped) {
+      warn(interval ? EventFault::partial_event : interval_fault(buffer), buffer);
+      return;
+    }
+    GST_LOG_OBJECT(pads_[role], "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+                   mapped.events().size(), GST_TIME_ARGS(interval->start));
+    const GstSegment segment = segment_of(pads_[role]);
+    const auto clipped = clip(*interval, segment);
+    if (!clipped) return;
+    const auto [events, labels] = ClippedEvents(mapped, buffer, *interval, *clipped);
+    if (!events.empty()) concluded_ = reported_ = false;
+    const auto skipped = comparison_->add(
+        role, events, stream_time(segment, interval->start) / 1000,
+        stream_time(segment, clipped->start), stream_time(segment, clipped->end), labels);
+    warn(skipped, buffer);
+  }
+
+  /// Processes the next buffer of either stream. May throw.
+  GstFlowReturn aggregate_next() {
+    const bool comparing = begin();
+    const auto behind = comparing ? comparison_->behind() : StreamRole::candidate;
+    if (behind == StreamRole::reference && !is_over(StreamRole::reference)) {
+      const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pads_[StreamRole::reference]));
+      if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
+      compare(StreamRole::reference, buffer.get());
+      return GST_FLOW_OK;
+    }
+    if (goes_back(StreamRole::candidate)) {
+      if (!is_over(StreamRole::reference))
+        return gst_aggregator_pad_drop_buffer(pads_[StreamRole::reference])
+                   ? GST_FLOW_OK
+                   : GST_AGGREGATOR_FLOW_NEED_DATA;
+      GST_DEBUG_OBJECT(element(), "stream time goes back: starting over");
+      if (!concluded_) conclude();
+      flush();
+      return GST_FLOW_OK;
+    }
+    {
+      const auto buffer = next_buffer(main_pad());
+      if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
+      if (comparing && behind == StreamRole::candidate)
+        compare(StreamRole::candidate, buffer.get());
+    }
+    OwnedBuffer passed(gst_aggregator_pad_pop_buffer(main_pad()));
+    return is_gap(passed.get())
+               ? push_gap(GST_BUFFER_PTS(passed.get()), GST_BUFFER_DURATION(passed.get()))
+               : push(std::move(passed));
+  }
+
+  /// Posts and writes the statistics, as of empty streams if there is no comparison yet.
+  void conclude() {
+    concluded_ = reported_ = true;
+    const StreamComparison nothing(1, 1);
+    const auto& comparison = comparison_ ? *comparison_ : nothing;
+    GST_DEBUG_OBJECT(element(), "concluding%s",
+                     comparison_ ? "" : ": the caps of one of the streams never came");
+    report(element(), settings.copy(), structure_of(comparison), [&] {
+      return eventcamera::draw_maps(comparison.map(StreamRole::reference),
+                                    comparison.map(StreamRole::candidate));
+    });
+  }
+
+  const PerRole<GstAggregatorPad*> pads_{pad("reference"), pad("candidate")};
+
+  PerRole<std::optional<SensorSize>> sensors_;
+  std::optional<StreamComparison> comparison_;  // set once both sensors are known
+  bool concluded_ = true;                       // no events since the last report
+  bool reported_ = false;                       // and there was one
+  WarnOnce warn_of_missing_{GST_CAT_DEFAULT};
+};
 
 }  // namespace
 
@@ -362,7 +343,7 @@ DEFINE_EVENT_AGGREGATOR(GstEventCompare, gst_event_compare, EVENT_COMPARE, Event
                         eventcompare, GST_RANK_NONE, "similarity of event streams")
 
 static void gst_event_compare_class_init(GstEventCompareClass* klass) {
-  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  Properties<aggregator_settings<EventCompare>> properties(G_OBJECT_CLASS(klass));
   add_report_properties(
       properties,
       "PNG file of the events per pixel, of both streams and of their "

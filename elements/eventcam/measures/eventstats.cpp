@@ -45,7 +45,6 @@
 #include <limits>
 #include <optional>
 
-#include "elements/eventcam/measures/clipped_events.hpp"
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/element_type.hpp"

@@ -26,7 +26,6 @@
  */
 #include <gst/gst.h>
 
-#include <algorithm>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -36,7 +35,6 @@
 
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "elements/eventcam/network/flush_timer.hpp"
-#include "elements/eventcam/network/max_latency.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/element_type.hpp"

@@ -45,17 +45,83 @@ GST_DEBUG_CATEGORY_STATIC(flow_join_debug);
 
 namespace {
 
+/// True if these are the dimensions of a flow; further ones are 1.
+bool are_dimensions(std::string_view dimensions, const std::string& of_flow) {
+  if (!dimensions.starts_with(of_flow)) return false;
+  dimensions.remove_prefix(of_flow.size());
+  while (dimensions.starts_with(":1")) dimensions.remove_prefix(2);
+  return dimensions.empty();
+}
+
 class FlowJoin final : public EventAggregator {
  public:
   explicit FlowJoin(GstAggregator* element)
       : EventAggregator(element, {.verb = "join", .main_pad = "video_sink"}) {}
 
-  void stop() override;
+  void stop() override {
+    size_.reset();
+    dimensions_.clear();
+    warn_of_missing_.reset();
+    warn_of_no_flow_.reset();
+  }
+
   void flush() noexcept override {}
   void release_memory() noexcept override {}
-  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
-  GstFlowReturn aggregate(bool timed_out) override;
-  GstClockTime next_time() override;
+
+  bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
+    const GstStructure* const structure = gst_caps_get_structure(caps, 0);
+    if (pad == flow_pad_) {
+      const char* const dimensions = gst_structure_get_string(structure, "dimensions");
+      dimensions_ = dimensions != nullptr ? dimensions : "none";
+      return true;
+    }
+    Size size;
+    if (!gst_structure_get_int(structure, "width", &size.width) ||
+        !gst_structure_get_int(structure, "height", &size.height))
+      return false;
+    size_ = size;
+    GstVideoInfo video;
+    frame_duration_ = gst_video_info_from_caps(&video, caps) ? frame_duration(video) : 0;
+    // Flow to a frame is not known before the frame.
+    gst_aggregator_set_latency(element(), frame_duration_, frame_duration_);
+    if (!gst_pad_is_linked(GST_PAD(flow_pad_)))
+      warn_of_missing_(element(),
+                       {GST_CORE_ERROR_PAD,
+                        "No optical flow: link a source of tensors to the pad \"flow_sink\". Until "
+                        "then, video from a live source passes unchanged, and other video waits."},
+                       "the pad \"flow_sink\" is not linked");
+    return true;
+  }
+
+  GstFlowReturn aggregate(bool timed_out) override {
+    auto frame = next_buffer(main_pad());
+    if (!frame) return has_ended(main_pad()) ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
+    if (!size_) return GST_FLOW_NOT_NEGOTIATED;
+    OwnedBuffer flow;
+    if (const auto time = running_time(main_pad(), GST_BUFFER_PTS(frame.get()))) {
+      auto [result, found] = flow_at(*time);
+      if (result == GST_AGGREGATOR_FLOW_NEED_DATA && !timed_out) return result;
+      if (found && covers(found.get(), frame.get())) flow = std::move(found);
+    }
+    frame.reset();  // otherwise it would not be writable in place
+    OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
+    if (is_gap(out.get()))
+      return is_segment_sent() ? push_gap(GST_BUFFER_PTS(out.get()), GST_BUFFER_DURATION(out.get()))
+                               : GST_FLOW_OK;
+    if (flow && !add_flow(out.get(), flow.get())) return GST_FLOW_ERROR;
+    if (!flow && !has_ended(flow_pad_))
+      warn_of_no_flow_(
+          element(),
+          {GST_STREAM_ERROR_FORMAT,
+           "A frame has no optical flow; passing it without. Give the flow from a frame "
+           "to the next one the PTS and the duration of the frame."},
+          "no matching buffer on flow_sink");
+    return push(std::move(out));
+  }
+
+  /// Time at which a live frame is pushed without waiting for flow: at once if it has no time, and
+  /// at the end of the video.
+  GstClockTime next_time() override { return next_main_time(); }
 
  private:
   struct Size {
@@ -63,9 +129,69 @@ class FlowJoin final : public EventAggregator {
     gint height = 0;
   };
 
-  std::pair<GstFlowReturn, OwnedBuffer> flow_at(GstClockTime time);
-  bool covers(GstBuffer* flow, GstBuffer* frame) const;
-  bool add_flow(GstBuffer* frame, GstBuffer* flow);
+  /// Takes the flow that begins at a running time from the queue; null if there is none. More data
+  /// is needed if it may still arrive.
+  std::pair<GstFlowReturn, OwnedBuffer> flow_at(GstClockTime time) {
+    while (auto next = next_buffer(flow_pad_)) {
+      const GstClockTime pts = GST_BUFFER_PTS(next.get());
+      const auto start = running_time(flow_pad_, pts);
+      if (is_gap(next.get())) {
+        const GstClockTime duration = GST_BUFFER_DURATION(next.get());
+        const auto end =
+            GST_CLOCK_TIME_IS_VALID(duration) ? running_time(flow_pad_, pts + duration) : start;
+        if (end && *end > time) return {GST_FLOW_OK, nullptr};
+      } else if (start && *start >= time + event_resolution) {
+        return {GST_FLOW_OK, nullptr};
+      }
+      gst_aggregator_pad_drop_buffer(flow_pad_);
+      if (!is_gap(next.get()) && start && *start + event_resolution > time)
+        return {GST_FLOW_OK, std::move(next)};
+      GST_LOG_OBJECT(flow_pad_, "no frame for %" GST_PTR_FORMAT, next.get());
+    }
+    return {has_ended(flow_pad_) ? GST_FLOW_OK : GST_AGGREGATOR_FLOW_NEED_DATA, nullptr};
+  }
+
+  /// True if flow that begins with a frame covers the frame's duration, as far as is known. It does
+  /// not if frames were skipped upstream of one of the pads.
+  bool covers(GstBuffer* flow, GstBuffer* frame) const {
+    const GstClockTime duration = GST_BUFFER_DURATION(flow);
+    const GstClockTime expected =
+        GST_BUFFER_DURATION_IS_VALID(frame) ? GST_BUFFER_DURATION(frame) : frame_duration_;
+    if (!GST_CLOCK_TIME_IS_VALID(duration) || expected == 0) return true;
+    return duration > expected / 2 && duration - expected / 2 < expected;
+  }
+
+  /// Returns false, after an error message, if the flow does not have the size of the frame.
+  bool add_flow(GstBuffer* frame, GstBuffer* flow) {
+    const auto expected = "2:" + std::to_string(size_->width) + ":" + std::to_string(size_->height);
+    if (!are_dimensions(dimensions_, expected)) {
+      post_message(
+          element(), GST_MESSAGE_ERROR,
+          {GST_CORE_ERROR_NEGOTIATION, "The optical flow has the dimensions " + dimensions_ +
+                                           ", and the video needs " + expected + ":1."},
+          "caps of video_sink and flow_sink");
+      return false;
+    }
+    const auto width = static_cast<guint>(size_->width);
+    const auto height = static_cast<guint>(size_->height);
+    const gsize size = gsize{width} * height * 2 * sizeof(gfloat);
+    gpointer bytes = nullptr;
+    gsize actual = 0;
+    gst_buffer_extract_dup(flow, 0, G_MAXSIZE, &bytes, &actual);
+    GBytes* const owned = g_bytes_new_take(bytes, actual);
+    const bool fits = actual == size;
+    if (fits)
+      gst_buffer_add_event_camera_flow_meta(frame, width, height, owned);
+    else
+      post_message(
+          element(), GST_MESSAGE_ERROR,
+          {GST_RESOURCE_ERROR_FAILED, "Cannot read a tensor of optical flow: it has " +
+                                          std::to_string(actual) + " bytes instead of " +
+                                          std::to_string(size) + ". Check the element upstream."},
+          "size of a buffer of flow_sink");
+    g_bytes_unref(owned);
+    return fits;
+  }
 
   GstAggregatorPad* const flow_pad_ = pad("flow_sink");
 
@@ -76,157 +202,10 @@ class FlowJoin final : public EventAggregator {
   WarnOnce warn_of_no_flow_{GST_CAT_DEFAULT};
 };
 
-/// Takes the flow that begins at a running time from the queue; null if there is none. More data is
-/// needed if it may still arrive.
-std::pair<GstFlowReturn, OwnedBuffer> FlowJoin::flow_at(GstClockTime time) {
-  while (auto next = next_buffer(flow_pad_)) {
-    const GstClockTime pts = GST_BUFFER_PTS(next.get());
-    const auto start = running_time(flow_pad_, pts);
-    if (is_gap(next.get())) {
-      const GstClockTime duration = GST_BUFFER_DURATION(next.get());
-      const auto end =
-          GST_CLOCK_TIME_IS_VALID(duration) ? running_time(flow_pad_, pts + duration) : start;
-      if (end && *end > time) return {GST_FLOW_OK, nullptr};
-    } else if (start && *start >= time + event_resolution) {
-      return {GST_FLOW_OK, nullptr};
-    }
-    gst_aggregator_pad_drop_buffer(flow_pad_);
-    if (!is_gap(next.get()) && start && *start + event_resolution > time)
-      return {GST_FLOW_OK, std::move(next)};
-    GST_LOG_OBJECT(flow_pad_, "no frame for %" GST_PTR_FORMAT, next.get());
-  }
-  return {has_ended(flow_pad_) ? GST_FLOW_OK : GST_AGGREGATOR_FLOW_NEED_DATA, nullptr};
-}
-
-/// True if flow that begins with a frame covers the frame's duration, as far as is known. It does
-/// not if frames were skipped upstream of one of the pads.
-bool FlowJoin::covers(GstBuffer* flow, GstBuffer* frame) const {
-  const GstClockTime duration = GST_BUFFER_DURATION(flow);
-  const GstClockTime expected =
-      GST_BUFFER_DURATION_IS_VALID(frame) ? GST_BUFFER_DURATION(frame) : frame_duration_;
-  if (!GST_CLOCK_TIME_IS_VALID(duration) || expected == 0) return true;
-  return duration > expected / 2 && duration - expected / 2 < expected;
-}
-
-/// True if these are the dimensions of a flow; further ones are 1.
-bool are_dimensions(std::string_view dimensions, const std::string& of_flow) {
-  if (!dimensions.starts_with(of_flow)) return false;
-  dimensions.remove_prefix(of_flow.size());
-  while (dimensions.starts_with(":1")) dimensions.remove_prefix(2);
-  return dimensions.empty();
-}
-
-/// Returns false, after an error message, if the flow does not have the size of the frame.
-bool FlowJoin::add_flow(GstBuffer* frame, GstBuffer* flow) {
-  const auto expected = "2:" + std::to_string(size_->width) + ":" + std::to_string(size_->height);
-  if (!are_dimensions(dimensions_, expected)) {
-    post_message(element(), GST_MESSAGE_ERROR,
-                 {GST_CORE_ERROR_NEGOTIATION, "The optical flow has the dimensions " + dimensions_ +
-                                                  ", and the video needs " + expected + ":1."},
-                 "caps of video_sink and flow_sink");
-    return false;
-  }
-  const auto width = static_cast<guint>(size_->width);
-  const auto height = static_cast<guint>(size_->height);
-  const gsize size = gsize{width} * height * 2 * sizeof(gfloat);
-  gpointer bytes = nullptr;
-  gsize actual = 0;
-  gst_buffer_extract_dup(flow, 0, G_MAXSIZE, &bytes, &actual);
-  GBytes* const owned = g_bytes_new_take(bytes, actual);
-  const bool fits = actual == size;
-  if (fits)
-    gst_buffer_add_event_camera_flow_meta(frame, width, height, owned);
-  else
-    post_message(
-        element(), GST_MESSAGE_ERROR,
-        {GST_RESOURCE_ERROR_FAILED, "Cannot read a tensor of optical flow: it has " +
-                                        std::to_string(actual) + " bytes instead of " +
-                                        std::to_string(size) + ". Check the element upstream."},
-        "size of a buffer of flow_sink");
-  g_bytes_unref(owned);
-  return fits;
-}
-
-GstFlowReturn FlowJoin::aggregate(bool timed_out) {
-  auto frame = next_buffer(main_pad());
-  if (!frame) return has_ended(main_pad()) ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
-  if (!size_) return GST_FLOW_NOT_NEGOTIATED;
-  OwnedBuffer flow;
-  if (const auto time = running_time(main_pad(), GST_BUFFER_PTS(frame.get()))) {
-    auto [result, found] = flow_at(*time);
-    if (result == GST_AGGREGATOR_FLOW_NEED_DATA && !timed_out) return result;
-    if (found && covers(found.get(), frame.get())) flow = std::move(found);
-  }
-  frame.reset();  // otherwise it would not be writable in place
-  OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
-  if (is_gap(out.get()))
-    return is_segment_sent() ? push_gap(GST_BUFFER_PTS(out.get()), GST_BUFFER_DURATION(out.get()))
-                             : GST_FLOW_OK;
-  if (flow && !add_flow(out.get(), flow.get())) return GST_FLOW_ERROR;
-  if (!flow && !has_ended(flow_pad_))
-    warn_of_no_flow_(element(),
-                     {GST_STREAM_ERROR_FORMAT,
-                      "A frame has no optical flow; passing it without. Give the flow from a frame "
-                      "to the next one the PTS and the duration of the frame."},
-                     "no matching buffer on flow_sink");
-  return push(std::move(out));
-}
-
-/// Time at which a live frame is pushed without waiting for flow: at once if it has no time, and at
-/// the end of the video.
-GstClockTime FlowJoin::next_time() {
-  const auto frame = next_buffer(main_pad());
-  if (!frame) return has_ended(main_pad()) ? 0 : GST_CLOCK_TIME_NONE;
-  if (!GST_BUFFER_PTS_IS_VALID(frame.get())) return 0;
-  return running_time(main_pad(), GST_BUFFER_PTS(frame.get())).value_or(0);
-}
-
-bool FlowJoin::handle_caps(GstAggregatorPad* pad, GstCaps* caps) {
-  const GstStructure* const structure = gst_caps_get_structure(caps, 0);
-  if (pad == flow_pad_) {
-    const char* const dimensions = gst_structure_get_string(structure, "dimensions");
-    dimensions_ = dimensions != nullptr ? dimensions : "none";
-    return true;
-  }
-  Size size;
-  if (!gst_structure_get_int(structure, "width", &size.width) ||
-      !gst_structure_get_int(structure, "height", &size.height))
-    return false;
-  size_ = size;
-  GstVideoInfo video;
-  frame_duration_ = gst_video_info_from_caps(&video, caps) ? frame_duration(video) : 0;
-  // Flow to a frame is not known before the frame.
-  gst_aggregator_set_latency(element(), frame_duration_, frame_duration_);
-  if (!gst_pad_is_linked(GST_PAD(flow_pad_)))
-    warn_of_missing_(element(),
-                     {GST_CORE_ERROR_PAD,
-                      "No optical flow: link a source of tensors to the pad \"flow_sink\". Until "
-                      "then, video from a live source passes unchanged, and other video waits."},
-                     "the pad \"flow_sink\" is not linked");
-  return true;
-}
-
-void FlowJoin::stop() {
-  size_.reset();
-  dimensions_.clear();
-  warn_of_missing_.reset();
-  warn_of_no_flow_.reset();
-}
-
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstFlowJoin, gst_flow_join, GST, FLOW_JOIN, GstEventAggregator)
-struct _GstFlowJoin {
-  GstEventAggregator parent;
-};
-G_DEFINE_TYPE_WITH_CODE(GstFlowJoin, gst_flow_join, GST_TYPE_EVENT_AGGREGATOR,
-                        GST_DEBUG_CATEGORY_INIT(GST_CAT_DEFAULT, "flowjoin", 0,
-                                                "optical flow of video frames"))
-GST_ELEMENT_REGISTER_DEFINE(flowjoin, "flowjoin", GST_RANK_NONE, gst_flow_join_get_type())
-
-static void gst_flow_join_init(GstFlowJoin* self) {
-  gst_event_aggregator_make<FlowJoin>(GST_EVENT_AGGREGATOR(self));
-}
+DEFINE_EVENT_AGGREGATOR(GstFlowJoin, gst_flow_join, FLOW_JOIN, FlowJoin, flowjoin, GST_RANK_NONE,
+                        "optical flow of video frames")
 
 static void gst_flow_join_class_init(GstFlowJoinClass* klass) {
 #define ANY_VIDEO_CAPS "video/x-raw(ANY), " SIZE_CAPS ", framerate = (fraction) [ 0, max ]"

@@ -1,10 +1,20 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/reader/reader_output.hpp"
 
+#include <gst/gst.h>
+#include <gst/video/video.h>
+
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/reader/event_reader.hpp"
 #include "gst/recording/sensor_events.hpp"
@@ -14,7 +24,218 @@ GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
 
 using eventcamera::Microseconds;
 using eventcamera::RecordingReader;
+using eventcamera::SensorSize;
 using eventcamera::StreamKind;
+
+GstEvent* with_seqnum(GstEvent* event, guint32 seqnum) {
+  if (seqnum != GST_SEQNUM_INVALID) gst_event_set_seqnum(event, seqnum);
+  return event;
+}
+
+namespace {
+
+/// Memory of event buffers that were freed, in any thread, for further buffers. It is kept while
+/// buffers need as much, and up to a limit.
+class SpareMemory {
+ public:
+  std::vector<eventcamera::Event> pop() {
+    const std::lock_guard lock(mutex_);
+    if (count_ == 0) return {};
+    auto memory = std::exchange(spare_[--count_], {});
+    capacity_ -= memory.capacity();
+    return memory;
+  }
+
+  void push(std::vector<eventcamera::Event> memory) noexcept {
+    constexpr std::size_t min_needed = 512;
+    const std::lock_guard lock(mutex_);
+    needed_ = std::max({memory.size(), needed_ - needed_ / 64, min_needed});
+    const auto capacity = memory.capacity();
+    if (capacity / 4 > needed_ || capacity_ + capacity > max_events || count_ == spare_.size())
+      return;
+    spare_[count_++] = std::move(memory);
+    capacity_ += capacity;
+  }
+
+ private:
+  static constexpr std::size_t max_events = std::size_t{1} << 23;  // 64 MiB
+
+  std::mutex mutex_;
+  std::array<std::vector<eventcamera::Event>, 16> spare_;
+  std::size_t count_ = 0;     ///< number of them
+  std::size_t capacity_ = 0;  ///< of all of them, in events
+  std::size_t needed_ = 0;    ///< events of a recent buffer: a maximum that decays
+};
+
+}  // namespace
+
+/// Source pad for one stream of a file, with the state of its events: stream-start, caps, tags and
+/// segment.
+class ReaderPad {
+ public:
+  /// Creates the pad without adding it to an element. Logs in `category`.
+  ReaderPad(GstPadTemplate* templ, const std::string& name, GstDebugCategory* category)
+      : pad_(gst_pad_new_from_template(templ, name.c_str())), name_(name), category_(category) {
+    gst_object_ref_sink(pad_);
+    gst_pad_use_fixed_caps(pad_);
+  }
+
+  ~ReaderPad() {
+    reset();
+    gst_object_unref(pad_);
+  }
+
+  ReaderPad(const ReaderPad&) = delete;
+  ReaderPad& operator=(const ReaderPad&) = delete;
+
+  GstPad* get() const { return pad_; }
+  const std::string& name() const { return name_; }
+  bool is_added() const { return GST_OBJECT_PARENT(pad_) != nullptr; }
+
+  /// Forgets what was sent, for a new stream.
+  void reset() {
+    interrupt();
+    started_ = false;
+    size_ = {};
+    video_.reset();
+  }
+
+  /// Marks the next data as discontinuous; a new segment is due.
+  void interrupt() {
+    segment_due_ = true;
+    discontinuous_ = true;
+  }
+
+  /// Marks the next data as discontinuous, in the same segment.
+  void interrupt_data() { discontinuous_ = true; }
+
+  /// Starts a new stream. Event streams have type video, because players draw them.
+  void start_stream(GstElement* element, guint group) {
+    const bool is_only = name_ == "src";
+    gchar* const id = gst_pad_create_stream_id(pad_, element, is_only ? nullptr : name_.c_str());
+    GstStream* const stream =
+        gst_stream_new(id, nullptr, GST_STREAM_TYPE_VIDEO, GST_STREAM_FLAG_NONE);
+    GstEvent* const event = gst_event_new_stream_start(id);
+    gst_event_set_stream(event, stream);
+    gst_event_set_group_id(event, group);
+    gst_object_unref(stream);
+    g_free(id);
+    start_stream(event);
+  }
+
+  /// Starts a stream with upstream's stream-start event. Takes ownership of `upstream`.
+  void start_stream(GstEvent* upstream) {
+    reset();
+    started_ = true;
+    if (!GST_PAD_IS_ACTIVE(pad_)) gst_pad_set_active(pad_, TRUE);
+    gst_pad_push_event(pad_, upstream);
+  }
+
+  bool is_started() const { return started_; }
+
+  /// Sends tags with the file format and the camera model.
+  void send_tags(const std::string& format, const std::string& camera) {
+    if (!format.empty()) {
+      GstTagList* const container =
+          gst_tag_list_new(GST_TAG_CONTAINER_FORMAT, format.c_str(), nullptr);
+      gst_tag_list_set_scope(container, GST_TAG_SCOPE_GLOBAL);
+      gst_pad_push_event(pad_, gst_event_new_tag(container));
+    }
+    if (!camera.empty() &&
+        g_utf8_validate(camera.data(), static_cast<gssize>(camera.size()), nullptr))
+      gst_pad_push_event(
+          pad_, gst_event_new_tag(gst_tag_list_new(GST_TAG_DEVICE_MODEL, camera.c_str(), nullptr)));
+  }
+
+  /// Sends caps unless already sent. False if they are refused.
+  bool send_caps(SensorSize size) {
+    if (size == size_) return true;
+    const OwnedCaps caps = event_caps(size.width, size.height);
+    const bool taken = push_caps(caps.get());
+    if (taken) size_ = size;
+    return taken;
+  }
+
+  bool send_caps(const GstVideoInfo& info) {
+    if (video_ && gst_video_info_is_equal(&*video_, &info)) return true;
+    const OwnedCaps caps(gst_video_info_to_caps(&info));
+    const bool taken = push_caps(caps.get());
+    if (taken) video_ = info;
+    return taken;
+  }
+
+  bool has_video() const { return video_.has_value(); }
+
+  /// Sends a segment if one is due.
+  void send_segment(const GstSegment& segment, guint32 seqnum) {
+    if (std::exchange(segment_due_, false))
+      gst_pad_push_event(pad_, with_seqnum(gst_event_new_segment(&segment), seqnum));
+  }
+
+  void need_segment(bool due) { segment_due_ = due; }
+
+  GstFlowReturn push(GstBuffer* buffer, GstClockTime pts) {
+    GST_BUFFER_PTS(buffer) = pts;
+    if (std::exchange(discontinuous_, false)) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
+    return gst_pad_push(pad_, buffer);
+  }
+
+  /// Pushes the first `count` events of `memory`, at least one, without copying them, and their
+  /// labels, if there are any. Throws std::bad_alloc.
+  GstFlowReturn push(std::vector<eventcamera::Event> memory, std::size_t count,
+                     std::span<const eventcamera::Label> labels, GstClockTime pts,
+                     GstClockTime duration) {
+    struct Owner {
+      std::shared_ptr<SpareMemory> spare;
+      std::vector<eventcamera::Event> memory;
+    };
+    auto owner = std::make_unique<Owner>(Owner{spare_, std::move(memory)});
+    auto* const events = owner->memory.data();
+    const gsize size = count * sizeof(eventcamera::Event);
+    OwnedBuffer buffer(gst_buffer_new_wrapped_full(
+        static_cast<GstMemoryFlags>(0), events, size, 0, size, owner.release(), [](gpointer data) {
+          const std::unique_ptr<Owner> last(static_cast<Owner*>(data));
+          last->spare->push(std::move(last->memory));
+        }));
+    if (!labels.empty()) std::ranges::copy(labels, add_labels(buffer.get(), count).begin());
+    GST_BUFFER_DURATION(buffer.get()) = duration;
+    return push(buffer.release(), pts);
+  }
+
+  /// Memory of a buffer that was freed, or none.
+  std::vector<eventcamera::Event> spare_memory() { return spare_->pop(); }
+
+  GstFlowReturn push_gap(GstClockTime pts, GstClockTime duration) {
+    return push_event(pad_, gst_event_new_gap(pts, duration));
+  }
+
+  /// Flow return after send_caps() failed.
+  GstFlowReturn refusal() const {
+    return GST_PAD_IS_FLUSHING(pad_) || gst_pad_get_last_flow_return(pad_) == GST_FLOW_FLUSHING
+               ? GST_FLOW_FLUSHING
+               : GST_FLOW_NOT_NEGOTIATED;
+  }
+
+ private:
+  bool push_caps(GstCaps* caps) {
+    GST_CAT_DEBUG_OBJECT(category_, pad_, "sending %" GST_PTR_FORMAT, caps);
+    if (GstStream* const stream = gst_pad_get_stream(pad_)) {
+      gst_stream_set_caps(stream, caps);
+      gst_object_unref(stream);
+    }
+    return gst_pad_push_event(pad_, gst_event_new_caps(caps)) != FALSE;
+  }
+
+  GstPad* pad_;
+  std::string name_;
+  GstDebugCategory* category_;
+  std::shared_ptr<SpareMemory> spare_ = std::make_shared<SpareMemory>();
+  bool started_ = false;
+  bool segment_due_ = true;
+  bool discontinuous_ = true;
+  SensorSize size_;  ///< size in the caps sent last
+  std::optional<GstVideoInfo> video_;
+};
 
 ReaderOutput::ReaderOutput(GstElement* element, GstPad* sink, const EventReaderFormat& format,
                            Guarded<FormatSettings>& settings, ReaderTimeline& timeline)
@@ -257,7 +478,7 @@ bool ReaderOutput::find_size(std::size_t index) {
   GstPad* const pad = pad_of(index).get();
   const OwnedCaps templ(gst_pad_get_pad_template_caps(pad));
   const OwnedCaps peer(gst_pad_peer_query_caps(pad, templ.get()));
-  eventcamera::SensorSize size;
+  SensorSize size;
   if (!gst_caps_is_empty(peer.get())) {
     const auto* const structure = gst_caps_get_structure(peer.get(), 0);
     if (gst_structure_get_int(structure, "width", &size.width) &&

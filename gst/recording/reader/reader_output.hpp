@@ -9,11 +9,19 @@
 #include <vector>
 
 #include "gst/base/errors.hpp"
+#include "gst/base/event_caps.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/recording/eventreader.hpp"
-#include "gst/recording/reader/reader_pad.hpp"
 #include "gst/recording/reader/reader_timeline.hpp"
 #include "src/formats/recording_reader.hpp"
+
+class ReaderPad;
+
+/// Caps of events read from a file, which have no framerate.
+#define FILE_EVENTS_CAPS EVENT_CAPS ", framerate = (fraction) 0/1"
+
+/// Sets the seqnum of `event`, if valid, and returns `event`.
+GstEvent* with_seqnum(GstEvent* event, guint32 seqnum);
 
 /// Source pads of a reader: adds them when the streams of a recording are known, and pushes its
 /// output, after the events that must precede it.

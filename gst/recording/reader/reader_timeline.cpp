@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "gst/base/pads.hpp"
-#include "gst/recording/reader/pad_bytes.hpp"
 
 using eventcamera::RecordingReader;
 

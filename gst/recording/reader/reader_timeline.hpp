@@ -15,6 +15,13 @@ inline GstClockTime nanoseconds(eventcamera::Microseconds t) {
   return static_cast<GstClockTime>(std::max<eventcamera::Microseconds>(t, 0)) * GST_USECOND;
 }
 
+/// Size of the upstream file in bytes; 0 if unknown.
+inline guint64 upstream_bytes(GstPad* sink) {
+  gint64 size = 0;
+  const bool known = gst_pad_peer_query_duration(sink, GST_FORMAT_BYTES, &size) != FALSE;
+  return known && size > 0 ? static_cast<guint64>(size) : 0;
+}
+
 /// Bounds of a segment in whole microseconds, rounded outwards.
 inline eventcamera::Microseconds position_of(const GstSegment& segment) {
   return static_cast<eventcamera::Microseconds>(segment.position / GST_USECOND);

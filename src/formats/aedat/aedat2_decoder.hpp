@@ -5,12 +5,11 @@
 #include <optional>
 #include <string>
 
+#include "src/core/address_layout.hpp"
 #include "src/core/sensor_size.hpp"
-#include "src/formats/aedat/aedat2_layout.hpp"
 #include "src/formats/aedat/aedat_header.hpp"
 #include "src/formats/byte_queue.hpp"
 #include "src/formats/decoder.hpp"
-#include "src/formats/event_decoder.hpp"
 
 namespace eventcamera {
 

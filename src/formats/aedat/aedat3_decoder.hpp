@@ -8,7 +8,6 @@
 #include "src/formats/aedat/aedat_header.hpp"
 #include "src/formats/byte_queue.hpp"
 #include "src/formats/decoder.hpp"
-#include "src/formats/event_decoder.hpp"
 
 namespace eventcamera {
 

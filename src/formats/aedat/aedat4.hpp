@@ -22,7 +22,7 @@ enum class Aedat4Compression : std::uint8_t {
 /// First line of the file.
 constexpr std::string_view aedat4_magic = "#!AER-DAT4.0\r\n";
 
-/// What a trigger's source, a number in the file, says of its edge.
+/// Meaning of a trigger's source, a number in the file: input and direction of the edge.
 struct Aedat4Edge {
   std::uint16_t id;
   bool rising;

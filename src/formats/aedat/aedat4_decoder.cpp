@@ -93,7 +93,7 @@ bool Aedat4Decoder::read_header() {
   return true;
 }
 
-/// Takes what the FlatBuffer of the header says.
+/// Evaluates the FlatBuffer of the header.
 void Aedat4Decoder::handle_header(std::span<const std::uint8_t> content) {
   const auto at = aedat4_magic.size();
   const auto* const header = aedat4::verified<aedat4::Header>(content, "IOHE");

@@ -68,7 +68,7 @@ class Aedat4Decoder final : public Decoder {
     std::size_t used = 0;  ///< bytes of the payload that hold it; 0 if it does not decompress
   };
 
-  /// What the packet table says of a stream, without impossible times.
+  /// Extent of a stream according to the packet table, ignoring impossible times.
   struct Extent {
     std::uint64_t end = 0;  ///< past the start of its last packet
     Microseconds latest_start = std::numeric_limits<Microseconds>::min();  ///< of its packets

@@ -47,7 +47,7 @@ class Aedat4Encoder final : public Encoder {
   /// support the frame.
   void encode(const Frame& frame, std::vector<std::uint8_t>& out);
 
-  /// Appends those that AEDAT4 supports, sorted by time, and returns their number. Nothing without
+  /// Appends the supported ones, which must be sorted by time, and returns their number; 0 without
   /// a stream for them.
   std::size_t encode(std::span<const Trigger> triggers, std::vector<std::uint8_t>& out);
   std::size_t encode(std::span<const ImuSample> samples, std::vector<std::uint8_t>& out);

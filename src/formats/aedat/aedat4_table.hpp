@@ -22,9 +22,9 @@ struct Aedat4TableEntry {
   friend constexpr bool operator==(const Aedat4TableEntry&, const Aedat4TableEntry&) = default;
 };
 
-/// Parses the table in `bytes`, the file from the table's position to its end; nothing if they are
-/// not a table. The first packet is at `packets_at`. Positions point to packets or to
-/// their payloads, depending on the writer; the first entry shows which.
+/// Parses the table in `bytes`, the end of the file from the table's position on; nothing if they
+/// are not a table. The first packet is at `packets_at`. Positions point to packets or to their
+/// payloads, depending on the writer; the first entry shows which.
 std::optional<std::vector<Aedat4TableEntry>> read_aedat4_table(std::span<const std::uint8_t> bytes,
                                                                Aedat4Compression compression,
                                                                std::uint64_t packets_at);

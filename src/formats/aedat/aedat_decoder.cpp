@@ -7,7 +7,6 @@
 #include "src/formats/aedat/aedat2_decoder.hpp"
 #include "src/formats/aedat/aedat3_decoder.hpp"
 #include "src/formats/aedat/aedat4_decoder.hpp"
-#include "src/formats/event_decoder.hpp"
 
 namespace eventcamera {
 

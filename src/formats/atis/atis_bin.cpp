@@ -3,7 +3,6 @@
 
 #include <set>
 
-#include "src/formats/unit_decoder.hpp"
 #include "src/formats/unit_stream_decoder.hpp"
 #include "src/formats/unwrapped_clock.hpp"
 
@@ -27,7 +26,7 @@ struct Record {
             std::uint32_t{bytes[2] & 0x7fU} << 16 | std::uint32_t{bytes[3]} << 8 | bytes[4]};
   }
 
-  /// No event: times that follow are later by overflow_time.
+  /// Not an event: later times are shifted by overflow_time.
   bool is_overflow() const { return y == static_cast<std::uint32_t>(atis.height); }
 };
 

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "src/core/sensor_size.hpp"
-#include "src/formats/event_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 namespace eventcamera {
 
@@ -14,8 +14,8 @@ namespace eventcamera {
 /// event, without a header. A size of 0x0 means unknown.
 std::unique_ptr<EventDecoder> make_atis_bin_decoder(SensorSize size);
 
-/// True if bytes at the start of a file are such events. There is no signature: many events have to
-/// be in order of time, from its beginning on, at various pixels.
+/// True if a file starts with such events. There is no signature: many events must be in order of
+/// time from the start of the file on, at various pixels.
 bool is_atis_bin(std::span<const std::uint8_t> bytes);
 
 }  // namespace eventcamera

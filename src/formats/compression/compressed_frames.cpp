@@ -16,8 +16,8 @@ namespace eventcamera {
 
 namespace {
 
-/// Limits of the first memory for the content of frames, and how many times as large as the frame
-/// it is between them.
+/// Limits of the first buffer for the content of a frame, and its size relative to the frame
+/// between these.
 constexpr std::size_t min_content = std::size_t{4} << 10;
 constexpr std::size_t max_first_content = std::size_t{256} << 10;
 constexpr std::size_t expected_ratio = 4;

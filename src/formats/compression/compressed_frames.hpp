@@ -35,7 +35,7 @@ class FrameDecompressor {
   };
 
   /// Returns the content of the compressed frame at the front of `payload`; nothing if it is
-  /// corrupt, larger than `limit`, or beyond what so many bytes may expand to.
+  /// corrupt, larger than `limit`, or beyond the ExpansionLimit.
   std::optional<Content> decompress(FrameCodec codec, std::span<const std::uint8_t> payload,
                                     std::size_t limit);
 

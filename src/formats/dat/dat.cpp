@@ -8,7 +8,6 @@
 
 #include "src/core/max_side.hpp"
 #include "src/formats/prophesee_header.hpp"
-#include "src/formats/unit_decoder.hpp"
 #include "src/formats/unit_stream_decoder.hpp"
 #include "src/formats/unwrapped_clock.hpp"
 #include "src/formats/word_writer.hpp"
@@ -172,15 +171,15 @@ class DatDecoder final : public UnitStreamDecoder {
   MakeDecoder make_decoder_ = nullptr;  ///< for the records; set once the header is read
 };
 
-/// Converts times to the lower 32 bits that are written. Readers detect a wrap by a fall of more
-/// than half the range. Removes what cannot be represented so: long pauses, or a first time beyond
-/// 32 bits.
+/// Converts times to the lower 32 bits that are written. Readers detect a wrap by a decrease of
+/// more than half the range. Removes pauses that this cannot represent, and a first time beyond 32
+/// bits.
 class DatClock {
  public:
   std::uint32_t written(Microseconds t) {
     const auto gap = static_cast<std::uint64_t>(t) - static_cast<std::uint64_t>(last_);
     if (t > last_ && gap > half) [[unlikely]]
-      leave_out(t, gap);
+      remove_pause(t, gap);
     begun_ = true;
     last_ = t;
     return at(t);
@@ -195,7 +194,7 @@ class DatClock {
     return static_cast<std::uint32_t>(static_cast<std::uint64_t>(t) - shift_);
   }
 
-  void leave_out(Microseconds t, std::uint64_t gap) {
+  void remove_pause(Microseconds t, std::uint64_t gap) {
     const auto max_gap = begun_ ? DatTime::max_rise : DatTime::range - 1;
     if (gap <= max_gap && at(t) > at(last_)) return;  // no wrap
     shift_ += gap;

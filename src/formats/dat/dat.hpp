@@ -4,13 +4,13 @@
 #include <memory>
 
 #include "src/core/sensor_size.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
-#include "src/formats/event_decoder.hpp"
 
 namespace eventcamera {
 
 /// Decodes Prophesee DAT files ("DAT file format") of events or triggers, versions 1 and 2. Their
-/// times have 32 bits and wrap every 71 minutes: a fall by more than half of that is a wrap.
+/// times have 32 bits and wrap every 71 minutes: a decrease by more than half of that is a wrap.
 std::unique_ptr<EventDecoder> make_dat_decoder();
 
 /// Encodes version 2. A first time of 71 minutes or more becomes 0. Pauses that readers would

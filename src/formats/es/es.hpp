@@ -5,8 +5,8 @@
 #include <memory>
 
 #include "src/core/sensor_size.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
-#include "src/formats/event_decoder.hpp"
 
 namespace eventcamera {
 

@@ -6,8 +6,8 @@
 #include <string_view>
 
 #include "src/core/sensor_size.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
-#include "src/formats/event_decoder.hpp"
 
 namespace eventcamera {
 

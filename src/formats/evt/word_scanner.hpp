@@ -19,10 +19,10 @@ enum class Framing : std::uint8_t {
   padded,  ///< transfers of whole words up to an end marker, past which are old bytes
 };
 
-/// Finds the valid EVT words in what a live camera sends. Words are passed on in stretches: from a
-/// TIME_HIGH to the next, which must continue the clock, with no invalid word between them. What
-/// does not is lost, and counted. After a gap, a stretch must be complete before it is passed on,
-/// and no event is that depends on a word before the gap.
+/// Finds the valid EVT words in the data of a live camera. Words are passed on in stretches: from a
+/// TIME_HIGH to the next, which must continue the clock, without invalid words in between. All
+/// others are lost, and counted. After a gap, a stretch must be complete before it is passed on;
+/// events that depend on a word before the gap are dropped.
 ///
 /// The end marker of a padded transfer, or the end of its bytes, also ends a stretch. A transfer
 /// that begins before the end of the last one is an old one, unless the next one continues it: then
@@ -31,7 +31,7 @@ class WordScanner {
  public:
   struct Transfer {
     std::span<const std::uint8_t> bytes;
-    bool is_discontinuous = false;        ///< something is missing before it
+    bool is_discontinuous = false;        ///< data is missing before it
     std::optional<Microseconds> elapsed;  ///< since the transfer before, by another clock
   };
 
@@ -41,15 +41,15 @@ class WordScanner {
     std::vector<std::uint8_t> words;
     Microseconds start = 0;         ///< no event is earlier
     Microseconds end = 0;           ///< no event of the following pieces is earlier
-    bool is_discontinuous = false;  ///< else it starts at the end of the last piece
+    bool is_discontinuous = false;  ///< otherwise it starts at the end of the last piece
   };
 
   struct Counts {
     std::uint64_t bytes = 0;        ///< passed on
     std::uint64_t events = 0;       ///< passed on
-    std::uint64_t lost_bytes = 0;   ///< that came, and were not passed on; without padding
-    std::uint64_t lost_events = 0;  ///< in them, if their words can be decoded
-    std::uint64_t gaps = 0;         ///< discontinuous pieces but for the first
+    std::uint64_t lost_bytes = 0;   ///< received, but not passed on; without padding
+    std::uint64_t lost_events = 0;  ///< in lost bytes that can be decoded
+    std::uint64_t gaps = 0;         ///< discontinuous pieces, except the first
   };
 
   virtual ~WordScanner() = default;

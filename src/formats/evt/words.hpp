@@ -9,7 +9,7 @@
 
 #include "src/formats/encoder.hpp"
 #include "src/formats/evt/raw.hpp"
-#include "src/formats/unit_decoder.hpp"
+#include "src/formats/unit_stream_decoder.hpp"
 
 namespace eventcamera {
 

@@ -4,7 +4,6 @@
 #include <optional>
 #include <vector>
 
-#include "src/formats/hdf5/growing_dataset.hpp"
 #include "src/formats/hdf5/hdf5_layout.hpp"
 
 namespace eventcamera {

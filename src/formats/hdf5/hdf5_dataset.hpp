@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "src/formats/corruption.hpp"
 #include "src/formats/event_table.hpp"
 #include "src/formats/hdf5/hdf5_handle.hpp"
 #include "src/formats/table_sample.hpp"
@@ -124,5 +125,31 @@ class Hdf5Dataset {
   std::vector<std::uint8_t> loaded_;             ///< rows of one row of chunks
   std::optional<std::uint64_t> loaded_block_;
 };
+
+/// Returns the end of the block of rows to read at once, from `row` on.
+inline std::uint64_t block_end(std::uint64_t row, std::uint64_t rows) {
+  constexpr std::uint64_t block_rows = 16384;
+  return std::min(rows, (row / block_rows + 1) * block_rows);
+}
+
+/// Returns the first row for which `precedes(row)` is false; it must be false for all later rows.
+template <class Precedes>
+std::uint64_t first_row(std::uint64_t rows, const Precedes& precedes) {
+  std::uint64_t first = 0;
+  while (rows > 0) {
+    const auto half = rows / 2;
+    const bool before = precedes(first + half);
+    if (before) first += half + 1;
+    rows = before ? rows - half - 1 : half;
+  }
+  return first;
+}
+
+/// Records corruption; looks up the position of the first only, because the search is slow and no
+/// other is reported.
+inline void note(Corruption& corruption, const Hdf5Dataset& dataset, std::uint64_t row,
+                 const char* what) {
+  corruption.note(corruption.places == 0 ? dataset.position(row) : 0, what);
+}
 
 }  // namespace eventcamera

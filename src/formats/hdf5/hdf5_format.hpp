@@ -16,7 +16,7 @@ enum class Hdf5Format : std::uint8_t {
   mvsec,       ///< /davis/left/events, rows of x, y, t in seconds, p
 };
 
-/// Which events of a file to read, and how.
+/// Selects the events of a file to read.
 struct Hdf5Selection {
   std::string path = {};     ///< of a dataset or a group; empty: the first events
   TableSettings table = {};  ///< columns are for rows without names

@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <utility>
+#include <vector>
 
+#include "src/formats/byte_source.hpp"
+#include "src/formats/hdf5/hdf5_dataset.hpp"
 #include "src/formats/hdf5/hdf5_file.hpp"
 #include "src/formats/hdf5/hdf5_table.hpp"
-#include "src/formats/hdf5/hdf5_triggers.hpp"
 #include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
@@ -26,6 +29,94 @@ struct Hdf5Reader::File {
 };
 
 namespace {
+
+/// The events of a file.
+class Hdf5Decoder final : public Decoder {
+ public:
+  explicit Hdf5Decoder(Hdf5Selection selection) : selection_(std::move(selection)) {}
+
+  void push(std::span<const std::uint8_t> piece) override { collected_.push(piece); }
+
+  void drain() override {
+    reader_ = std::make_unique<Hdf5Reader>(collected_.take(), selection_);
+    describe();
+  }
+
+  bool open(ByteSource& source) override {
+    reader_ = std::make_unique<Hdf5Reader>(source, selection_);
+    opened_ = true;
+    describe();
+    return true;
+  }
+
+  bool is_table() const override { return true; }
+
+  /// Returns events after the triggers up to their time.
+  std::optional<Item> next() override {
+    if (!reader_) return std::nullopt;
+    if (!events_due_) {
+      events_.clear();
+      events_due_ = reader_->read(read_at_once, events_) > 0;
+    }
+    if (!events_due_ || triggers_until_ <= events_.back().t) {
+      triggers_.clear();
+      if (reader_->read_triggers(read_at_once, triggers_) > 0) {
+        triggers_until_ = triggers_.back().t;
+        return TriggerItem{0, triggers_};
+      }
+    }
+    if (!std::exchange(events_due_, false)) return std::nullopt;
+    return EventItem{0, events_};
+  }
+
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+
+  const Corruption& corruption() const override {
+    static const Corruption none;
+    return reader_ ? reader_->corruption() : none;
+  }
+
+  UnreadStreams unread_streams() const override {
+    if (!reader_ || reader_->others().empty()) return {};
+    return {.names = "events in " + reader_->others(), .property = "events-path"};
+  }
+
+  /// A pushed file must be pushed again as a whole.
+  std::optional<SeekPoint> seek_point_before(Microseconds t) const override {
+    if (!opened_) return std::nullopt;
+    return SeekPoint{.t = t};
+  }
+
+  void restart(const SeekPoint& seek_point) override {
+    events_due_ = false;
+    triggers_until_ = std::numeric_limits<Microseconds>::min();
+    reader_->seek(seek_point.t);
+  }
+
+  std::optional<Microseconds> last_time() override {
+    const auto range = reader_ ? reader_->time_range() : std::nullopt;
+    if (!range) return std::nullopt;
+    return range->last;
+  }
+
+ private:
+  static constexpr std::size_t read_at_once = std::size_t{1} << 14;
+
+  void describe() {
+    streams_.front().size = reader_->size();
+    streams_.front().labelled = reader_->has_labels();
+  }
+
+  Hdf5Selection selection_;
+  CollectedBytes collected_{"an HDF5 file"};
+  std::unique_ptr<Hdf5Reader> reader_;  ///< set once the file can be read
+  std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
+  std::vector<AbsoluteEvent> events_;
+  std::vector<Trigger> triggers_;
+  bool events_due_ = false;  ///< events_ are to be returned
+  Microseconds triggers_until_ = std::numeric_limits<Microseconds>::min();  ///< time of the last
+  bool opened_ = false;  ///< opened, not collected
+};
 
 /// Checks the signature, which may follow a user block whose size is a power of two.
 bool is_signed(ByteSource& bytes) {
@@ -47,6 +138,54 @@ Hdf5Handle open_source(ByteSource& bytes) {
 }
 
 }  // namespace
+
+std::unique_ptr<Decoder> make_hdf5_decoder(Hdf5Selection selection) {
+  return std::make_unique<Hdf5Decoder>(std::move(selection));
+}
+
+/// Triggers of the Metavision layout.
+class Hdf5Triggers {
+ public:
+  /// Returns null if the file has none.
+  static std::unique_ptr<Hdf5Triggers> open(hid_t file) {
+    if (!Hdf5Dataset::exists(file, "EXT_TRIGGER/events", H5O_TYPE_DATASET)) return nullptr;
+    return std::unique_ptr<Hdf5Triggers>(new Hdf5Triggers(file));
+  }
+
+  /// Appends a bounded number of triggers from the next row on. False at the end.
+  bool read(std::size_t count, std::vector<Trigger>& out, Corruption& corruption) {
+    if (row_ >= dataset_.rows() || count == 0) return false;
+    const auto end = std::min<std::uint64_t>(block_end(row_, dataset_.rows()), row_ + count);
+    if (dataset_.read(row_, end - row_, numbers_)) {
+      for (std::size_t i = 0; i < numbers_.size(); i += 3)
+        out.push_back(
+            {numbers_[i], static_cast<std::uint16_t>(numbers_[i + 2]), numbers_[i + 1] > 0});
+    } else {
+      note(corruption, dataset_, row_, "unreadable part of an HDF5 dataset");
+    }
+    row_ = end;
+    return true;
+  }
+
+  void seek(Microseconds t) {
+    row_ = first_row(dataset_.rows(), [&](std::uint64_t row) {
+      return dataset_.read(row, 1, numbers_) && numbers_[0] < t;
+    });
+  }
+
+ private:
+  explicit Hdf5Triggers(hid_t file) : dataset_(file, "EXT_TRIGGER/events") {
+    if (dataset_.rank() != 1)
+      throw UnsupportedFormat("HDF5 dataset /EXT_TRIGGER/events must hold rows");
+    const std::string members[] = {"t", "p", "id"};
+    dataset_.choose(members);
+    dataset_.require_filters();
+  }
+
+  Hdf5Dataset dataset_;
+  std::uint64_t row_ = 0;
+  std::vector<std::int64_t> numbers_;  ///< t, p and id of each row
+};
 
 Hdf5Reader::Hdf5Reader(std::unique_ptr<ByteSource> bytes, const Hdf5Selection& selection)
     : Hdf5Reader(

@@ -11,6 +11,7 @@
 #include "src/core/sensor_size.hpp"
 #include "src/formats/byte_source.hpp"
 #include "src/formats/corruption.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/event_table.hpp"
 #include "src/formats/hdf5/hdf5_format.hpp"
 
@@ -76,5 +77,9 @@ class Hdf5Reader {
   std::size_t returned_ = 0;
   std::optional<Microseconds> not_before_;  ///< time of a seek, until its first event is found
 };
+
+/// Creates a decoder for HDF5 files. A pushed file is collected in memory, up to 256 MiB, and read
+/// at its end, because HDF5 needs random access.
+std::unique_ptr<Decoder> make_hdf5_decoder(Hdf5Selection selection = {});
 
 }  // namespace eventcamera

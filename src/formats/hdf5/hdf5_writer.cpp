@@ -8,7 +8,6 @@
 
 #include "src/core/max_side.hpp"
 #include "src/formats/hdf5/ecf.hpp"
-#include "src/formats/hdf5/growing_dataset.hpp"
 #include "src/formats/hdf5/hdf5_file.hpp"
 #include "src/formats/hdf5/hdf5_layout.hpp"
 
@@ -23,8 +22,8 @@ struct Hdf5Writer::File {
 
 namespace {
 
-/// A commit follows a tenth more events, or this many. A crash or a full disk loses at most the
-/// events of two commits, since the last one may be incomplete.
+/// A commit starts after a tenth more events, or this many. A crash or a full disk loses at most
+/// the events of two commits, since the last one may be incomplete.
 constexpr std::size_t new_share = 10;
 constexpr std::size_t max_uncommitted = std::size_t{1} << 20;
 

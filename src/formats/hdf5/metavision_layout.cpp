@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "src/formats/hdf5/ecf.hpp"
-#include "src/formats/hdf5/growing_dataset.hpp"
 #include "src/formats/hdf5/hdf5_layout.hpp"
 
 namespace eventcamera {

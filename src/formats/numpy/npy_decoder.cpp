@@ -300,7 +300,7 @@ void NpyDecoder::decode_tail(ByteSource& source, Decoded& out) const {
   tail.decode(bytes, out);
 }
 
-/// Records that the row which `rows_to_read` rows end is not an event.
+/// Records that the row before the last `rows_to_read` rows is not an event.
 void NpyDecoder::note_unreadable(std::uint64_t rows_to_read) {
   corruption_.note(position_, "number out of range");
   rows_.add("row " + std::to_string(rows_.rows() - rows_to_read) +

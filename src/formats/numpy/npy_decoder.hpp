@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "src/formats/decoder.hpp"
-#include "src/formats/event_decoder.hpp"
 #include "src/formats/event_table.hpp"
 #include "src/formats/numpy/npy_header.hpp"
 

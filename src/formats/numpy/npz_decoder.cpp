@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "src/core/max_side.hpp"
-#include "src/formats/collected_bytes.hpp"
+#include "src/formats/byte_source.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/zip_archive.hpp"
 

@@ -8,10 +8,6 @@
 
 #include "src/formats/chunker.hpp"
 #include "src/formats/magic.hpp"
-#include "src/formats/ros/bag_magic.hpp"
-#include "src/formats/ros/db3_file.hpp"
-#include "src/formats/ros/mcap_file.hpp"
-#include "src/formats/ros/rosbag_file.hpp"
 
 namespace eventcamera {
 
@@ -27,15 +23,10 @@ struct Format {
   std::unique_ptr<BagFile> (*make)(BagFile::AddTopic add_topic);
 };
 
-template <class File>
-std::unique_ptr<BagFile> make_file(BagFile::AddTopic add_topic) {
-  return std::make_unique<File>(std::move(add_topic));
-}
-
 constexpr Format formats[] = {
-    {mcap_magic, "MCAP", make_file<McapFile>},
-    {rosbag_magic, "ROS bag 2.0", make_file<RosbagFile>},
-    {sqlite_magic, "ROS 2 bag with SQLite", make_file<Db3File>},
+    {mcap_magic, "MCAP", make_mcap_file},
+    {rosbag_magic, "ROS bag 2.0", make_rosbag_file},
+    {sqlite_magic, "ROS 2 bag with SQLite", make_db3_file},
 };
 
 /// Bytes that identify the format.

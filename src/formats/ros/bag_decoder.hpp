@@ -14,8 +14,8 @@
 
 namespace eventcamera {
 
-/// Reads events and images from a ROS bag: MCAP, ROS 1 version 2.0, or ROS 2 with SQLite, which
-/// its first bytes tell.
+/// Reads events and images from a ROS bag: MCAP, ROS 1 version 2.0, or ROS 2 with SQLite,
+/// recognised by its first bytes.
 ///
 /// Each topic that is read is a stream, named by StreamInfo::source. Times are the stamps of the
 /// messages' headers, not the times at which they were recorded.
@@ -50,7 +50,7 @@ class BagDecoder final : public Decoder {
 
   std::string wanted_;  ///< with a comma before and after each name; empty: not chosen
   std::string format_name_;
-  std::vector<std::uint8_t> start_;  ///< first bytes, until they tell the format
+  std::vector<std::uint8_t> start_;  ///< first bytes, until the format is known
   std::unique_ptr<BagFile> file_;    ///< null until then
   ByteSource* source_ = nullptr;     ///< set by open()
   std::vector<StreamInfo> streams_;
@@ -64,7 +64,7 @@ class BagDecoder final : public Decoder {
   Microseconds logged_ = 0;              ///< time of its recording
   std::optional<Microseconds> delay_;    ///< from the time of a message to its recording
   bool finished_ = false;
-  bool last_time_due_ = true;  ///< it was not searched for yet
+  bool last_time_due_ = true;  ///< last_time_ was not determined yet
   std::optional<Microseconds> last_time_;
 };
 

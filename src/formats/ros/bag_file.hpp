@@ -5,18 +5,27 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "src/core/event.hpp"
 #include "src/formats/byte_source.hpp"
 #include "src/formats/corruption.hpp"
-#include "src/formats/ros/message_cursor.hpp"
-#include "src/formats/seek_points.hpp"
+#include "src/formats/decoder.hpp"
 
 namespace eventcamera {
+
+/// How messages of a topic are serialized.
+///
+/// ros1: fields without padding (wiki.ros.org/msg,
+/// wiki.ros.org/roscpp/Overview/MessagesSerialization). cdr: XCDR1 of OMG's DDS-XTypes 1.3,
+/// section 7.4, little-endian, after an encapsulation header of four bytes, from which alignment
+/// counts.
+enum class RosSerialization : std::uint8_t { ros1, cdr };
 
 /// A topic of a bag.
 struct BagTopic {
@@ -90,6 +99,16 @@ class BagFile {
  private:
   AddTopic add_topic_;
 };
+
+/// Reads MCAP files, with and without chunks, summary and index.
+std::unique_ptr<BagFile> make_mcap_file(BagFile::AddTopic add_topic);
+
+/// Reads ROS 1 bags, version 2.0: wiki.ros.org/Bags/Format/2.0.
+std::unique_ptr<BagFile> make_rosbag_file(BagFile::AddTopic add_topic);
+
+/// Reads ROS 2 bags that are SQLite databases (github.com/ros2/rosbag2,
+/// rosbag2_storage_sqlite3): the tables topics and messages, whose rows are in order of recording.
+std::unique_ptr<BagFile> make_db3_file(BagFile::AddTopic add_topic);
 
 /// Name of a message type without the folder that ROS 2 adds: package/Type of package/msg/Type.
 inline std::string ros1_type(std::string type) {

@@ -56,8 +56,8 @@ bool ChunkedBagFile::read_magic() {
   return true;
 }
 
-/// Consumes the last record, and goes to the next one: record_ is its size, or 0 if there is
-/// something else first. False if more bytes are needed, or at the end.
+/// Consumes the last record and finds the next one: record_ is its size, or 0 if other bytes
+/// precede it. False if more bytes are needed, or at the end.
 bool ChunkedBagFile::next_record() {
   queue_.consume(std::exchange(record_, 0));
   if (ended_) skip_ = queue_.size();
@@ -98,7 +98,7 @@ bool ChunkedBagFile::next_record() {
   return true;
 }
 
-/// False if more are to be skipped than there are.
+/// False if more bytes are needed.
 bool ChunkedBagFile::skip_bytes() {
   const auto count = std::min<std::uint64_t>(skip_, queue_.size());
   queue_.consume(static_cast<std::size_t>(count));
@@ -110,7 +110,7 @@ bool ChunkedBagFile::skip_bytes() {
   return skip_ == 0;
 }
 
-/// False if there is none so far.
+/// Searches for the next record. False if there is none so far.
 bool ChunkedBagFile::scan() {
   while (true) {
     const auto bytes = queue_.peek(scanned_bytes_);
@@ -135,7 +135,7 @@ void ChunkedBagFile::corrupt(const char* what) {
   scanning_ = true;
 }
 
-/// Goes to the next record in the chunk after bytes that are none. False if there is none.
+/// Skips invalid bytes up to the next record in the chunk. False if there is none.
 bool ChunkedBagFile::find_record_in_chunk() {
   do chunk_ = chunk_->subspan(1);
   while (chunk_->size() >= scanned_bytes_ && !begins_record(*chunk_));

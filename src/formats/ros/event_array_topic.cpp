@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <algorithm>
 
-#include "src/formats/ros/topics.hpp"
+#include "src/formats/ros/topic_decoder.hpp"
 #include "src/formats/sensor_sizes.hpp"
 
 namespace eventcamera {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "src/formats/evt/words.hpp"
-#include "src/formats/ros/topics.hpp"
+#include "src/formats/ros/topic_decoder.hpp"
 #include "src/formats/sensor_sizes.hpp"
 
 namespace eventcamera {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "src/core/max_side.hpp"
-#include "src/formats/ros/topics.hpp"
+#include "src/formats/ros/topic_decoder.hpp"
 
 namespace eventcamera {
 

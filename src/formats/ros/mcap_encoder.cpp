@@ -15,7 +15,7 @@
 #include "src/formats/compression/compressed_frames.hpp"
 #include "src/formats/evt/evt3_words.hpp"
 #include "src/formats/evt/words.hpp"
-#include "src/formats/ros/bag_magic.hpp"
+#include "src/formats/magic.hpp"
 #include "src/formats/ros/mcap_records.hpp"
 
 namespace eventcamera {

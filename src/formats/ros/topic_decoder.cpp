@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/formats/ros/topic_decoder.hpp"
 
-#include <string_view>
 #include <utility>
 
 #include "src/core/max_side.hpp"
-#include "src/formats/ros/topics.hpp"
 
 namespace eventcamera {
 

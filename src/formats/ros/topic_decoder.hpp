@@ -4,13 +4,81 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
+#include <string_view>
 
+#include "src/core/event.hpp"
 #include "src/core/sensor_size.hpp"
+#include "src/formats/byte_cursor.hpp"
 #include "src/formats/corruption.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/ros/bag_file.hpp"
 
 namespace eventcamera {
+
+/// Reads the fields of a serialized message. Past the end everything is 0 or empty.
+class MessageCursor {
+ public:
+  MessageCursor(std::span<const std::uint8_t> message, RosSerialization serialization)
+      : MessageCursor(ByteCursor(message), serialization) {}
+
+  bool failed() const { return failed_ || fields_.failed(); }
+
+  template <class Number>
+  Number number() {
+    if (is_cdr_) fields_.align(sizeof(Number));
+    return fields_.number<Number>();
+  }
+
+  bool boolean() { return number<std::uint8_t>() != 0; }
+
+  /// Reads 32-bit seconds and nanoseconds; returns nanoseconds.
+  std::uint64_t time() {
+    const std::uint64_t seconds = number<std::uint32_t>();
+    return seconds * 1'000'000'000 + number<std::uint32_t>();
+  }
+
+  /// In CDR, its size includes a final zero.
+  std::string_view text() {
+    if (is_cdr_) fields_.align(sizeof(std::uint32_t));
+    auto text = fields_.text();
+    if (is_cdr_ && text.ends_with('\0')) text.remove_suffix(1);
+    return text;
+  }
+
+  std::span<const std::uint8_t> bytes() {
+    if (is_cdr_) fields_.align(sizeof(std::uint32_t));
+    return fields_.sized_bytes<std::uint32_t>();
+  }
+
+  /// Time of a std_msgs/Header, in nanoseconds.
+  std::uint64_t header_stamp() {
+    if (!is_cdr_) number<std::uint32_t>();  // its number
+    const auto stamp = time();
+    text();  // its frame
+    return stamp;
+  }
+
+  std::span<const std::uint8_t> rest() const { return fields_.rest(); }
+
+ private:
+  MessageCursor(ByteCursor message, RosSerialization serialization)
+      : is_cdr_(serialization == RosSerialization::cdr),
+        failed_(is_cdr_ && !skip_encapsulation(message)),
+        fields_(message.rest()) {}
+
+  /// False unless little-endian XCDR1 follows.
+  static bool skip_encapsulation(ByteCursor& message) {
+    constexpr std::uint16_t little_endian_cdr = 0x0100;
+    const auto scheme = message.number<std::uint16_t>();
+    message.number<std::uint16_t>();  // options
+    return !message.failed() && scheme == little_endian_cdr;
+  }
+
+  bool is_cdr_;
+  bool failed_;
+  ByteCursor fields_;
+};
 
 /// Decodes the messages of one topic. Times are ROS times: the stamps of the headers.
 class TopicDecoder {
@@ -62,5 +130,16 @@ StreamKind kind_of_messages(const BagTopic& topic);
 
 /// Creates the decoder for a topic with events or frames. `corruption` must outlive it.
 std::unique_ptr<TopicDecoder> make_topic_decoder(const BagTopic& topic, Corruption& corruption);
+
+/// event_camera_msgs/EventPacket, formerly event_array_msgs/EventArray: encoded events.
+std::unique_ptr<TopicDecoder> make_event_packet_decoder(const BagTopic& topic,
+                                                        Corruption& corruption);
+
+/// dvs_msgs/EventArray, and prophesee_event_msgs/EventArray, which is the same: a list of events.
+std::unique_ptr<TopicDecoder> make_event_array_decoder(const BagTopic& topic,
+                                                       Corruption& corruption);
+
+/// sensor_msgs/Image.
+std::unique_ptr<TopicDecoder> make_image_decoder(const BagTopic& topic, Corruption& corruption);
 
 }  // namespace eventcamera

@@ -155,8 +155,8 @@ std::size_t CsvDecoder::append_head(std::string_view text) {
   return count;
 }
 
-/// Returns the fields of a line, without their quotes; none if there are too many. An empty last
-/// one is ignored: some programs end lines with a separator.
+/// Splits a line into fields without quotes, and returns their number; 0 if there are too many. An
+/// empty last field is ignored: some programs end lines with a separator.
 std::size_t CsvDecoder::split(std::string_view line, bool are_names, Fields& fields) {
   std::size_t count = 0;
   line = trimmed(line);
@@ -182,7 +182,7 @@ std::size_t CsvDecoder::split(std::string_view line, bool are_names, Fields& fie
   return count;
 }
 
-/// Finds out what commas in numbers are. Throws UnsupportedFormat if they do not tell.
+/// Detects the meaning of commas in numbers. Throws UnsupportedFormat if it is ambiguous.
 void CsvDecoder::find_commas(const std::vector<std::vector<std::string_view>>& rows) {
   bool is_decimal = false;
   bool is_grouping = false;
@@ -344,7 +344,7 @@ bool CsvDecoder::are_all_named() const {
          }) >= static_cast<std::ptrdiff_t>(event_columns);
 }
 
-/// Takes the names of columns from a comment, such as "# t [s] x y p" or "# columns: x, y, p, t".
+/// Reads the names of columns from a comment, such as "# t [s] x y p" or "# columns: x, y, p, t".
 void CsvDecoder::read_names_in_comment(std::string_view line) {
   const auto begin = line.find_first_not_of("#% \t");
   if (begin == std::string_view::npos || line.size() > max_line) return;

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "src/formats/decoder.hpp"
-#include "src/formats/event_decoder.hpp"
 #include "src/formats/event_table.hpp"
 #include "src/formats/table_sample.hpp"
 #include "src/formats/text/decimal.hpp"

@@ -35,7 +35,7 @@ class Utf8Text {
     return converted;
   }
 
-  /// The only byte of a text of one.
+  /// The text, if it has only one byte.
   std::string_view rest() const { return start_; }
 
  private:

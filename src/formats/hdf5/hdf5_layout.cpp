@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/hdf5/growing_dataset.hpp"
+#include "src/formats/hdf5/hdf5_layout.hpp"
 
 #include <stdexcept>
 

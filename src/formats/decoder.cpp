@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/event_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 #include <algorithm>
 #include <utility>
