@@ -6,8 +6,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -149,9 +151,31 @@ int next_port() {
   return port += 10;
 }
 
+/// Drops every 50th packet that leaves the element `loss`, but not the first few and the last.
+void drop_every_50th(const Pipeline& pipeline, std::atomic<int>& dropped) {
+  GstPad* pad = gst_element_get_static_pad(pipeline["loss"], "src");
+  struct Loss {
+    std::atomic<int>& dropped;
+    int count = 0;
+  };
+  gst_pad_add_probe(
+      pad, GST_PAD_PROBE_TYPE_BUFFER,
+      [](GstPad*, GstPadProbeInfo*, gpointer data) {
+        auto& loss = *static_cast<Loss*>(data);
+        if (++loss.count % 50 != 0 || loss.count > buffers) return GST_PAD_PROBE_OK;
+        ++loss.dropped;
+        return GST_PAD_PROBE_DROP;
+      },
+      new Loss{dropped}, [](gpointer data) { delete static_cast<Loss*>(data); });
+  gst_object_unref(pad);
+}
+
 /// Everything arrives through a pipeline that starts with rtpeventpay's packets.
-void expect_everything(const std::string& way) {
+void expect_everything(
+    const std::string& way,
+    const std::function<void(const Pipeline&)>& prepare = [](const Pipeline&) {}) {
   Pipeline pipeline(source + " ! rtpeventpay name=pay ! " + way + " ! " + sink);
+  prepare(pipeline);
   Receiver receiver(pipeline);
   pipeline.set(GST_STATE_PLAYING);
   Sender(pipeline).send_all();
@@ -217,6 +241,115 @@ void count_buffers(GstElement* element, const char* name, std::atomic<guint64>& 
       },
       &count, nullptr);
   gst_object_unref(pad);
+}
+
+TEST(Rtp, ARestartedSrtpSenderIsHeardByItsNewSsrc) {
+  const auto port = std::to_string(next_port());
+  Pipeline receiving("udpsrc port=" + port + " caps=\"application/x-srtp," + rtp_fields +
+                     "\" ! srtpdec name=decrypt ! " + sink);
+  g_signal_connect(receiving["decrypt"], "request-key",
+                   G_CALLBACK(+[](GstElement*, guint, gpointer) {
+                     return gst_caps_from_string(srtp_caps(key).c_str());
+                   }),
+                   nullptr);
+  Receiver receiver(receiving);
+  receiving.set(GST_STATE_PLAYING);
+  for (std::size_t starts = 1; starts <= 3; ++starts) {
+    Pipeline sending(source + " ! rtpeventpay name=pay ! srtpenc key=" + key +
+                     " ! udpsink host=127.0.0.1 port=" + port);
+    sending.set(GST_STATE_PLAYING);
+    Sender(sending).send(0, 10);
+    const auto sent = starts * 10 * events_per_buffer;
+    wait_until([&] { return receiver.events().size() == sent; });
+    EXPECT_EQ(receiver.events().size(), sent);
+  }
+}
+
+/// Answers `signal` of an rtpbin with an element for session 0.
+void add_retransmission(const Pipeline& pipeline, const char* rtpbin, const char* signal,
+                        const char* element) {
+  g_signal_connect(
+      pipeline[rtpbin], signal, G_CALLBACK(+[](GstElement*, guint, gpointer name) {
+        GstElement* bin = gst_bin_new(nullptr);
+        GstElement* rtx = gst_element_factory_make(static_cast<const char*>(name), nullptr);
+        GstStructure* map =
+            gst_structure_new("application/x-rtp-pt-map", "96", G_TYPE_UINT, 97U, nullptr);
+        g_object_set(rtx, "payload-type-map", map, nullptr);
+        if (g_strcmp0(static_cast<const char*>(name), "rtprtxsend") == 0)
+          g_object_set(rtx, "max-size-packets", 1000U, nullptr);
+        gst_structure_free(map);
+        gst_bin_add(GST_BIN(bin), rtx);
+        for (const auto* pad_name : {"sink", "src"}) {
+          GstPad* pad = gst_element_get_static_pad(rtx, pad_name);
+          gst_element_add_pad(bin, gst_ghost_pad_new((std::string(pad_name) + "_0").c_str(), pad));
+          gst_object_unref(pad);
+        }
+        return bin;
+      }),
+      const_cast<char*>(element));
+}
+
+TEST(Rtp, RetransmissionLosesNothing) {
+  const int port = next_port();
+  const auto [rtp, rtcp, feedback] =
+      std::array{std::to_string(port), std::to_string(port + 1), std::to_string(port + 2)};
+  // The latency bears a loaded machine: packets leave the jitter buffer as soon as none is missing.
+  const std::string bin = "rtpbin rtp-profile=avpf do-retransmission=true latency=20000 name=";
+  Pipeline receiving(bin + "r  udpsrc name=rtp port=" + rtp + " " + from_caps +
+                     "  udpsrc port=" + rtcp +
+                     " ! r.recv_rtcp_sink_0  r.send_rtcp_src_0 ! udpsink host=127.0.0.1 "
+                     "sync=false async=false port=" +
+                     feedback + "  r. ! " + sink);
+  g_signal_connect(
+      receiving["r"], "request-pt-map", G_CALLBACK(+[](GstElement*, guint, guint type, gpointer) {
+        const auto caps = type == 96 ? "application/x-rtp," + rtp_fields
+                                     : std::string(
+                                           "application/x-rtp,media=application,payload=97,"
+                                           "clock-rate=1000000,encoding-name=RTX,apt=96");
+        return gst_caps_from_string(caps.c_str());
+      }),
+      nullptr);
+  g_signal_connect(receiving["r"], "new-jitterbuffer",
+                   G_CALLBACK(+[](GstElement*, GstElement* buffer, guint, guint, gpointer) {
+                     g_object_set(buffer, "faststart-min-packets", 1, nullptr);
+                   }),
+                   nullptr);
+  // rtpbin asks for these when its pads are requested.
+  add_retransmission(receiving, "r", "request-aux-receiver", "rtprtxreceive");
+  gst_element_link_pads(receiving["rtp"], "src", receiving["r"], "recv_rtp_sink_0");
+  Receiver receiver(receiving);
+  Pipeline sending(
+      bin + "s  " + source +
+      " ! rtpeventpay name=pay  identity name=loss ! udpsink host=127.0.0.1 port=" + rtp +
+      "  s.send_rtcp_src_0 ! udpsink host=127.0.0.1 sync=false async=false port=" + rtcp +
+      "  udpsrc port=" + feedback + " ! s.recv_rtcp_sink_0");
+  add_retransmission(sending, "s", "request-aux-sender", "rtprtxsend");
+  gst_element_link_pads(sending["pay"], "src", sending["s"], "send_rtp_sink_0");
+  gst_element_link_pads(sending["s"], "send_rtp_src_0", sending["loss"], "sink");
+  std::atomic<int> dropped = 0;
+  drop_every_50th(sending, dropped);
+  receiving.set(GST_STATE_PLAYING);
+  sending.set(GST_STATE_PLAYING);
+  Sender(sending).send(0, buffers, receiver);
+  EXPECT_EQ(dropped, 2);
+  EXPECT_EQ(receiver.events(), sent_events());
+  EXPECT_EQ(receiving.stat("depay", "lost-events"), 0U);
+}
+
+TEST(Rtp, ForwardErrorCorrectionLosesNothing) {
+  std::atomic<int> dropped = 0;
+  expect_everything(
+      "rtpulpfecenc pt=122 percentage=100 multipacket=true ! identity name=loss ! "
+      "rtpstorage name=storage size-time=20000000000 ! rtpjitterbuffer do-lost=true latency=2000 ! "
+      "rtpulpfecdec name=fec pt=122",
+      [&](const Pipeline& pipeline) {
+        drop_every_50th(pipeline, dropped);
+        GObject* storage = nullptr;
+        g_object_get(pipeline["storage"], "internal-storage", &storage, nullptr);
+        g_object_set(pipeline["fec"], "storage", storage, nullptr);
+        g_object_unref(storage);
+      });
+  EXPECT_EQ(dropped, 2);
 }
 
 TEST(Rtp, ArrivesOverSrt) {
