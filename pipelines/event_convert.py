@@ -219,7 +219,8 @@ class Pictures:
             self._sheet().save(path, "PNG")
             return
         first, *others = (picture.quantize(256, dither=self._image.Dither.NONE) for picture in self._kept)
-        first.save(path, "GIF", save_all=True, append_images=others, duration=40, loop=0)
+        first.save(path, "GIF", save_all=True, append_images=others,
+                   duration=1000 // FILMS[".gif"][0], loop=0)
 
     def _sheet(self):
         """The pictures in the middle of as many parts of equal length."""
@@ -536,8 +537,8 @@ def writer_of(path):
     if not writer:
         if reader := with_extension_of(readers(), path):
             raise Misuse(f"{reader.extension} files can only be read")
-        known = " ".join([element.extension for element in writers()] + list(FILMS))
-        raise Misuse(f"{path}: unknown extension; known are {known}")
+        known = " ".join(element.extension for element in writers())
+        raise Misuse(f"{path}: unknown extension; {' '.join(FILMS)} are drawn, and for events known are {known}")
     return writer
 
 

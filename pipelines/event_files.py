@@ -156,6 +156,7 @@ class Interrupt:
 
     def __init__(self):
         self._numbers = []
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # no traceback where `head` has read enough
         # A terminal that closes sends SIGHUP, and then its shell does. nohup ignores both.
         for number in signal.SIGINT, signal.SIGTERM, signal.SIGHUP:
             if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:

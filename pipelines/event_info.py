@@ -107,7 +107,7 @@ def read(path, progress, interrupt):
     length = duration / 1e9 if known else ((counts.last or 0) - (counts.first or 0)) / 1e6
     number = {name: stats.get_uint64(name)[1] for name in ("triggers", "frames", "imu-samples", *DAMAGE)}
     height, width = counts.pixels.shape
-    content = caps.get_structure(0).get_name() if caps else reader.extension
+    content = caps.get_structure(0).get_name().removeprefix("application/x-") if caps else reader.extension
     hot = counts.hot_pixels(length)
     return counts, {
         "path": path,

@@ -21,7 +21,6 @@
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/named_file.hpp"
-#include "pipelines/plugin.h"
 #include "src/render/thumbnail.hpp"
 
 namespace {
@@ -191,6 +190,19 @@ std::optional<std::string> parse(Options& options, int& argc, char**& argv) {
   return std::nullopt;
 }
 
+/// Returns false, and prints what to do, if GStreamer lacks the plugin eventcam.
+bool has_plugin() {
+  const Owned<GstObject> plugin(
+      GST_OBJECT(gst_registry_find_plugin(gst_registry_get(), "eventcam")));
+  if (!plugin)
+    std::fputs(
+        "GStreamer does not find the plugin eventcam. In a checkout, enter the development shell: "
+        "meson devenv -C build -w .\nOtherwise install it: the Debian package "
+        "gstreamer1.0-eventcam, or as root: meson install -C build\n",
+        stderr);
+  return plugin != nullptr;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -204,7 +216,7 @@ int main(int argc, char** argv) {
     std::printf("event-thumbnail %s\n", PACKAGE_VERSION);
     return 0;
   }
-  if (!find_plugin()) return 1;
+  if (!has_plugin()) return 1;
   const char* in = options.files[0];
   const char* out = options.files[1];
   if (std::error_code none; std::filesystem::equivalent(in, out, none)) {

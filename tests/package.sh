@@ -119,6 +119,7 @@ source /tmp/pages/scratch_folder.sh
 source /tmp/pages/run_lines.sh
 mkdir -p pipelines/examples
 ln -s /usr/share/doc/{gir1.2-gsteventcamera-1.0,python3-gst-eventcamera}/examples/* pipelines/examples/
+eval "gst-launch-1.0 -q $ball ! x264enc ! mp4mux ! filesink location=drive.mp4"
 run_lines /tmp/pages/README.md /tmp/pages/api.md /tmp/pages/network.md
 for file in ball.npz out.raw out.h5 events.npy; do
   [ -s $file ] || fail "$file is missing or empty"

@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Labels of simulated events on their way: from eventsim-dvs to measures and files.
 #include <array>
-#include <numeric>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "src/core/label.hpp"
 #include "tests/elements/pipeline.hpp"
 
 namespace {
 
 using namespace harness;
-using eventcamera::Cause;
 
 const std::string noisy =
     "eventsim-dvs preset=davis346 shot-noise-rate=20 leak-rate=5 hot-pixels=0.01 "
@@ -91,90 +89,6 @@ TEST(Labels, AreCountedByEventstats) {
       EXPECT_EQ(count, expected.at(i)) << names[i];
     }
   }
-}
-
-/// Drops every third event of each buffer, and its label.
-GstPadProbeReturn drop_some(GstPad*, GstPadProbeInfo* info, gpointer) {
-  auto* buffer = gst_buffer_make_writable(GST_PAD_PROBE_INFO_BUFFER(info));
-  GST_PAD_PROBE_INFO_DATA(info) = buffer;
-  auto* meta = gst_buffer_get_event_camera_label_meta(buffer);
-  auto events = events_of(buffer);
-  const auto* const labels = reinterpret_cast<eventcamera::Label*>(meta->labels);
-  const eventcamera::LabelledEvents all{
-      {reinterpret_cast<eventcamera::Event*>(events.data()), events.size()},
-      {const_cast<eventcamera::Label*>(labels), meta->n_labels}};
-  int i = 0;
-  const auto kept = all.keep_if([&](const eventcamera::Event&) { return i++ % 3 != 0; });
-  gst_event_camera_label_meta_truncate(meta, kept.events.size());
-  gst_buffer_remove_all_memory(buffer);
-  const auto size = kept.events.size_bytes();
-  gst_buffer_append_memory(buffer, gst_allocator_alloc(nullptr, size, nullptr));
-  gst_buffer_fill(buffer, 0, kept.events.data(), size);
-  return GST_PAD_PROBE_OK;
-}
-
-/// Adds the labels that pass.
-GstPadProbeReturn count_labels(GstPad*, GstPadProbeInfo* info, gpointer sum) {
-  std::vector<Buffer> one;
-  one.emplace_back(gst_buffer_ref(GST_PAD_PROBE_INFO_BUFFER(info)));
-  const auto counts = counts_of(one);
-  auto& sums = *static_cast<Counts*>(sum);
-  for (std::size_t i = 0; i < counts.size(); ++i) sums.at(i) += counts.at(i);
-  return GST_PAD_PROBE_OK;
-}
-
-void add_probe(GstElement* element, const char* name, GstPadProbeCallback probe, gpointer data) {
-  GstPad* pad = gst_element_get_static_pad(element, name);
-  gst_pad_add_probe(pad, GST_PAD_PROBE_TYPE_BUFFER, probe, data, nullptr);
-  gst_object_unref(pad);
-}
-
-TEST(Labels, TellEventcompareHowWellAFilterClassifies) {
-  Pipeline pipeline(
-      "eventcompare name=compare ! fakesink name=out  "
-      "videotestsrc pattern=ball num-buffers=20 ! video/x-raw,width=64,height=48 ! " +
-      noisy +
-      "label=true name=dvs ! tee name=t  t. ! queue ! compare.reference  "
-      "t. ! queue ! identity name=filter ! compare.candidate");
-  Counts before{};
-  Counts after{};
-  add_probe(pipeline["dvs"], "src", count_labels, &before);
-  add_probe(pipeline["filter"], "src", drop_some, nullptr);
-  add_probe(pipeline["out"], "sink", count_labels, &after);
-  Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
-  pipeline.set(GST_STATE_PLAYING);
-  const Owned<GstMessage> message(gst_bus_timed_pop_filtered(
-      bus.get(), 60 * GST_SECOND,
-      static_cast<GstMessageType>(GST_MESSAGE_ELEMENT | GST_MESSAGE_ERROR)));
-  ASSERT_TRUE(message);
-  ASSERT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_ELEMENT) << text_of(message.get());
-  const auto* figures = gst_message_get_structure(message.get());
-  const GValue* value = gst_structure_get_value(figures, "classification");
-  ASSERT_NE(value, nullptr);
-  const auto* found = gst_value_get_structure(value);
-  const auto all_but_light = [](const Counts& counts) {
-    return std::accumulate(counts.begin() + 2, counts.end(), guint64{0});
-  };
-  const auto count = [&](const char* name) {
-    guint64 number = 0;
-    EXPECT_TRUE(gst_structure_get_uint64(found, name, &number)) << name;
-    return number;
-  };
-  const auto rate = [&](const char* name) {
-    double number = 0;
-    EXPECT_TRUE(gst_structure_get_double(found, name, &number)) << name;
-    return number;
-  };
-  ASSERT_GT(after[1], 0U);
-  EXPECT_LT(after[1], before[1]);
-  EXPECT_EQ(count("true-positives"), after[1]);
-  EXPECT_EQ(count("false-positives"), all_but_light(after));
-  EXPECT_EQ(count("false-negatives"), before[1] - after[1]);
-  EXPECT_EQ(count("true-negatives"), all_but_light(before) - all_but_light(after));
-  EXPECT_NEAR(rate("true-positive-rate"), 2 / 3.0, 0.1);
-  EXPECT_NEAR(rate("false-positive-rate"), 2 / 3.0, 0.1);
-  EXPECT_DOUBLE_EQ(rate("precision"), static_cast<double>(after[1]) /
-                                          static_cast<double>(after[1] + all_but_light(after)));
 }
 
 /// The bytes that follow a text.

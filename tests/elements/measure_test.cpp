@@ -543,13 +543,46 @@ TEST_F(CompareTest, PassesTheCustomEventsOfTheCandidateOn) {
                                       "of-candidate", "buffer", "eos"}));
 }
 
+/// A buffer with an event of each of these causes.
+GstBuffer* caused_by(const std::vector<guint8>& causes) {
+  std::vector<Event> events;
+  std::vector<GstEventCameraLabel> labels;
+  for (const auto cause : causes) {
+    events.push_back(Event::at(static_cast<int>(events.size()), 1, 5, Polarity::on));
+    labels.push_back({.object_class = 0, .cause = cause, .reserved = 0});
+  }
+  GstBuffer* const buffer = buffer_of(0, events, 10 * ms);
+  gst_buffer_add_event_camera_label_meta(buffer, labels.data(), labels.size());
+  return buffer;
+}
+
+TEST_F(CompareTest, ClassifiesTheEventsThatAreLeft) {
+  make();
+  begin();
+  constexpr guint8 light = GST_EVENT_CAMERA_CAUSE_LIGHT;
+  constexpr guint8 leak = GST_EVENT_CAMERA_CAUSE_LEAK;
+  gst_harness_push(reference, caused_by({light, light, light, leak, leak, leak, leak}));
+  gst_harness_push(candidate, caused_by({light, light, leak}));
+  end(reference);
+  end(candidate);
+  const auto* figures = conclude();
+  ASSERT_TRUE(figures);
+  const auto* classification = within(figures, "classification");
+  ASSERT_TRUE(classification);
+  for (const auto& [name, count] : {std::pair("true-positives", 2U),
+                                    {"false-positives", 1U},
+                                    {"false-negatives", 1U},
+                                    {"true-negatives", 3U}})
+    EXPECT_EQ(count_in(classification, name), count) << name;
+  EXPECT_DOUBLE_EQ(number_in(classification, "true-positive-rate"), 2 / 3.0);
+  EXPECT_DOUBLE_EQ(number_in(classification, "false-positive-rate"), 1 / 4.0);
+  EXPECT_DOUBLE_EQ(number_in(classification, "precision"), 2 / 3.0);
+}
+
 TEST_F(CompareTest, ClassifiesWhereNoEventIsLeft) {
   make();
   begin();
-  GstBuffer* noise = buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms);
-  const GstEventCameraLabel label{.object_class = 0, .cause = 3, .reserved = 0};
-  gst_buffer_add_event_camera_label_meta(noise, &label, 1);
-  gst_harness_push(reference, noise);
+  gst_harness_push(reference, caused_by({GST_EVENT_CAMERA_CAUSE_LEAK}));
   gst_harness_push_event(candidate, gst_event_new_gap(0, 10 * ms));
   end(reference);
   end(candidate);

@@ -52,7 +52,7 @@ TEST_P(EveryRecording, IsReadAndSoughtInWhereItIsCompressed) {
   const Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   for (const auto compress : {eventcamera::compressed::gzip, eventcamera::compressed::zstd}) {
     const TemporaryFile compressed(compress(bytes));
-    for (const std::string way : {"", "queue ! "}) {
+    for (const std::string way : {"", "queue ! ", "identity ! "}) {
       SCOPED_TRACE(way);
       Player player(compressed.source() + way +
                     "decodebin caps=\"application/x-event-camera,format=XYTP\" "

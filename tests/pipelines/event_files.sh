@@ -65,7 +65,7 @@ done
 gst-typefind-1.0 n-mnist.bin | grep -q " - application/x-atis-bin" || fail "n-mnist.bin is not recognised"
 
 # A file of MATLAB, by the line of the documentation.
-eval "$(grep "^python3 .*loadmat" "$SOURCE/docs/formats.md" | sed 's#^#/usr/bin/#')"
+eval "$(grep "^/usr/bin/python3 .*loadmat" "$SOURCE/docs/formats.md")"
 convert n-mnist.npz matlab.csv
 cmp n-mnist.bin.lines matlab.csv || fail "n-mnist.mat has other events"
 
@@ -523,6 +523,8 @@ refused "only to reading files that may lack" --width 5 --height 5 scene.mp4 out
 # What is in a file.
 timeout 60 "$BUILD/pipelines/event-info" --json ball.raw framed.aedat4 short.raw >info.json
 timeout 60 "$BUILD/pipelines/event-info" framed.aedat4 --plot rate.png | tee info
+timeout 60 "$BUILD/pipelines/event-info" ball.raw 2>errors | true
+[ ! -s errors ] || fail "a pipe that closes: $(cat errors)"
 grep -q "^  events  *[0-9,]*, [0-9.]* % ON" info || fail "the number of events is not told"
 /usr/bin/python3 - <<'PYTHON'
 import json

@@ -133,7 +133,7 @@ for element in evtenc eventstats eventrender; do
   # gst-launch-1.0 prints only the error of a pipeline that fails while it starts; the log has the warning.
   GST_DEBUG=GST_ERROR_SYSTEM:4 refused 'caps="application/x-event-camera,format=XYTP"' filesrc location=candidate.raw ! queue ! decodebin ! $element ! fakesink
 done
-refused "Insert eventrender before elements that take video" filesrc location=out.raw ! evtdec ! videoconvert ! fakesink
+refused "Insert eventrender before elements that take video" filesrc location=candidate.raw ! evtdec ! videoconvert ! fakesink
 refused "preset=davis999: choose one of standard, ideal, " videotestsrc ! eventsim-dvs preset=davis999 ! fakesink
 refused "EVT words support sensors of 1x1 to 2048x2048 pixels" videotestsrc num-buffers=3 ! video/x-raw,width=2049,height=16 ! eventsim-frame ! evtenc ! fakesink
 launch videotestsrc num-buffers=3 ! video/x-raw,width=2049,height=16 ! videoscale ! eventsim-frame ! evtenc ! fakesink
