@@ -3,7 +3,6 @@
 #include <string>
 #include <vector>
 
-#include "src/core/label.hpp"
 #include "tests/elements/pipeline.hpp"
 
 namespace {
@@ -157,32 +156,50 @@ TEST_P(EventCutCase, HasTheseWindows) {
   EXPECT_EQ(cut.h.warning().starts_with("There are no windows"), windows.empty());
 }
 
-/// What begins a window before it, and whether its events are dropped.
 TEST(EventCut, StartsOverWhereTheStreamDoes) {
-  const auto go_on = [](Cut&) {};
-  const auto change = [](Cut& cut) {
-    gst_harness_set_src_caps_str(cut.h.get(),
-                                 "application/x-event-camera, format=XYTP, width=9, height=4");
+  struct Break {
+    std::function<void(Cut&)> happen;
+    bool starts_over;
   };
-  const auto breaks = std::vector<std::pair<std::function<void(Cut&)>, bool>>{
-      {go_on, false},
+  const std::vector<Break> breaks{
+      {[](Cut&) {}, false},
       {[](Cut& cut) { push_segment(cut.h.get()); }, false},
-      {[](Cut& cut) { flush({cut.h.get()}), push_segment(cut.h.get()); }, true},
+      {[](Cut& cut) {
+         flush({cut.h.get()});
+         push_segment(cut.h.get());
+       },
+       true},
       {[](Cut& cut) { play_on(cut.h.get(), GST_SECOND); }, true},
       {[](Cut& cut) { end_segment(cut.h.get()); }, true},
-      {change, true}};
-  for (const auto& [happen, starts_over] : breaks) {
+      {[](Cut& cut) {
+         gst_harness_set_src_caps_str(cut.h.get(),
+                                      "application/x-event-camera, format=XYTP, width=9, height=4");
+       },
+       true}};
+  for (const auto& stream : breaks) {
     Cut cut;
-    cut.push_triggers({{1'000, 0, true}});
-    cut.push(0, {2'000});
-    happen(cut);
+    cut.push_triggers({{1'000, 0, true}, {3'000, 0, true}});
+    cut.push(0, {2'000, 4'000});
+    stream.happen(cut);
     cut.push_triggers({{12'000, 0, true}, {15'000, 0, true}});
     cut.push(10'000, {11'000, 13'000});
-    EXPECT_EQ(cut.windows(), starts_over
-                                 ? (Texts{"12000+3000: 1000 DISCONT"})
-                                 : (Texts{"1000+11000: 1000 10000 DISCONT", "12000+3000: 1000"}));
-    EXPECT_EQ(stat_of(cut.h.element(), "dropped-events"), starts_over ? 2U : 0U);
+    EXPECT_EQ(cut.windows(),
+              stream.starts_over
+                  ? (Texts{"1000+2000: 1000 DISCONT", "12000+3000: 1000 DISCONT"})
+                  : (Texts{"1000+2000: 1000 DISCONT", "3000+9000: 1000 8000", "12000+3000: 1000"}));
+    EXPECT_EQ(stat_of(cut.h.element(), "dropped-events"), stream.starts_over ? 2U : 0U);
   }
+}
+
+TEST(EventCut, ForgetsTriggersThatWaitAtAFlush) {
+  Cut cut;
+  cut.push_triggers({{1'000, 0, true}, {11'500, 0, true}});
+  cut.push(0, {2'000});
+  flush({cut.h.get()});
+  push_segment(cut.h.get());
+  cut.push_triggers({{12'000, 0, true}, {15'000, 0, true}});
+  cut.push(10'000, {11'700, 13'000});
+  EXPECT_EQ(cut.windows(), Texts{"12000+3000: 1000 DISCONT"});
 }
 
 TEST(EventCut, StartsOverWhereTimeGoesBack) {
