@@ -17,7 +17,7 @@
  * goes back interrupts, and those of windows of more than 71 minutes. A window has at most 16777216
  * events; further ones are skipped with a warning.
  *
- * A window leaves once it is complete. The latency is the length of the longest window so far, but
+ * A window is output once it is complete. The latency is the longest window so far, but
  * at most a second, since nothing tells when the next trigger comes.
  *
  * ## Example launch line
