@@ -42,7 +42,7 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
   X(eventstats)                                                                            \
   X(eventatisdec) X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
   X(eventantiflicker) X(eventdenoise) X(eventhotpixel) X(eventratecontrol)                 \
-  X(eventcrop) X(eventflip) X(eventmask) X(eventpolarity) X(eventscale) X(eventundistort)  \
+  X(eventcrop) X(eventcut) X(eventflip) X(eventmask) X(eventpolarity) X(eventscale) X(eventundistort)  \
   X(eventlabel) X(eventrefractory) X(eventtensor) X(eventtrail) X(flowjoin)                \
   X(eventdatagramdepay) X(eventdatagrampay)                                                \
   X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc) X(evtparse) X(rtpeventdepay) X(rtpeventpay)

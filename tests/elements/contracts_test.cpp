@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "tests/elements/element_lines.hpp"
+#include "tests/elements/event_buffer.hpp"
 
 namespace {
 
@@ -150,9 +151,11 @@ class Consumer {
     segment.flags = flags;
     push([segment] { return gst_event_new_segment(&segment); });
   }
-  /// Pushes an interval of 10 ms into each input: a frame, or three events.
+  /// Pushes an interval of 10 ms into each input: a frame, or a trigger and three events.
   void push_interval(guint index, bool discontinuous = false) {
     steps_.emplace_back([=](const Input& input) {
+      const eventcamera::Trigger trigger{gint64{index} * 10'000, 0, true};
+      if (!input.takes_frames) gst_pad_push_event(input.pad.get(), event_of({&trigger, 1}));
       GstBuffer* const buffer = input.takes_frames ? frame(index) : neighbours(index);
       GST_BUFFER_PTS(buffer) = index * 10 * GST_MSECOND;
       GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;

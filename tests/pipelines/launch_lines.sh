@@ -115,6 +115,9 @@ launch filesrc location=live.aedat4 ! identity ! aedatdemux ! fakesink
 davis=$SHARED_DATA/events/davis346-frames-events-imu.aedat4
 [ ! -f "$davis" ] || launch filesrc location="$davis" ! aedatdemux name=d  d.events_0 ! queue ! eventrender ! videoconvert ! fakesink  d.video_0 ! queue ! eventsim-dense ! videoconvert ! fakesink
 
+triggers=$SHARED_DATA/events/evt3-640x480-triggers.raw
+[ ! -f "$triggers" ] || launch filesrc location="$triggers" ! evtdec ! eventcut edge=falling ! eventtensor ! fakesink
+
 refused() { # WORDS ARGUMENT...: fails, and says these words
   local words=$1
   shift

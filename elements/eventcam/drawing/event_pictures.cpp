@@ -112,7 +112,8 @@ GstFlowReturn EventPictures::handle_buffer(GstBuffer* buffer) {
   known_ = std::max(known_, interval->end);
   if (due && (!all || interval->end + event_resolution > *due)) return push_next_picture();
   drop_buffer();
-  if (state_->has_framerate() || interval->end <= segment_of(main_pad()).start)
+  const bool is_instant = gst_buffer_get_size(buffer) == 0 && interval->end == interval->start;
+  if (state_->has_framerate() || is_instant || interval->end <= segment_of(main_pad()).start)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   return push_picture(*interval, *interval);
 }

@@ -1,0 +1,449 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventcut
+ * @title: eventcut
+ * @short_description: cuts a stream at external triggers
+ *
+ * Cuts an event stream at the triggers that readers such as #evtdec send with the events, so that
+ * each buffer holds the events between two exposures of a synchronised frame camera. A buffer has
+ * the PTS of a trigger and lasts until the next one; an event at the time of a trigger belongs to
+ * the window that begins there. A window without events becomes a GAP. #eventtensor then makes a
+ * tensor of each window, and #eventrender and #eventreconstruct draw a picture of each at framerate
+ * 0/1.
+ *
+ * Only triggers of #GstEventCut:input with this #GstEventCut:edge cut; all are passed on, ahead of
+ * their window. Events before the first of them and after the last are dropped; `stats` counts
+ * them. So are the events of a window that a seek, a new segment, another sensor size or time that
+ * goes back interrupts, and those of windows of more than 71 minutes. A window has at most 16777216
+ * events; further ones are skipped with a warning.
+ *
+ * A window is output once it is complete. The latency is the longest window so far, but
+ * at most a second, since nothing tells when the next trigger comes.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventcut edge=rising !
+ * eventtensor representation=voxel-grid ! filesink location=voxels.f32
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include <gst/base/gstbasetransform.h>
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "gst/base/authors.hpp"
+#include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/event_caps.hpp"
+#include "gst/base/event_faults.hpp"
+#include "gst/base/event_pool.hpp"
+#include "gst/base/latency.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/types.hpp"
+#include "gst/filter/changed_caps.hpp"
+#include "gst/recording/sensor_events.hpp"
+#include "src/core/event_validator.hpp"
+#include "src/core/sensor_size.hpp"
+#include "src/formats/waiting_items.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_cut_debug);
+#define GST_CAT_DEFAULT event_cut_debug
+
+using eventcamera::AbsoluteEvent;
+using eventcamera::Event;
+using eventcamera::EventValidator;
+using eventcamera::Microseconds;
+using eventcamera::SensorSize;
+using eventcamera::Trigger;
+
+namespace {
+
+/// Maximum number of events in a window; bounds the memory.
+constexpr std::size_t max_events = std::size_t{1} << 24;
+
+/// Longest window whose times fit into events.
+constexpr Microseconds max_length = std::numeric_limits<guint32>::max();
+
+constexpr GstClockTime max_latency = GST_SECOND;
+
+enum class Edge { rising, falling, both };
+
+/// User-settable values.
+struct Settings {
+  Edge edge = Edge::rising;
+  gint64 input = -1;
+
+  bool cuts_at(const Trigger& trigger) const {
+    return trigger.t >= 0 && (edge == Edge::both || trigger.rising == (edge == Edge::rising)) &&
+           (input < 0 || trigger.id == input);
+  }
+};
+
+/// Counters since the start.
+struct Counters {
+  guint64 events = 0;
+  guint64 dropped = 0;
+  guint64 rejected = 0;
+  guint64 windows = 0;
+};
+
+/// State from start to stop.
+struct Stream {
+  SensorSize sensor{};
+  std::optional<EventValidator> validator;      ///< once the sensor is known
+  eventcamera::WaitingItems<Trigger> triggers;  ///< not reached yet
+  std::optional<Microseconds> start;            ///< of the window; none before a trigger
+  std::vector<AbsoluteEvent> events;            ///< of the window
+  bool is_labelled = false;                     ///< some events had labels
+  GstClockTime reached = 0;                     ///< end of the last interval
+  bool is_discontinuous = true;                 ///< the next buffer is
+  EventBuffers buffers;
+  EventFaults faults{"cut", GST_CAT_DEFAULT};
+  WarnOnce warn_of_excess{GST_CAT_DEFAULT};
+};
+
+struct Private {
+  explicit Private(GstBaseTransform* element) : stream(GST_BASE_TRANSFORM_SINK_PAD(element)) {}
+
+  Guarded<Settings> settings;
+  Guarded<Counters> counters;
+  Guarded<GstClockTime> latency;
+  StreamLocked<Stream> stream;
+};
+
+}  // namespace
+
+DEFINE_EVENT_ELEMENT(GstEventCut, gst_event_cut, EVENT_CUT, GstBaseTransform,
+                     GST_TYPE_BASE_TRANSFORM, eventcut, GST_RANK_NONE, "windows between triggers")
+#define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_cut_parent_class)
+
+static Guarded<Settings>& settings_of(GObject* object) {
+  return GST_EVENT_CUT(object)->priv->settings;
+}
+
+/// Runs `work`; reports any exception.
+template <class Work>
+static auto reported(gpointer self, const Work& work) {
+  const auto report = [](const std::exception& error) { return events_report("cut", error); };
+  return catch_exceptions(self, report, work);
+}
+
+/* windows */
+
+/// Drops the window, and waits for the trigger that starts the next one.
+static void start_over(GstEventCut* self) {
+  const auto stream = self->priv->stream.lock();
+  self->priv->counters.lock()->dropped += stream->events.size();
+  stream->events.clear();
+  stream->start.reset();
+  stream->is_labelled = false;
+  stream->reached = 0;
+  stream->is_discontinuous = true;
+  if (stream->validator) stream->validator->restart();
+}
+
+static void lengthen_latency(GstEventCut* self, GstClockTime duration) {
+  {
+    const auto latency = self->priv->latency.lock();
+    if (std::min(duration, max_latency) <= *latency) return;
+    *latency = std::min(duration, max_latency);
+  }
+  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
+}
+
+/// Pushes the window, which holds these events and ends at `end`. May throw.
+static GstFlowReturn push_window(GstEventCut* self, std::span<const AbsoluteEvent> events,
+                                 Microseconds end) {
+  const auto stream = self->priv->stream.lock();
+  GstPad* const src = GST_BASE_TRANSFORM_SRC_PAD(self);
+  const Microseconds start = *stream->start;
+  const GstClockTime pts = static_cast<GstClockTime>(start) * GST_USECOND;
+  const GstClockTime duration = static_cast<GstClockTime>(end - start) * GST_USECOND;
+  GST_LOG_OBJECT(
+      self, "window of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
+      events.size(), GST_TIME_ARGS(pts), GST_TIME_ARGS(pts + duration));
+  ++self->priv->counters.lock()->windows;
+  lengthen_latency(self, duration);
+  if (events.empty()) return push_event(src, gst_event_new_gap(pts, duration));
+
+  OwnedBuffer buffer;
+  const GstFlowReturn result = stream->buffers.acquire(events.size() * sizeof(Event), buffer);
+  if (result != GST_FLOW_OK) return result;
+  std::ranges::transform(events, WritableBytes(buffer.get()).events().begin(),
+                         [start](const AbsoluteEvent& event) {
+                           return Event{static_cast<guint32>(event.t - start), event.x, event.y_p};
+                         });
+  if (stream->is_labelled)
+    std::ranges::transform(events, add_labels(buffer.get(), events.size()).begin(),
+                           eventcamera::label_of);
+  GST_BUFFER_PTS(buffer.get()) = pts;
+  GST_BUFFER_DURATION(buffer.get()) = duration;
+  if (std::exchange(stream->is_discontinuous, false))
+    GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
+  return gst_pad_push(src, buffer.release());
+}
+
+/// Pushes the windows that end in the interval, whose events have been added. Before the first
+/// window, a GAP without duration, of which no tensor or picture is made, says that time passes.
+/// May throw.
+static GstFlowReturn advance(GstEventCut* self, const EventInterval& interval) {
+  const auto stream = self->priv->stream.lock();
+  stream->reached = std::max(stream->reached, interval.end);
+  const auto reached = static_cast<Microseconds>(stream->reached / GST_USECOND);
+  GstFlowReturn result = GST_FLOW_OK;
+  std::span<const AbsoluteEvent> rest = stream->events;
+  for (const auto& trigger : stream->triggers.pop_before(reached + 1)) {
+    if (result != GST_FLOW_OK) break;
+    if (stream->start && trigger.t <= *stream->start) continue;  // late, or of another input
+    const auto next = std::ranges::lower_bound(rest, trigger.t, {}, &AbsoluteEvent::t);
+    const auto before = rest.first(static_cast<std::size_t>(next - rest.begin()));
+    if (stream->start && trigger.t - *stream->start <= max_length)
+      result = push_window(self, before, trigger.t);
+    else
+      self->priv->counters.lock()->dropped += before.size();
+    rest = rest.subspan(before.size());
+    stream->start = trigger.t;
+    stream->validator->pass(trigger.t);
+  }
+  stream->events.erase(stream->events.begin(),
+                       stream->events.end() - static_cast<std::ptrdiff_t>(rest.size()));
+  if (stream->start) return result;
+  self->priv->counters.lock()->dropped += stream->events.size();
+  stream->events.clear();
+  return push_event(GST_BASE_TRANSFORM_SRC_PAD(self),
+                    gst_event_new_gap(interval.start, GST_CLOCK_TIME_NONE));
+}
+
+/// Starts over if an interval is earlier than the last one. Triggers that wait belong to it.
+static void approach(GstEventCut* self, const EventInterval& interval) {
+  const GstClockTime reached = self->priv->stream->reached;
+  if (interval.start + event_resolution >= reached) return;
+  GST_DEBUG_OBJECT(self, "time goes back from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
+                   GST_TIME_ARGS(reached), GST_TIME_ARGS(interval.start));
+  start_over(self);
+}
+
+/// Adds the events of a buffer. May throw.
+static void add(GstEventCut* self, const MappedEvents& mapped, Microseconds max_t,
+                GstBuffer* buffer) {
+  const auto stream = self->priv->stream.lock();
+  const auto labels = labels_of(buffer);
+  stream->is_labelled |= !labels.empty();
+  std::size_t excess = 0;
+  const auto take = [&](const AbsoluteEvent& event) {
+    if (stream->events.size() < max_events)
+      stream->events.push_back(event);
+    else
+      ++excess;
+  };
+  const auto invalid =
+      stream->validator->take(mapped.events(), mapped.start(), max_t, take, labels);
+  stream->faults.warn(self, invalid, buffer);
+  if (excess > 0)
+    stream->warn_of_excess(
+        self,
+        {GST_STREAM_ERROR_FAILED, "Cannot keep all events: there are more than " +
+                                      std::to_string(max_events) +
+                                      " in a window; skipping the rest. Check input and edge."},
+        std::to_string(excess) + " events skipped");
+  const auto counters = self->priv->counters.lock();
+  counters->dropped += excess;
+  counters->rejected += invalid.outside + invalid.unsorted;
+}
+
+static GstFlowReturn submit_input_buffer(GstBaseTransform* transform, gboolean, GstBuffer* input) {
+  auto* self = GST_EVENT_CUT(transform);
+  const OwnedBuffer buffer(input);
+  const auto stream = self->priv->stream.lock();
+  if (!stream->validator) return GST_FLOW_NOT_NEGOTIATED;
+  const auto events = gst_buffer_get_size(input) / sizeof(Event);
+  self->priv->counters.lock()->events += events;
+  const auto interval = interval_of(input);
+  const MappedEvents mapped(input);
+  if (!interval || !mapped) {
+    stream->faults.warn(self, interval ? EventFault::partial_event : interval_fault(input), input);
+    self->priv->counters.lock()->rejected += events;
+    return GST_FLOW_OK;
+  }
+  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, events,
+                 GST_TIME_ARGS(interval->start));
+  return reported(self, [&] {
+    approach(self, *interval);
+    if (GST_BUFFER_IS_DISCONT(input)) {
+      const auto result = advance(self, {interval->start, interval->start});
+      if (result != GST_FLOW_OK) return result;
+      stream->is_discontinuous = true;
+    }
+    add(self, mapped, length_of(*interval), input);
+    return advance(self, *interval);
+  });
+}
+
+/* events, queries */
+
+/// Passes a GAP as an interval without events. May throw.
+static bool handle_gap(GstEventCut* self, GstEvent* event) {
+  GstClockTime start = 0;
+  GstClockTime duration = 0;
+  gst_event_parse_gap(event, &start, &duration);
+  if (!self->priv->stream->validator || start > G_MAXINT64) return true;
+  if (!GST_CLOCK_TIME_IS_VALID(duration)) duration = 0;
+  const EventInterval interval{start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)};
+  approach(self, interval);
+  return advance(self, interval) == GST_FLOW_OK;
+}
+
+/// May throw.
+static void add_triggers(GstEventCut* self, GstEvent* event) {
+  auto triggers = triggers_of(event);
+  const auto stream = self->priv->stream.lock();
+  if (!triggers || stream->triggers.is_full()) return;
+  const Settings settings = self->priv->settings.copy();
+  std::erase_if(*triggers, [&](const Trigger& trigger) { return !settings.cuts_at(trigger); });
+  stream->triggers.push(*triggers);
+}
+
+static void warn_without_windows(GstEventCut* self) {
+  const Counters counters = self->priv->counters.copy();
+  if (counters.events > 0 && counters.windows == 0)
+    post_message(self, GST_MESSAGE_WARNING,
+                 {GST_STREAM_ERROR_FAILED,
+                  "There are no windows: fewer than two triggers cut these events. Check the "
+                  "properties input and edge, and that the recording has triggers."},
+                 std::to_string(counters.dropped) + " events dropped");
+}
+
+static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
+  auto* self = GST_EVENT_CUT(transform);
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_CUSTOM_DOWNSTREAM:
+      reported(self, [&] { add_triggers(self, event); });
+      break;
+    case GST_EVENT_GAP: {
+      const OwnedEvent gap(event);
+      return reported(self, [&] { return handle_gap(self, event); }) ? TRUE : FALSE;
+    }
+    case GST_EVENT_SEGMENT:
+      if (!plays_events(self, event, "cut")) return FALSE;
+      if (continues(transform->segment, segment_of(event))) break;
+      [[fallthrough]];
+    case GST_EVENT_SEGMENT_DONE:
+    case GST_EVENT_EOS:
+    case GST_EVENT_FLUSH_STOP:
+      self->priv->stream->triggers.clear();
+      start_over(self);
+      if (GST_EVENT_TYPE(event) == GST_EVENT_EOS) warn_without_windows(self);
+      break;
+    default:
+      break;
+  }
+  return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
+}
+
+static gboolean query(GstBaseTransform* transform, GstPadDirection direction, GstQuery* query) {
+  if (direction == GST_PAD_SRC && GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
+    return answer_latency(GST_CAT_DEFAULT, GST_BASE_TRANSFORM_SINK_PAD(transform), query,
+                          GST_EVENT_CUT(transform)->priv->latency.copy());
+  return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
+}
+
+/* negotiation, states */
+
+/// Windows have no framerate.
+static GstCaps* transform_caps(GstBaseTransform*, GstPadDirection direction, GstCaps* caps,
+                               GstCaps* filter) {
+  return changed_caps(caps, filter, [direction](GstStructure* structure) {
+    if (direction == GST_PAD_SINK)
+      gst_structure_set(structure, "framerate", GST_TYPE_FRACTION, 0, 1, nullptr);
+    else
+      gst_structure_remove_field(structure, "framerate");
+    return true;
+  });
+}
+
+static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
+  auto* self = GST_EVENT_CUT(transform);
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, in)) return FALSE;
+  const auto stream = self->priv->stream.lock();
+  const SensorSize sensor{info.width, info.height};
+  if (stream->validator && stream->sensor == sensor) return TRUE;
+  start_over(self);
+  stream->sensor = sensor;
+  stream->validator.emplace(info.width, info.height);
+  return TRUE;
+}
+
+static gboolean start(GstBaseTransform* transform) {
+  *GST_EVENT_CUT(transform)->priv->counters.lock() = {};
+  return TRUE;
+}
+
+static gboolean stop(GstBaseTransform* transform) {
+  GST_EVENT_CUT(transform)->priv->stream.reset();
+  *GST_EVENT_CUT(transform)->priv->latency.lock() = 0;
+  return TRUE;
+}
+
+/* type */
+
+static GstStructure* stats_of(GObject* object) {
+  const Counters counters = GST_EVENT_CUT(object)->priv->counters.copy();
+  return gst_structure_new("application/x-event-cut-stats", "events", G_TYPE_UINT64,
+                           counters.events, "dropped-events", G_TYPE_UINT64, counters.dropped,
+                           "rejected-events", G_TYPE_UINT64, counters.rejected, "windows",
+                           G_TYPE_UINT64, counters.windows, nullptr);
+}
+
+static GType edge_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(Edge::rising), "Rising edges", "rising"},
+      {static_cast<int>(Edge::falling), "Falling edges", "falling"},
+      {static_cast<int>(Edge::both), "Both edges", "both"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventCutEdge", values);
+}
+
+static void gst_event_cut_init(GstEventCut* self) {
+  self->priv = new Private(GST_BASE_TRANSFORM(self));
+  gst_base_transform_set_passthrough(GST_BASE_TRANSFORM(self), FALSE);
+}
+
+static void gst_event_cut_class_init(GstEventCutClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = finalize;
+  Properties<settings_of> properties(object_class);
+  properties.add(&Settings::edge,
+                 g_param_spec_enum("edge", "Edge", "Edges of triggers to cut at", edge_type(),
+                                   static_cast<int>(Settings().edge), mutable_playing_flags));
+  properties.add(
+      &Settings::input,
+      g_param_spec_int64("input", "Input", "Number of the trigger input to cut at (-1 = all)", -1,
+                         G_MAXUINT16, Settings().input, mutable_playing_flags));
+  install_stats(object_class, stats_of,
+                "Counts since the start: events (received), dropped-events (outside of windows), "
+                "rejected-events (outside the sensor or out of order), windows (pushed)");
+  add_pad_templates(GST_ELEMENT_CLASS(klass), EVENT_CAPS, EVENT_CAPS);
+  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event cutter", "Filter",
+                                        "Cuts a stream at external triggers", EVENTSIM_AUTHORS);
+
+  GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
+  transform_class->start = start;
+  transform_class->stop = stop;
+  transform_class->transform_caps = transform_caps;
+  transform_class->set_caps = set_caps;
+  transform_class->query = query;
+  transform_class->sink_event = sink_event;
+  transform_class->submit_input_buffer = submit_input_buffer;
+}
