@@ -38,8 +38,8 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
 // clang-format off
 #define ELEMENTS(X)                                                                        \
   AEDAT_ELEMENTS(X) HDF5_ELEMENTS(X) NPZ_ELEMENTS(X) ROS_ELEMENTS(X)                       \
-  X(eventcompare) X(eventmerge) X(eventoverlay) X(eventreconstruct) X(eventrender)        \
-  X(eventstats)                                                                            \
+  X(eventcompare) X(eventfuse) X(eventmerge) X(eventoverlay) X(eventreconstruct)           \
+  X(eventrender) X(eventstats)                                                             \
   X(eventatisdec) X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
   X(eventantiflicker) X(eventdenoise) X(eventhotpixel) X(eventratecontrol)                 \
   X(eventcrop) X(eventcut) X(eventflip) X(eventmask) X(eventpolarity) X(eventscale) X(eventundistort)  \

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// eventfuse: the brightness of its pictures, and their times.
+#include <cmath>
+#include <thread>
+
+#include "src/core/event.hpp"
+#include "tests/elements/pipeline.hpp"
+
+namespace {
+
+using namespace harness;
+using eventcamera::Event;
+using eventcamera::Polarity;
+
+constexpr GstClockTime ms = GST_MSECOND;
+
+struct Picture {
+  GstClockTime time;  ///< ms
+  int first;          ///< grey level of the first pixel
+  int last;
+
+  friend bool operator==(const Picture&, const Picture&) = default;
+  friend void PrintTo(const Picture& picture, std::ostream* out) {
+    *out << picture.time << " ms: " << picture.first << ' ' << picture.last;
+  }
+};
+
+class Fusion : public TwoInputs {
+ public:
+  Fusion(const std::string& framerate, const std::string& output)
+      : TwoInputs("eventfuse cutoff=0 positive-threshold=0.2 negative-threshold=0.3", "video_sink",
+                  "event_sink") {
+    begin(framerate, output);
+  }
+
+  void begin(const std::string& framerate, const std::string& output, int width = 8,
+             int height = 4) {
+    const auto size = ", width=" + std::to_string(width) + ", height=" + std::to_string(height);
+    gst_harness_set_sink_caps_str(video.get(), ("video/x-raw, " + output).c_str());
+    gst_harness_set_src_caps_str(
+        video.get(), ("video/x-raw, format=GRAY8, framerate=" + framerate + size).c_str());
+    gst_harness_set_src_caps_str(events.get(),
+                                 ("application/x-event-camera, format=XYTP" + size).c_str());
+  }
+
+  void push_frame(GstClockTime pts, int grey, GstClockTime duration = 40 * ms) {
+    GstBuffer* buffer = gst_buffer_new_allocate(nullptr, 32, nullptr);
+    gst_buffer_memset(buffer, 0, static_cast<guint8>(grey), 32);
+    GST_BUFFER_PTS(buffer) = pts;
+    GST_BUFFER_DURATION(buffer) = duration;
+    gst_harness_push(video.get(), buffer);
+  }
+
+  void push_events(GstClockTime pts, const std::vector<Event>& list, GstClockTime duration) {
+    gst_harness_push(events.get(), buffer_of(pts, list, duration));
+  }
+
+  void end() {
+    for (auto* h : {video.get(), events.get()}) gst_harness_push_event(h, gst_event_new_eos());
+  }
+
+  std::vector<Picture> pictures() {
+    std::vector<Picture> all;
+    GstBuffer* next = nullptr;
+    while (gst_harness_pull_until_eos(video.get(), &next) && next != nullptr) {
+      const Buffer picture(next);
+      const auto bytes = bytes_of(next);
+      all.push_back({GST_BUFFER_PTS(next) / ms, static_cast<guint8>(bytes.front()),
+                     static_cast<guint8>(bytes.back())});
+    }
+    return all;
+  }
+
+  Owned<GstHarness>& video = first;
+  Owned<GstHarness>& events = second;
+};
+
+TEST(Fuse, ShowsTheEventsUpToEachPicture) {
+  struct Case {
+    std::string framerate;  // of the video
+    GstClockTime duration;
+    std::string output;
+    std::vector<Picture> pictures;
+  };
+  // 125 + o = (100 + o) e^0.2, 71 + o = (100 + o) e^-0.3, o = 12.75
+  const Case cases[] = {
+      {"25/1",
+       40 * ms,
+       "framerate=50/1",
+       {{0, 100, 100}, {20, 125, 100}, {40, 125, 71}, {60, 155, 71}}},
+      {"25/1",
+       GST_CLOCK_TIME_NONE,
+       "framerate=50/1",
+       {{0, 100, 100}, {20, 125, 100}, {40, 125, 71}, {60, 155, 71}}},
+      {"25/1", 40 * ms, "format=GRAY8", {{0, 100, 100}, {40, 125, 71}}},
+      {"0/1", 40 * ms, "format=GRAY8", {{0, 100, 100}, {40, 125, 71}}},
+      {"0/1",
+       GST_CLOCK_TIME_NONE,
+       "framerate=50/1",
+       {{0, 100, 100}, {20, 125, 100}, {40, 125, 71}}},
+  };
+  for (const Case& test : cases) {
+    Fusion fuse(test.framerate, test.output);
+    fuse.push_frame(0, 100, test.duration);
+    fuse.push_events(
+        0, {Event::at(0, 0, 20'000, Polarity::on), Event::at(7, 3, 20'001, Polarity::off)},
+        50 * ms);
+    fuse.push_frame(40 * ms, 200, test.duration);
+    fuse.push_events(50 * ms, {Event::at(0, 0, 0, Polarity::on)}, 30 * ms);
+    fuse.end();
+    EXPECT_EQ(fuse.pictures(), test.pictures) << test.framerate << ' ' << test.output;
+  }
+}
+
+/// Also where playback is faster: the cutoff is of the scene's time.
+TEST(Fuse, ApproachesTheLastFrame) {
+  Fusion fuse("10/1", "framerate=10/1");
+  g_object_set(fuse.element.get(), "cutoff", 1., nullptr);
+  for (const double rate : {1., 2.}) {
+    for (auto* h : {fuse.video.get(), fuse.events.get()}) {
+      GstSegment segment;
+      gst_segment_init(&segment, GST_FORMAT_TIME);
+      segment.rate = rate;
+      gst_harness_push_event(h, gst_event_new_segment(&segment));
+    }
+    fuse.push_frame(0, 100, 100 * ms);
+    fuse.push_events(0, {Event::at(0, 0, 0, Polarity::on)}, 100 * ms);
+    fuse.push_frame(100 * ms, 100, 100 * ms);
+    fuse.push_events(100 * ms, {}, 100 * ms);
+    for (const int grey : {100, 113}) {  // (100 + o) exp(0.2 e^(-0.2 pi)) - o
+      const Buffer picture(gst_harness_pull(fuse.video.get()));
+      ASSERT_TRUE(picture);
+      EXPECT_EQ(static_cast<guint8>(bytes_of(picture.get()).front()), grey) << rate;
+    }
+    flush({fuse.video.get(), fuse.events.get()});
+  }
+}
+
+TEST(Fuse, GoesOnWhereSizesChange) {
+  Fusion fuse("25/1", "framerate=50/1");
+  fuse.push_frame(0, 100);
+  fuse.push_events(0, {Event::at(0, 0, 0, Polarity::on)}, 40 * ms);
+  fuse.begin("25/1", "framerate=50/1", 4, 8);
+  fuse.push_events(40 * ms, {Event::at(3, 7, 5'000, Polarity::on)}, 40 * ms);
+  fuse.push_frame(40 * ms, 50);
+  fuse.end();
+  EXPECT_EQ(fuse.pictures(),
+            (std::vector<Picture>{{0, 100, 100}, {20, 125, 100}, {40, 50, 50}, {60, 50, 64}}));
+  EXPECT_EQ(fuse.text_of_next(GST_MESSAGE_WARNING), "");
+}
+
+TEST(Fuse, WarnsOfAnotherSensorSize) {
+  Fusion fuse("25/1", "framerate=50/1");
+  gst_harness_set_src_caps_str(fuse.events.get(),
+                               "application/x-event-camera, format=XYTP, width=9, height=4");
+  fuse.push_frame(0, 100);
+  fuse.push_events(0, {Event::at(0, 0, 0, Polarity::on)}, 40 * ms);
+  fuse.end();
+  EXPECT_EQ(fuse.pictures(), (std::vector<Picture>{{0, 100, 100}, {20, 100, 100}}));
+  EXPECT_NE(fuse.text_of_next(GST_MESSAGE_WARNING).find("Insert eventscale"), std::string::npos);
+}
+
+/// No picture of the pause.
+TEST(Fuse, StartsOverAfterALeap) {
+  Fusion fuse("25/1", "framerate=25/1");
+  gst_harness_push_event(fuse.events.get(), gst_event_new_eos());
+  fuse.push_frame(0, 100);
+  fuse.push_frame(3600 * GST_SECOND, 50);
+  gst_harness_push_event(fuse.video.get(), gst_event_new_eos());
+  EXPECT_EQ(fuse.pictures(), (std::vector<Picture>{{0, 100, 100}, {3'600'000, 50, 50}}));
+}
+
+TEST(LiveFuse, GoesOnWithoutEvents) {
+  Pipeline pipeline(
+      "videotestsrc is-live=true num-buffers=10 ! video/x-raw,format=GRAY8,framerate=50/1 ! "
+      "eventfuse ! video/x-raw,framerate=100/1 ! fakesink name=sink sync=true");
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  EXPECT_GE(pipeline.stat("sink", "rendered"), 19U);
+}
+
+/// A texture that moves by a pixel a picture: every tenth is a frame.
+TEST(Fused, IsNearerToAMovingTextureThanTheLastFrame) {
+  constexpr int width = 64;
+  constexpr int height = 48;
+  const auto texture = [](int i) {
+    std::vector<guint8> grey;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        grey.push_back(static_cast<guint8>(120 + 60 * std::sin(0.3 * (x - i)) * std::cos(0.4 * y) +
+                                           40 * std::sin(0.17 * (x - i) + y)));
+    return grey;
+  };
+  const auto frame = [&texture](int i, int step) {
+    const auto grey = texture(i);
+    GstBuffer* const buffer = gst_buffer_new_memdup(grey.data(), grey.size());
+    GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(i) * GST_SECOND / 240;
+    GST_BUFFER_DURATION(buffer) = static_cast<GstClockTime>(step) * GST_SECOND / 240;
+    return buffer;
+  };
+  const std::string size = ", width=64, height=48, framerate=";
+  Harness camera("eventsim-dvs");
+  gst_harness_set_src_caps_str(camera.get(),
+                               ("video/x-raw, format=GRAY8" + size + "240/1").c_str());
+  TwoInputs fuse("eventfuse", "video_sink", "event_sink");
+  gst_harness_set_sink_caps_str(fuse.first.get(), "video/x-raw, framerate=240/1");
+  gst_harness_set_src_caps_str(fuse.first.get(),
+                               ("video/x-raw, format=GRAY8" + size + "24/1").c_str());
+  gst_harness_set_src_caps_str(
+      fuse.second.get(), ("application/x-event-camera, format=XYTP" + size + "240/1").c_str());
+  double fused_error = 0;
+  double held_error = 0;
+  const std::jthread frames([&] {
+    for (int i = 0; i < 60; i += 10) gst_harness_push(fuse.first.get(), frame(i, 10));
+  });
+  const std::jthread events([&] {
+    for (int i = 0; i < 60; ++i) {
+      gst_harness_push(camera.get(), frame(i, 1));
+      while (GstBuffer* const buffer = gst_harness_try_pull(camera.get()))
+        gst_harness_push(fuse.second.get(), buffer);
+    }
+    gst_harness_push_event(fuse.second.get(), gst_event_new_eos());
+  });
+  for (int i = 0; i < 60; ++i) {
+    const auto held = texture(i - i % 10);
+    const Buffer picture(gst_harness_pull(fuse.first.get()));
+    ASSERT_TRUE(picture) << i;
+    const auto fused = bytes_of(picture.get());
+    const auto truth = texture(i);
+    for (std::size_t at = 0; at < truth.size(); ++at) {
+      fused_error += std::abs(static_cast<guint8>(fused[at]) - truth[at]);
+      held_error += std::abs(held[at] - truth[at]);
+    }
+  }
+  EXPECT_LT(fused_error, 0.65 * held_error) << fused_error / held_error;
+}
+
+}  // namespace
