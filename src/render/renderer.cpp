@@ -122,7 +122,8 @@ void Renderer::draw(Microseconds start, Microseconds end, const PixelLayout& lay
   const bool is_first = !std::exchange(has_drawn_, true);
   if (auto* window = std::get_if<EventWindow>(&memory_))
     window->begin_at(is_first ? start : start + 1);
-  if (auto* reconstruction = std::get_if<Reconstruction>(&memory_)) reconstruction->finish_picture();
+  if (auto* reconstruction = std::get_if<Reconstruction>(&memory_))
+    reconstruction->finish_picture();
   const auto pixels = pixels_of(settings_, layout);
   for (int y = 0; y < height_; ++y) {
     shade_row(y, time);
