@@ -12,7 +12,7 @@
  *
  * Both inputs must have the same size. Insert videoconvert before `video_sink` if the video is not
  * grey. The two streams are synchronized by running time. A discontinuity of the video starts over
- * with its frame.
+ * with its frame. A frame lasts for a minute at most.
  *
  * Video from a live source waits for events no longer than its latency. Other video waits for the
  * events up to a picture, or for a GAP event or EOS.
@@ -154,13 +154,12 @@ class EventFuse final : public FramesWithEvents {
     return filter_->add(events, origin, length);
   }
 
-  /// Interval in which a frame is the last one, if it is known, within the segment.
+  /// Interval in which a frame is the last one, within the segment. Durations may be erroneous.
   EventInterval interval_of_frame(GstBuffer* frame) const {
     const GstClockTime duration =
         GST_BUFFER_DURATION_IS_VALID(frame) ? GST_BUFFER_DURATION(frame) : frame_duration(*video_);
     const GstClockTime start = GST_BUFFER_PTS_IS_VALID(frame) ? GST_BUFFER_PTS(frame) : end_;
-    const GstClockTime end =
-        start + std::clamp(duration, GstClockTime{1}, GstClockTime{G_MAXINT64});
+    const GstClockTime end = start + std::clamp(duration, GstClockTime{1}, max_pause);
     return {std::max(start, segment_of(main_pad()).start), end};
   }
 
