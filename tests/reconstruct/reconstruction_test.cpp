@@ -89,11 +89,13 @@ Picture by_definition(int width, int height, const Reconstruction::Settings& set
 }
 
 TEST(Reconstruction, FollowsItsEquations) {
-  for (const auto& [width, height] : {std::pair{1, 1}, {3, 2}, {37, 21}, {70, 5}})
+  for (const auto& size : {std::pair{1, 1}, {3, 2}, {37, 21}, {70, 5}})
     for (const Reconstruction::Settings settings : {Reconstruction::Settings{},
                                                     {.cutoff = 5, .smoothing = 0},
                                                     {.cutoff = 1000, .smoothing = 3.3}})
       for (const int count : {0, 1, 3000}) {
+        const int width = size.first;
+        const int height = size.second;
         const auto events = events_by_chance(width, height, count);
         const auto expected = by_definition(width, height, settings, events);
         Picture first;

@@ -158,14 +158,14 @@ class EventFuse final : public FramesWithEvents {
   EventInterval interval_of_frame(GstBuffer* frame) const {
     const GstClockTime duration =
         GST_BUFFER_DURATION_IS_VALID(frame) ? GST_BUFFER_DURATION(frame) : frame_duration(*video_);
-    const GstClockTime start = GST_BUFFER_PTS_IS_VALID(frame) ? GST_BUFFER_PTS(frame) : end_;
+    const GstClockTime start = GST_BUFFER_PTS_IS_VALID(frame) ? GST_BUFFER_PTS(frame) : shown_.end;
     const GstClockTime end = start + std::clamp(duration, GstClockTime{1}, max_pause);
     return {std::max(start, segment_of(main_pad()).start), end};
   }
 
   /// Passes the first queued frame to the filter, and pushes the next picture. May throw.
   GstFlowReturn handle_frame(GstBuffer* frame, bool timed_out) {
-    const EventInterval interval = interval_of_frame(frame);
+    const EventInterval interval = is_shown_ ? shown_ : interval_of_frame(frame);
     if (interval.start >= interval.end) return drop_frame();  // before the segment
     if (!is_shown_) {
       const bool leaps = times_ && interval.start > times_->picture().start + max_pause;
@@ -181,7 +181,7 @@ class EventFuse final : public FramesWithEvents {
       if (!is_gap(frame) && !show(frame, interval.start)) return GST_FLOW_ERROR;
       if (!times_) begin_pictures(interval.start);
       is_shown_ = true;
-      end_ = interval.end;
+      shown_ = interval;
     }
     if (times_ && times_->picture().start < interval.end) return push_next_picture(timed_out);
     const bool is_picture = GST_VIDEO_INFO_FPS_N(&output_) == 0 && !is_gap(frame);
@@ -253,7 +253,7 @@ class EventFuse final : public FramesWithEvents {
   std::optional<ComplementaryFilter> filter_;  // from the first frame
   std::optional<FrameTimes> times_;  // of the next picture, from the first frame at a framerate
   bool is_shown_ = false;            // the filter has the first queued frame
-  GstClockTime end_ = 0;             // of the last frame
+  EventInterval shown_{};            // of the last frame
   bool discontinuous_ = false;       // the next picture is discontinuous
   WarnOnce warn_of_size_{GST_CAT_DEFAULT};
 };
