@@ -78,8 +78,8 @@ class Fusion : public TwoInputs {
 TEST(Fuse, PlacesAFrameWithoutTimeAfterTheLastOne) {
   Fusion fuse("25/1", "framerate=50/1");
   fuse.push_frame(0, 100);
-  fuse.push_frame(GST_CLOCK_TIME_NONE, 200);
   fuse.push_events(0, {}, 100 * ms);
+  fuse.push_frame(GST_CLOCK_TIME_NONE, 200);
   fuse.end();
   EXPECT_EQ(fuse.pictures(),
             (std::vector<Picture>{{0, 100, 100}, {20, 100, 100}, {40, 100, 100}, {60, 100, 100}}));

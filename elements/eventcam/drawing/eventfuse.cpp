@@ -166,7 +166,9 @@ class EventFuse final : public FramesWithEvents {
   /// Passes the first queued frame to the filter, and pushes the next picture. May throw.
   GstFlowReturn handle_frame(GstBuffer* frame, bool timed_out) {
     const EventInterval interval = is_shown_ ? shown_ : interval_of_frame(frame);
-    if (interval.start >= interval.end) return drop_frame();  // before the segment
+    // Before the segment, or an erroneous time, after which pictures would wrap around.
+    if (interval.start >= interval.end || interval.end > GstClockTime{G_MAXINT64})
+      return drop_frame();
     if (!is_shown_) {
       const bool leaps = times_ && interval.start > times_->picture().start + max_pause;
       if (GST_BUFFER_IS_DISCONT(frame) || leaps) jump();
