@@ -78,7 +78,7 @@ class Fusion : public TwoInputs {
 TEST(Fuse, PlacesAFrameWithoutTimeAfterTheLastOne) {
   Fusion fuse("25/1", "framerate=50/1");
   fuse.push_frame(0, 100);
-  fuse.push_events(0, {}, 100 * ms);
+  fuse.push_events(0, {Event::at(0, 0, 90'000, Polarity::on)}, 100 * ms);
   fuse.push_frame(GST_CLOCK_TIME_NONE, 200);
   fuse.end();
   EXPECT_EQ(fuse.pictures(),
