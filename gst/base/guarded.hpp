@@ -37,7 +37,7 @@ class Guarded {
 
  private:
   mutable std::mutex mutex_;
-  Value value_;
+  Value value_{};
 };
 
 /// A value that belongs to the streaming thread of a pad. Each access holds the pad's stream lock,
@@ -70,5 +70,5 @@ class StreamLocked {
 
  private:
   GstPad* pad_;
-  Value value_;
+  Value value_{};
 };
