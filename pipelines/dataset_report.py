@@ -6,15 +6,14 @@ import os
 import urllib.parse
 
 import numpy as np
+from page_style import PAGE_STYLE
 
 # Fields of a record that go to the manifest: all that do not depend on the machine's file system.
 PUBLISHED = ("name", "split", "input", "making", "parameters", "written", "figures", "warnings", "versions")
-STYLE = """:root { color-scheme: light dark; font: 14px sans-serif }
-body { max-width: 75rem; margin: 1.5rem auto; padding: 0 1rem }
-.videos { display: grid; grid-template-columns: repeat(auto-fill, minmax(11rem, 1fr)); gap: 1rem }
-figure { margin: 0 } img { display: block; width: 100% } figcaption { overflow-wrap: anywhere; font-size: 12px }
-table { border-collapse: collapse } td, th { text-align: right; padding: .2rem .8rem } td { white-space: nowrap }
-th:first-child { text-align: left } tr:nth-child(even) { background: #8882 }"""
+STYLE = PAGE_STYLE + """
+.videos { display: grid; grid-template-columns: repeat(auto-fill, minmax(11rem, 1fr)); gap: 1rem } td { white-space: nowrap }
+img { display: block; width: 100% } figcaption { overflow-wrap: anywhere; font-size: 12px }
+"""
 # Columns of the page's table, and their text from the statistics of a part.
 COLUMNS = {
     "videos": lambda part: f"{part['videos']:,}",

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from event_streams import (GLib, Gst, Sensor, Span, compare, expect_writable, png_of, read_mask, read_recording,
                            read_video, reconstruct, seconds)
 import numpy as np
+from page_style import PAGE_STYLE
 from plugins import find_plugins
 
 LIMITS = (1, 5, 10)  # of matches, ms
@@ -270,12 +271,8 @@ def charts_of(sensor, real, simulated, travels):
     return charts
 
 
-STYLE = """
-:root { color-scheme: light dark; font-family: sans-serif }
-body { max-width: 75rem; margin: 1.5rem auto; padding: 0 1rem }
-table { border-collapse: collapse } th, td { padding: .2rem .8rem; text-align: right } th:first-child { text-align: left }
-tr:nth-child(even) { background: #8882 } .beyond { color: light-dark(#b02020, #ff8080) }
-.maps, .charts { display: grid; gap: 1rem } figure { margin: 0 }
+STYLE = PAGE_STYLE + """
+.beyond { color: light-dark(#b02020, #ff8080) } .maps, .charts { display: grid; gap: 1rem }
 .maps { grid-template-columns: repeat(auto-fill, minmax(18rem, 1fr)) }
 .charts { grid-template-columns: repeat(auto-fill, minmax(min(32rem, 100%), 1fr)) }
 img { width: 100%; image-rendering: pixelated } svg { width: 100% } svg text { font-size: 12px; fill: currentColor }
