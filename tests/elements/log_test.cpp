@@ -68,6 +68,15 @@ class Log {
   std::vector<Line> lines_;
 };
 
+TEST(Log, HasACategoryForEachElementThatDraws) {
+  for (const std::string element : {"eventrender", "eventreconstruct"}) {
+    Log log(element.c_str());
+    Pipeline pipeline("videotestsrc num-buffers=3 ! eventsim-diff ! " + element + " ! fakesink");
+    ASSERT_TRUE(pipeline.play()) << pipeline.error;
+    EXPECT_FALSE(log.with("drawing").empty()) << element;
+  }
+}
+
 TEST(Log, WarnsOnceOfSkippedEvents) {
   Log log("eventstats");
   Harness h("eventstats");

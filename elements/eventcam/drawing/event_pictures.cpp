@@ -11,8 +11,7 @@
 #include "gst/drawing/drawn_video.hpp"
 #include "gst/eventcamera/eventcamera.h"
 
-GST_DEBUG_CATEGORY_STATIC(event_pictures_debug);
-#define GST_CAT_DEFAULT event_pictures_debug
+#define GST_CAT_DEFAULT category_
 
 using eventcamera::Microseconds;
 using eventcamera::Renderer;
@@ -27,9 +26,10 @@ constexpr GstClockTime max_wait = 200 * GST_MSECOND;
 
 }  // namespace
 
-EventPictures::EventPictures(GstAggregator* element)
+EventPictures::EventPictures(GstAggregator* element, GstDebugCategory* category)
     : EventAggregator(element, {.verb = "draw", .passes_main_pad = false}),
-      warn_of_pause_(GST_CAT_DEFAULT) {}
+      category_(category),
+      warn_of_pause_(category) {}
 
 /* events */
 
@@ -348,7 +348,6 @@ gboolean decide_allocation(GstAggregator*, GstQuery* query) {
 }  // namespace
 
 void init_pictures_class(GstEventAggregatorClass* klass, const char* formats) {
-  GST_DEBUG_CATEGORY_INIT(event_pictures_debug, "eventpictures", 0, "video of events");
   add_aggregator_pad_template(klass, "sink", GST_PAD_SINK, EVENT_CAPS);
   const std::string video = std::string("video/x-raw, format = (string) ") + formats +
                             ", " SIZE_CAPS

@@ -16,7 +16,8 @@
 /// pictures show.
 class EventPictures : public EventAggregator {
  public:
-  explicit EventPictures(GstAggregator* element);
+  /// Logs in the element's category.
+  EventPictures(GstAggregator* element, GstDebugCategory* category);
 
   void stop() override;
   void flush() override;
@@ -68,6 +69,7 @@ class EventPictures : public EventAggregator {
   GstFlowReturn push_picture(const EventInterval& events, const EventInterval& picture);
   GstFlowReturn push_next_picture();
 
+  GstDebugCategory* const category_;
   std::optional<State> state_;
   std::optional<FrameTimes> times_;  // interval of the next picture, once the first event is near
   std::optional<gsize> taken_;       // number of processed events of the first queued buffer

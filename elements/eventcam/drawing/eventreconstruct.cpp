@@ -37,7 +37,7 @@ using eventcamera::Reconstruction;
 
 class EventReconstruct final : public EventPictures {
  public:
-  using EventPictures::EventPictures;
+  explicit EventReconstruct(GstAggregator* element) : EventPictures(element, GST_CAT_DEFAULT) {}
 
   Guarded<Reconstruction::Settings> settings;
 

@@ -46,7 +46,7 @@ namespace {
 
 class EventRender final : public EventPictures {
  public:
-  using EventPictures::EventPictures;
+  explicit EventRender(GstAggregator* element) : EventPictures(element, GST_CAT_DEFAULT) {}
 
   Guarded<RenderProperties> settings;
 
