@@ -32,7 +32,7 @@ using namespace eventcamera;
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 v4l2src ! eventsim-diff ! evtenc format=EVT3 ! filesink location=out.raw
+ * gst-launch-1.0 v4l2src ! eventsim-dvs ! evtenc format=EVT3 ! filesink location=out.raw
  * ]|
  *
  * Since: 0.1
@@ -101,7 +101,7 @@ GST_ELEMENT_REGISTER_DEFINE(evtenc, "evtenc", GST_RANK_PRIMARY, event_writer_typ
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventdatenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventdatenc ! filesink
  * location=test.dat
  * ]|
  *
@@ -128,7 +128,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventesenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventesenc ! filesink
  * location=test.es
  * ]|
  *
@@ -165,7 +165,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventcsvenc format=rpg ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventcsvenc format=rpg ! filesink
  * location=events.txt
  * ]|
  *
@@ -214,7 +214,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvenc, "eventcsvenc", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventnpyenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventnpyenc ! filesink
  * location=events.npy
  * ]|
  *
@@ -247,7 +247,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpyenc, "eventnpyenc", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventnpzenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventnpzenc ! filesink
  * location=events.npz
  * ]|
  *
@@ -283,7 +283,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzenc, "eventnpzenc", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventmcapenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventmcapenc ! filesink
  * location=events.mcap
  * ]|
  *
