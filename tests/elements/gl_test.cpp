@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The simulators on the GPU: against those on the CPU, and how they find OpenGL.
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
 #include <GLES3/gl31.h>
 #include <gst/gl/gl.h>
 #include <gst/gl/gstglfuncs.h>
@@ -229,7 +231,7 @@ std::atomic<GstGLContext*> lost = nullptr;     ///< or only this one
 std::atomic<GstGLContext*> current = nullptr;  ///< at the last look for errors
 std::atomic<bool> has_ended = false;
 std::atomic<bool> is_busy = false;
-std::atomic<int> waits = 0;
+std::atomic<int> waits = 0;  ///< for the GPU, not in the thread of a context
 
 /// Makes all contexts of the process report that they are lost where `is_lost`, and that the GPU is
 /// not done where `is_busy`, unless they wait for it.
@@ -237,7 +239,7 @@ void take_over_contexts() {
   { Harness("gleventsim-frame").caps(video); }  // GStreamer registers the type of contexts
   static gpointer (*get_proc_address)(GstGLAPI, const gchar*) = nullptr;
   static GLenum (*get_error)();
-  static PFNGLCLIENTWAITSYNCPROC wait_for;
+  static PFNEGLCLIENTWAITSYNCKHRPROC wait_for;
   auto* contexts =
       static_cast<GstGLContextClass*>(g_type_class_ref(g_type_from_name("GstGLContextEGL")));
   if (get_proc_address != nullptr) return;
@@ -252,12 +254,13 @@ void take_over_contexts() {
         return is_lost || current == lost ? context_lost : get_error();
       });
     }
-    if (std::string_view(name) == "glClientWaitSync") {
-      wait_for = reinterpret_cast<PFNGLCLIENTWAITSYNCPROC>(function);
+    if (std::string_view(name) == "eglClientWaitSyncKHR") {
+      wait_for = reinterpret_cast<PFNEGLCLIENTWAITSYNCKHRPROC>(function);
       return reinterpret_cast<gpointer>(
-          +[](GLsync sync, GLbitfield flags, GLuint64 timeout) -> GLenum {
-            waits += timeout > 0;
-            return is_busy && timeout == 0 ? GL_TIMEOUT_EXPIRED : wait_for(sync, flags, timeout);
+          +[](EGLDisplay display, EGLSyncKHR sync, EGLint flags, EGLTimeKHR timeout) -> EGLint {
+            if (is_busy && timeout == 0) return EGL_TIMEOUT_EXPIRED_KHR;
+            waits += timeout > 0 && gst_gl_context_get_current() == nullptr;
+            return wait_for(display, sync, flags, timeout);
           });
     }
     return function;
