@@ -204,6 +204,68 @@ TEST(OpenGl, SharesWhatItDrawsWithTheApplication) {
   gst_context_unref(display);
 }
 
+std::atomic<int> activations = 0;  ///< how often a thread made a context current
+
+void count_activations() {
+  { Harness("gleventsim-frame").caps(video); }  // GStreamer registers the type of contexts
+  static gboolean (*activate)(GstGLContext*, gboolean) = nullptr;
+  auto* contexts =
+      static_cast<GstGLContextClass*>(g_type_class_ref(g_type_from_name("GstGLContextEGL")));
+  if (activate != nullptr) return;
+  activate = contexts->activate;
+  contexts->activate = [](GstGLContext* context, gboolean current) -> gboolean {
+    ++activations;
+    return activate(context, current);
+  };
+}
+
+/// Plays cameras `first` to `last` - 1 in one pipeline, in one context that stays current. Returns
+/// the events of each.
+std::vector<std::string> events_of_cameras(int first, int last) {
+  std::string launch;
+  for (int i = first; i < last; ++i)
+    launch += " videotestsrc num-buffers=5 pattern=zone-plate kx2=" + std::to_string(10 + i) +
+              " ky2=20 kt=9 ! video/x-raw,format=GRAY8,width=64,height=48 ! gleventsim-frame ! "
+              "fakesink sync=false signal-handoffs=true name=events" +
+              std::to_string(i);
+  Pipeline pipeline(launch);
+  std::vector<std::string> events(static_cast<std::size_t>(last - first));
+  std::vector<GstElement*> sinks;
+  for (auto& bytes : events) {
+    sinks.push_back(pipeline[("events" + std::to_string(first + std::ssize(sinks))).c_str()]);
+    g_signal_connect(sinks.back(), "handoff",
+                     G_CALLBACK(+[](GstElement*, GstBuffer* buffer, GstPad*, std::string* out) {
+                       *out += bytes_of(buffer);
+                     }),
+                     &bytes);
+  }
+  EXPECT_TRUE(pipeline.reaches(GST_STATE_PAUSED)) << pipeline.error;
+  activations = 0;
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  EXPECT_EQ(activations, 0);
+  std::vector<GstGLContext*> contexts;
+  for (GstElement* sink : sinks) {
+    GstGLContext*& used = contexts.emplace_back();
+    gst_gl_query_local_gl_context(sink, GST_PAD_SINK, &used);
+    EXPECT_NE(used, nullptr);
+    EXPECT_EQ(used, contexts.front());
+  }
+  for (GstGLContext* context : contexts) gst_clear_object(&context);
+  return events;
+}
+
+TEST(OpenGl, IsOneContextForAllCamerasOfAPipeline) {
+  count_activations();
+  constexpr int cameras = 16;
+  const auto together = events_of_cameras(0, cameras);
+  EXPECT_GT(activations, 0);  // at the end of the context
+  for (int i = 0; i < cameras; ++i) {
+    const auto& events = together[static_cast<std::size_t>(i)];
+    EXPECT_GT(events.size(), 8U * 100);
+    EXPECT_EQ(events_of_cameras(i, i + 1).front() == events, true) << i;
+  }
+}
+
 TEST(OpenGl, IsNamedInAnErrorWhereItIsMissing) {
   // Neither a screen nor a device, in a process of its own.
   const auto run = [] {
