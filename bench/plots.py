@@ -38,6 +38,7 @@ GROWTH = [
         "dense-farneback": ("dense, farneback", "#8a5ab5"),
     },
     {
+        "dvs": ("dvs, default", "#262b36"),
         "dvs-ideal": ("dvs, ideal", "#3a9a68"),
         "dvs-denoised": ("dvs, ideal, denoise=8", "#2f6fb5"),
         "dvs-v2e-noisy": ("dvs, v2e-noisy", "#d0573e"),
@@ -63,7 +64,12 @@ PAPER_RUNTIMES = [
 ]
 # The documentation of EventCV's simulator: a moving edge at 640x480 and at 1280x720, on 12 cores.
 EVENTCV_RUNTIMES = ("EventCV", None, 56, 185)
-ROWS = [*PAPER_RUNTIMES, EVENTCV_RUNTIMES, ("eventsim-dvs, ideal", "dvs-ideal", None, None)]
+ROWS = [
+    *PAPER_RUNTIMES,
+    EVENTCV_RUNTIMES,
+    ("eventsim-dvs, default", "dvs", None, None),
+    ("eventsim-dvs, ideal", "dvs-ideal", None, None),
+]
 REAL_TIME = 30  # milliseconds, the paper's line
 ON_WHITE = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
 

@@ -16,7 +16,7 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 videotestsrc pattern=ball ! tee name=t  t. ! queue ! videoconvert ! eventoverlay
- * name=overlay ! videoconvert ! autovideosink  t. ! queue ! eventsim-diff ! overlay.event_sink
+ * name=overlay ! videoconvert ! autovideosink  t. ! queue ! eventsim-dvs ! overlay.event_sink
  * ]|
  *
  * Since: 0.1

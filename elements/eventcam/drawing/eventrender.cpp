@@ -28,7 +28,7 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc pattern=ball ! eventsim-diff ! eventrender mode=decay !
+ * gst-launch-1.0 videotestsrc pattern=ball ! eventsim-dvs ! eventrender mode=decay !
  * video/x-raw,framerate=60/1 ! videoconvert ! autovideosink
  * ]|
  *

@@ -15,7 +15,7 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventhdf5sink format=metavision
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventhdf5sink format=metavision
  * location=events.hdf5
  * ]|
  *

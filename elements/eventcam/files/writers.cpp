@@ -33,7 +33,7 @@ using eventcamera::SensorSize;
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 v4l2src ! eventsim-diff ! evtenc format=EVT3 ! filesink location=out.raw
+ * gst-launch-1.0 v4l2src ! eventsim-dvs ! evtenc format=EVT3 ! filesink location=out.raw
  * ]|
  *
  * Since: 0.1
@@ -105,7 +105,7 @@ GST_ELEMENT_REGISTER_DEFINE(evtenc, "evtenc", GST_RANK_PRIMARY, event_writer_typ
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventdatenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventdatenc ! filesink
  * location=test.dat
  * ]|
  *
@@ -132,7 +132,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventesenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventesenc ! filesink
  * location=test.es
  * ]|
  *
@@ -171,7 +171,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventcsvenc format=rpg ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventcsvenc format=rpg ! filesink
  * location=events.txt
  * ]|
  *
@@ -221,7 +221,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvenc, "eventcsvenc", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventnpyenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventnpyenc ! filesink
  * location=events.npy
  * ]|
  *
@@ -256,7 +256,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpyenc, "eventnpyenc", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventnpzenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventnpzenc ! filesink
  * location=events.npz
  * ]|
  *
@@ -292,7 +292,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzenc, "eventnpzenc", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventmcapenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventmcapenc ! filesink
  * location=events.mcap
  * ]|
  *

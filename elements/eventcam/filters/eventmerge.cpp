@@ -30,7 +30,7 @@
  * gst-launch-1.0 eventmerge name=m sink_1::xpos=346 ! eventrender ! videoconvert ! autovideosink
  * filesrc location=left.raw ! evtdec ! m.sink_0  filesrc location=right.raw ! evtdec ! m.sink_1
  * gst-launch-1.0 eventmerge name=m ! eventrender ! videoconvert ! autovideosink  videotestsrc
- * num-buffers=300 is-live=true pattern=ball ! eventsim-diff ! queue ! m.  videotestsrc
+ * num-buffers=300 is-live=true pattern=ball ! eventsim-dvs ! queue ! m.  videotestsrc
  * num-buffers=300 is-live=true pattern=snow ! eventsim-frame ! queue ! m.
  * ]|
  *

@@ -29,7 +29,7 @@
  * |[
  * gst-launch-1.0 udpsrc port=3333 ! eventdatagramdepay format=spif width=640 height=480 !
  * eventrender ! videoconvert ! autovideosink
- * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-diff !
+ * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-dvs !
  * eventdatagrampay format=spif ! udpsink host=receiver port=3333
  * ]|
  *

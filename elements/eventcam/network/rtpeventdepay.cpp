@@ -35,7 +35,7 @@
  * gst-launch-1.0 udpsrc port=5000
  * caps="application/x-rtp,media=application,clock-rate=1000000,encoding-name=X-EVENT-CAMERA,width=640,height=480"
  * ! rtpjitterbuffer ! rtpeventdepay ! eventrender ! videoconvert ! autovideosink
- * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-diff !
+ * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-dvs !
  * rtpeventpay ! udpsink host=receiver port=5000
  * ]|
  *

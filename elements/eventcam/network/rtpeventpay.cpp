@@ -21,7 +21,7 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 v4l2src ! eventsim-diff ! rtpeventpay ! udpsink host=receiver port=5000
+ * gst-launch-1.0 v4l2src ! eventsim-dvs ! rtpeventpay ! udpsink host=receiver port=5000
  * ]|
  *
  * Since: 0.1
