@@ -134,24 +134,30 @@ def draw_runtimes(runs, on_gpu, path):
         ("Many events: from a moving car, 640x480", "driving-640x480", 2),
         ("Few events: a ball, 1280x720", "ball-1280x720", 3),
     ]
+
+    def bars_of(row, scene, column):
+        bars = [(row[column], EVENTCV if row is EVENTCV_RUNTIMES else PAPER)] if row[column] else []
+        for formulation, colour in (("naive", NAIVE), ("ours", OURS)):
+            run = runs.get(f"{scene}/{row[1]}/{formulation}/threads:2")
+            if run:
+                bars.append((run["real_time"], colour))
+        if f"{scene}/{row[1]}" in on_gpu:
+            bars.append((on_gpu[f"{scene}/{row[1]}"], OURS_ON_GPU))
+        return bars
+
+    # Both panels have the same rows, as high as the one with more bars.
+    rows = [[bars_of(row, scene, column) for _, scene, column in panels] for row in ROWS]
     figure, all_axes = plt.subplots(1, 2, figsize=(13, 10), sharey=True)
-    for axes, (title, scene, column) in zip(all_axes, panels):
+    for panel, (axes, (title, _, _)) in enumerate(zip(all_axes, panels)):
         top = 0.0
         ticks = []
-        for row in ROWS:
-            bars = [(row[column], EVENTCV if row is EVENTCV_RUNTIMES else PAPER)] if row[column] else []
-            for formulation, colour in (("naive", NAIVE), ("ours", OURS)):
-                run = runs.get(f"{scene}/{row[1]}/{formulation}/threads:2")
-                if run:
-                    bars.append((run["real_time"], colour))
-            if f"{scene}/{row[1]}" in on_gpu:
-                bars.append((on_gpu[f"{scene}/{row[1]}"], OURS_ON_GPU))
-            ticks.append(top + (len(bars) - 1) / 2)
-            for value, colour in bars:
-                axes.barh(top, value, height=0.86, color=colour)
-                axes.text(value * 1.12, top, short(value), va="center", fontsize=8.5, bbox=ON_WHITE)
-                top += 1
-            top += 0.7
+        for row in rows:
+            height = max(map(len, row))
+            ticks.append(top + (height - 1) / 2)
+            for i, (value, colour) in enumerate(row[panel]):
+                axes.barh(top + i, value, height=0.86, color=colour)
+                axes.text(value * 1.12, top + i, short(value), va="center", fontsize=8.5, bbox=ON_WHITE)
+            top += height + 0.7
         axes.axvline(REAL_TIME, color="#5a62d8", linewidth=1, linestyle=(0, (4, 3)), zorder=0)
         axes.text(
             REAL_TIME,
