@@ -155,6 +155,21 @@ TEST(OpenGl, IsSharedWithThePipeline) {
   EXPECT_TRUE(pipeline.play()) << pipeline.error;
 }
 
+TEST(OpenGl, KeepsFramesAndPicturesInTextures) {
+  Pipeline pipeline(
+      "videotestsrc num-buffers=3 ! video/x-raw,format=NV12 ! glupload ! gleventsim-frame name=it "
+      "! "
+      "video/x-raw(memory:GLMemory) ! fakesink");
+  EXPECT_TRUE(pipeline.reaches(GST_STATE_PAUSED)) << pipeline.error;
+  for (const char* name : {"sink", "src"}) {
+    const Owned<GstPad> pad(gst_element_get_static_pad(pipeline["it"], name));
+    const Owned<GstCaps> caps(gst_pad_get_current_caps(pad.get()));
+    EXPECT_TRUE(gst_caps_features_contains(gst_caps_get_features(caps.get(), 0),
+                                           GST_CAPS_FEATURE_MEMORY_GL_MEMORY))
+        << name;
+  }
+}
+
 TEST(OpenGl, SharesWhatItDrawsWithTheApplication) {
   gst_init(nullptr, nullptr);
   const Owned<GstElement> pipeline(
