@@ -275,13 +275,15 @@ double element_cost_of(const Method& method, const Clip& clip, const Settings& s
       gst_buffer_fill(buffer, static_cast<gsize>(y * GST_VIDEO_INFO_PLANE_STRIDE(&video, 0)),
                       frame.row(y), static_cast<gsize>(frame.width()));
     GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(i) * bench::frame_time;
-    gst_app_src_push_buffer(source, buffer);  // waits until the last one has been taken
+    gst_app_src_push_buffer(source, buffer);  // blocks until the last one is taken
   };
-  for (std::int64_t i = 0; i < untimed; ++i) push(i);
+  // When a frame has been pushed, the last but one has passed the simulator.
+  constexpr std::int64_t in_flight = 2;
+  for (std::int64_t i = 0; i < untimed + in_flight; ++i) push(i);
   const auto start = Clock::now();
-  std::int64_t frames = 0;
+  std::int64_t frames = in_flight;
   for_each_timed([&](std::int64_t i) {
-    push(i);
+    push(i + in_flight);
     ++frames;
   });
   gst_app_src_end_of_stream(source);
