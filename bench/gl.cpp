@@ -129,14 +129,15 @@ class GpuTimer {
     names_.clear();
     mark("");
     work();
+    end_ = names_.size();
     mark("");
-    return time_between(0, names_.size() - 1);
+    return time_between(0, end_);
   }
 
   /// The kernels of the last commands.
   Passes passes() const {
     Passes passes;
-    for (std::size_t i = 1; i + 1 < names_.size(); ++i) {
+    for (std::size_t i = 1; i < end_; ++i) {
       auto& [runs, time] = passes[names_[i]];
       ++runs;
       time += time_between(i, i + 1);
@@ -161,6 +162,7 @@ class GpuTimer {
 
   gl::Context& gl_;
   std::vector<std::string> names_;  ///< of the kernels that start at each timestamp
+  std::size_t end_ = 0;             ///< timestamp of the end; read() may run kernels later
   std::vector<GLuint> queries_;
   PFNGLGENQUERIESPROC gen_queries_ =
       reinterpret_cast<PFNGLGENQUERIESPROC>(gl_test::load("glGenQueries"));
