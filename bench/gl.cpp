@@ -43,8 +43,7 @@ double time_of(const Work& work) {
   return milliseconds_since(start);
 }
 
-/// Frames of a clip, back and forth, that come first and are not timed: drivers compile late, and
-/// diff has no difference before the third.
+/// Warm-up frames: drivers compile late, and diff tracks from the third frame on.
 constexpr std::int64_t untimed = 4;
 
 double max_duration = 1000;  ///< of a measurement, milliseconds
@@ -103,7 +102,7 @@ const Method methods[] = {
     {bench::diff_method, gl::make_diff_simulator, "gleventsim-diff"},
 };
 
-/// Time of the GPU for all runs of a kernel in a frame.
+/// GPU time of all runs of a kernel in a frame.
 struct Pass {
   int runs;
   double time;  ///< milliseconds
@@ -118,12 +117,12 @@ class GpuTimer {
   GpuTimer(const GpuTimer&) = delete;
   GpuTimer& operator=(const GpuTimer&) = delete;
 
-  /// Times each kernel, too, from its start to the start of the next one.
+  /// Also times each kernel, from its start to the start of the next one.
   void time_kernels() {
     gl_.on_kernel = [this](std::string_view kernel) { mark(std::string(kernel)); };
   }
 
-  /// Milliseconds that the GPU takes for the commands that `work` queues. Waits for it.
+  /// Returns the GPU time of the commands that `work` queues, milliseconds. Waits for the GPU.
   template <class Work>
   double time_of(const Work& work) {
     names_.clear();
@@ -134,7 +133,7 @@ class GpuTimer {
     return time_between(0, end_);
   }
 
-  /// The kernels of the last commands.
+  /// Times of the kernels in the last time_of().
   Passes passes() const {
     Passes passes;
     for (std::size_t i = 1; i < end_; ++i) {
@@ -172,12 +171,12 @@ class GpuTimer {
   GetResult get_result_ = reinterpret_cast<GetResult>(gl_test::load("glGetQueryObjectui64v"));
 };
 
-/// Milliseconds of a frame, and its events.
+/// Milliseconds per frame, and number of events.
 struct Costs {
   double upload;
-  double call;     ///< that queues the kernels; llvmpipe works in it
-  double kernels;  ///< work of the GPU
-  double read;     ///< of the events, when the GPU is done
+  double call;     ///< to queue the kernels; llvmpipe runs them in it
+  double kernels;  ///< on the GPU
+  double read;     ///< to copy the events, once the GPU has finished
   double events;
   Passes passes;
 };
@@ -235,7 +234,7 @@ Costs costs_of(gl::Context& context, const Method& method, const Clip& clip,
   return costs;
 }
 
-/// Milliseconds of a frame on the CPU.
+/// Milliseconds per frame on the CPU.
 double cpu_cost_of(const Method& method, const Clip& clip, const Settings& settings) {
   const auto simulator = method.cpu.ours({clip[0].width(), clip[0].height(), 8});
   const auto play = [&](std::int64_t i) {
@@ -249,7 +248,7 @@ double cpu_cost_of(const Method& method, const Clip& clip, const Settings& setti
   return median(times);
 }
 
-/// Milliseconds of a frame in a pipeline, from memory to events.
+/// Milliseconds per frame in a pipeline, from memory to events.
 double element_cost_of(const Method& method, const Clip& clip, const Settings& settings) {
   std::string launch = "appsrc name=source format=time block=true max-buffers=1 ! glupload ! ";
   launch += std::string(method.element) +
