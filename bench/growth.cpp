@@ -48,7 +48,7 @@ void add(const std::string& axis, const std::string& value, const Setup& setup) 
           ->MinTime(0.03)  // for a plot
           ->UseRealTime();
     };
-    add_formulation("naive", method.naive);
+    if (method.naive) add_formulation("naive", method.naive);
     add_formulation("ours", method.ours);
   }
 }

@@ -28,7 +28,7 @@ using MakeSimulator = std::function<std::unique_ptr<Simulator>(const LumaFormat&
 struct Method {
   std::string name;
   double threshold;
-  MakeSimulator naive;
+  MakeSimulator naive;  ///< may be empty
   MakeSimulator ours;
 };
 
@@ -83,6 +83,11 @@ inline std::vector<Method> all_methods(double threshold_factor = 1) {
     settings.negative_threshold *= threshold_factor;
     methods.push_back(dvs_method(name, settings));
   }
+  auto settings = settings_of(DvsPreset::standard);
+  settings.positive_threshold *= threshold_factor;
+  settings.negative_threshold *= threshold_factor;
+  methods.push_back(dvs_method("dvs", settings));
+  methods.back().naive = nullptr;  // which has neither adaptation nor automatic denoising
   return methods;
 }
 

@@ -97,7 +97,7 @@ void register_simulators(const Scene& scene) {
           time_simulator(state, scene.clips, make, settings);
         });
       };
-      add_formulation("naive", method.naive);
+      if (method.naive) add_formulation("naive", method.naive);
       add_formulation("ours", method.ours);
     };
     const auto add_after_flow = [&](const std::string& name, auto time) {

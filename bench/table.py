@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Prints the tables of a benchmark run, a row per method and a column per scene: speed relative to
-the naive implementation, and milliseconds per frame; the same of dense flow alone relative to
-OpenCV's; and the sizes that each method holds in real time.
+"""Prints the tables of a benchmark run: a summary; milliseconds per frame and speed relative to the
+naive implementation, a row per method and a column per scene; the same for dense flow alone relative
+to OpenCV's; and the sizes that each method sustains in real time.
 
   table.py BENCHMARKS.json [PAGE.md]
 
@@ -29,10 +29,22 @@ METHODS = {
     "dense-farneback": "dense, `farneback`, with flow",
     "sparse": "sparse, with tracking",
     "diff": "diff, with tracking",
+    "dvs": "dvs, default, with flow",
     "dvs-ideal": "dvs, `ideal`",
     "dvs-denoised": "dvs, `ideal`, `denoise=8`",
     "dvs-v2e-noisy": "dvs, `v2e-noisy`",
     "dvs-motion": "dvs, `ideal`, `upsampling=motion`, with flow",
+}
+SUMMARY = {
+    "frame": "`eventsim-frame`",
+    "dense-dis-lq": "`eventsim-dense flow=dis-lq`",
+    "dense-dis-hq": "`eventsim-dense flow=dis-hq`",
+    "dense-farneback": "`eventsim-dense flow=farneback`",
+    "sparse": "`eventsim-sparse`",
+    "diff": "`eventsim-diff`",
+    "dvs": "`eventsim-dvs`",
+    "dvs-ideal": "`eventsim-dvs preset=ideal`",
+    "dvs-v2e-noisy": "`eventsim-dvs preset=v2e-noisy`",
 }
 FLOWS = {
     "flow-dis-lq": "`dis-lq`",
@@ -105,8 +117,14 @@ beside_memcpy = beside("memcpy", lambda ours, memcpy: (
     f"**{ours / memcpy:.1f}×** memcpy ({milliseconds(ours)} ms)"))
 
 
+def largest_size(times, rate):
+    """The largest frame size that takes at most the time of a frame at this rate."""
+    sustained = [size for size in times if times[size] <= 1000 / rate]
+    return f"**{sustained[-1]}**" if sustained else "none"
+
+
 def table_of_sizes(sizes):
-    """The largest size that each method holds at a rate, and its times."""
+    """The largest size that each method sustains at a rate, and its times."""
     columns = list(dict.fromkeys(size for times in sizes.values() for size in times))
     if not columns:
         return ""
@@ -114,28 +132,47 @@ def table_of_sizes(sizes):
     lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
     for method, label in METHODS.items():
         if times := sizes.get(method):
-            held = [[size for size in times if times[size] <= 1000 / rate] for rate in RATES]
-            cells = [label, *(f"**{each[-1]}**" if each else "none" for each in held)]
+            cells = [label, *(largest_size(times, rate) for rate in RATES)]
             cells += [milliseconds(times[size]) if size in times else "" for size in columns]
             lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def summary(times, sizes):
+    """Milliseconds per frame in three scenes, and the largest size that each method sustains."""
+    columns = ["driving, 640x480", "busy cars, 1280x720", "driving, 1920x1080", "real time at 30 frames/s"]
+    lines = ["| two threads, ms | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
+    for method, label in SUMMARY.items():
+        sized = sizes.get(method, {})
+        found = [
+            times.get(("driving-640x480", method, "ours", "2")),
+            times.get(("busy-cars-1280x720", method, "ours", "2")),
+            sized.get("1920x1080"),
+        ]
+        cells = ["" if each is None else milliseconds(each) for each in found]
+        cells.append(largest_size(sized, 30) if sized else "")
+        if any(cells):
+            lines.append("| " + " | ".join([label, *cells]) + " |")
     return "\n".join(lines) + "\n"
 
 
 def main():
     with open(sys.argv[1], encoding="utf-8") as file:
         run = json.load(file)
-    times = times_of(run)
+    times, sizes = times_of(run), sizes_of(run)
+    short = "\n".join([summary(times, sizes), run_on(run["context"])])
     tables = [
         table(times, METHODS, "2", "two threads", beside_naive),
         table(times, METHODS, "1", "one thread", beside_naive),
         table(times, FLOWS, "2", "flow alone, two threads", beside_opencv),
         table(times, FLOWS, "1", "flow alone, one thread", beside_opencv),
-        table_of_sizes(sizes_of(run)),
+        table_of_sizes(sizes),
         table(times, COPIES, "1", "one thread", beside_memcpy),
     ]
-    text = "\n".join([run_on(run["context"])] + [each for each in tables if each])
-    print(text)
+    text = "\n".join(each for each in tables if each)
+    print(short + "\n" + text)
     if len(sys.argv) > 2:
+        replace_tables(sys.argv[2], "bench/run, in short", short)
         replace_tables(sys.argv[2], "bench/run", text)
 
 

@@ -29,7 +29,7 @@ def option_parser(program, description, address, port):
     source.add_argument("--device", help="camera, such as /dev/video0 (default: a test scene)")
     source.add_argument("--source", help="instead of a camera: a video or a recording of events, which is repeated; an"
                         ' address such as rtsp://camera/stream; or a pipeline, such as "v4l2src ! videoflip method=clockwise"')
-    parser.add_argument("--simulator", default="eventsim-diff", type=for_webcams,
+    parser.add_argument("--simulator", default="eventsim-dvs", type=for_webcams,
                         help='simulator and its properties, such as "eventsim-sparse positive-threshold=5"'
                         " (default: %(default)s)")
     parser.add_argument("--address", type=ipaddress.ip_address, default=address,

@@ -14,10 +14,10 @@ options:
   --help                 show this message and exit
   --version              print the version and exit
   --device DEVICE        camera, such as /dev/video0 (default: a test scene)
-  --simulator SIMULATOR  simulator and its properties (default: eventsim-diff)
+  --simulator SIMULATOR  simulator and its properties (default: eventsim-dvs)
 USAGE
 }
-simulator=(eventsim-diff)
+simulator=(eventsim-dvs)
 camera=(videotestsrc is-live=true pattern=ball)
 while [ $# -gt 0 ]; do
   case $1 in
@@ -57,7 +57,7 @@ done
 has() { # ELEMENT, from a plugin of any version
   gst-inspect-1.0 --exists --atleast-version=0.0 "$1"
 }
-if ! has eventsim-diff; then
+if ! has eventsim-dvs; then
   echo "error: GStreamer does not find the plugin eventsim. In a checkout, enter the development shell:" \
     "meson devenv -C build -w ." >&2
   echo "Otherwise install it: the Debian package gstreamer1.0-eventsim, or as root: meson install -C build" >&2

@@ -119,7 +119,7 @@ struct EventAggregatorFunctions {
   static auto guard(EventAggregator& self, const Work& work) {
     const auto report = [&self](const std::exception& error) -> Report {
       self.release_memory();
-      return events_report(self.role_.verb, error);
+      return events_report(self.role_.verb)(error);
     };
     return catch_exceptions(self.element_, report, work);
   }

@@ -133,11 +133,14 @@ bool is_a(const std::exception& error) {
   return dynamic_cast<const Exception*>(&error) != nullptr;
 }
 
-/// Report for an exception while an element processes events; `verb` is, for example, "count".
-inline Report events_report(const std::string& verb, const std::exception& error) {
-  if (is_a<std::bad_alloc>(error))
-    return {
-        GST_RESOURCE_ERROR_NO_SPACE_LEFT,
-        "Not enough memory to " + verb + " these events; free memory, or lower the resolution."};
-  return {GST_STREAM_ERROR_FAILED, "Cannot " + verb + " these events."};
+/// For catch_exceptions(): reports an exception while an element processes events; `verb` is, for
+/// example, "count".
+inline auto events_report(const char* verb) {
+  return [verb](const std::exception& error) -> Report {
+    if (is_a<std::bad_alloc>(error))
+      return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+              std::string("Not enough memory to ") + verb +
+                  " these events; free memory, or lower the resolution."};
+    return {GST_STREAM_ERROR_FAILED, std::string("Cannot ") + verb + " these events."};
+  };
 }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <new>
 
+using namespace eventcamera;
+
 static GstClockTime time_of_last_event(GstBuffer* buffer) {
   const gsize size = gst_buffer_get_size(buffer);
   GstEventCameraEvent last = {};
@@ -19,17 +21,17 @@ std::optional<EventInterval> interval_of(GstBuffer* buffer) {
   return EventInterval{start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)};
 }
 
-static std::span<eventcamera::Label> labels_in(const GstEventCameraLabelMeta* meta) {
-  return {reinterpret_cast<eventcamera::Label*>(meta->labels), meta->n_labels};
+static std::span<Label> labels_in(const GstEventCameraLabelMeta* meta) {
+  return {reinterpret_cast<Label*>(meta->labels), meta->n_labels};
 }
 
-std::span<eventcamera::Label> labels_of(GstBuffer* buffer) {
+std::span<Label> labels_of(GstBuffer* buffer) {
   const auto* meta = gst_buffer_get_event_camera_label_meta(buffer);
   if (meta == nullptr) return {};
   return labels_in(meta);
 }
 
-std::span<eventcamera::Label> add_labels(GstBuffer* buffer, gsize events) {
+std::span<Label> add_labels(GstBuffer* buffer, gsize events) {
   const auto* meta = gst_buffer_add_event_camera_label_meta(buffer, nullptr, events);
   if (meta == nullptr) throw std::bad_alloc();
   return labels_in(meta);

@@ -56,8 +56,7 @@ inline bool plays_events(gpointer element, GstEvent* event, const char* verb) {
   if (format == GST_FORMAT_TIME) return plays_forwards(element, event, verb);
   return refuse_segment(
       element, event,
-      {GST_STREAM_ERROR_FORMAT,
-       std::string("Cannot ") + verb + " " + gst_format_get_name(format) +
-           ": this stream has no timestamps. Insert a reader of event files upstream, such as "
-           "decodebin " ASK_FOR_EVENTS "."});
+      {GST_STREAM_ERROR_FORMAT, std::string("Cannot ") + verb + " " + gst_format_get_name(format) +
+                                    ": this stream has no timestamps. Insert a reader of event "
+                                    "files upstream, such as decodebin " ASK_FOR_EVENTS "."});
 }

@@ -3,6 +3,7 @@
 
 #include <gst/gst.h>
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
@@ -104,6 +105,38 @@ inline void install_stats(GObjectClass* klass, const std::function<GstStructure*
                          static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 }
 
+/// Nick of a property: "Maximum rate" of max-rate.
+inline const char* nick_of(const char* name) {
+  std::string nick = name;
+  for (const auto& [prefix, word] : {std::pair("min-", "minimum-"), std::pair("max-", "maximum-")})
+    if (nick.starts_with(prefix)) nick.replace(0, 4, word);
+  std::ranges::replace(nick, '-', ' ');
+  nick.front() = g_ascii_toupper(nick.front());
+  return g_intern_string(nick.c_str());
+}
+
+/// Specification of a property of the type of `value`, its default. `limits` are the minimum and
+/// the maximum of a number, or the type of an enum.
+template <class Value, class... Limits>
+GParamSpec* new_spec(const char* name, const char* blurb, const Value& value, GParamFlags flags,
+                     Limits... limits) {
+  const char* const nick = nick_of(name);
+  if constexpr (std::is_same_v<Value, bool>)
+    return g_param_spec_boolean(name, nick, blurb, value ? TRUE : FALSE, flags);
+  else if constexpr (std::is_same_v<Value, std::string>)
+    return g_param_spec_string(name, nick, blurb, value.c_str(), flags);
+  else if constexpr (sizeof...(limits) == 1)
+    return g_param_spec_enum(name, nick, blurb, limits..., static_cast<gint>(value), flags);
+  else if constexpr (std::is_floating_point_v<Value>)
+    return g_param_spec_double(name, nick, blurb, static_cast<gdouble>(limits)..., value, flags);
+  else if constexpr (sizeof(Value) == sizeof(guint64))
+    return g_param_spec_uint64(name, nick, blurb, static_cast<guint64>(limits)...,
+                               static_cast<guint64>(value), flags);
+  else
+    return g_param_spec_uint(name, nick, blurb, static_cast<guint>(limits)...,
+                             static_cast<guint>(value), flags);
+}
+
 /// For class_init: installs properties that are fields of the settings. `settings_of` returns the
 /// Guarded settings of an object. A class may have properties in several settings.
 template <auto settings_of>
@@ -113,6 +146,22 @@ class Properties {
       typename std::remove_reference_t<decltype(settings_of(static_cast<GObject*>(nullptr)))>::Type;
 
   explicit Properties(GObjectClass* klass) : klass_(klass) {}
+
+  /// Adds a property that may change at any time, with the default of its field. Limits as for
+  /// new_spec().
+  template <class Field, class... Limits>
+  void add(Field field, const char* name, const char* blurb, Limits... limits) {
+    Settings defaults{};
+    add(field,
+        new_spec(name, blurb, std::invoke(field, defaults), mutable_playing_flags, limits...));
+  }
+
+  /// Adds a property that may change in the states NULL and READY.
+  template <class Field, class... Limits>
+  void add_fixed(Field field, const char* name, const char* blurb, Limits... limits) {
+    Settings defaults{};
+    add(field, new_spec(name, blurb, std::invoke(field, defaults), mutable_ready_flags, limits...));
+  }
 
   /// Adds a property stored in `field`: a pointer to a member of Settings, or a function that
   /// returns a reference into it. Fields are numbers, enums, booleans or strings.

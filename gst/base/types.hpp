@@ -3,6 +3,8 @@
 
 #include <gst/gst.h>
 
+#include <algorithm>
+#include <initializer_list>
 #include <string>
 
 /// GObject types made from tables, which must have static storage duration.
@@ -40,6 +42,26 @@ inline GType enum_type(const char* name, const GEnumValue* values) {
     gst_value_register(parser);
   }
   return type;
+}
+
+/// A value of an enum property.
+template <class Enum>
+struct Choice {
+  Enum value;
+  const char* description;
+  const char* name;
+};
+
+/// For class_init: returns an enum type with these values.
+template <class Enum>
+GType enum_type(const char* name, std::initializer_list<Choice<Enum>> choices) {
+  const GType known = g_type_from_name(name);
+  if (known != G_TYPE_INVALID) return known;
+  auto* const values = g_new0(GEnumValue, choices.size() + 1);  // the type keeps them
+  std::ranges::transform(choices, values, [](const Choice<Enum>& choice) {
+    return GEnumValue{static_cast<gint>(choice.value), choice.description, choice.name};
+  });
+  return enum_type(name, values);
 }
 
 /// Registers a type. For classes that several plugins contain, each with its own type name: names

@@ -9,9 +9,9 @@
 
 #include "gst/base/types.hpp"
 
-using eventcamera::PaletteName;
+using namespace eventcamera;
 
-eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info) {
+PixelLayout pixel_layout_of(const GstVideoInfo& info) {
   if (GST_VIDEO_INFO_FORMAT(&info) == GST_VIDEO_FORMAT_GRAY8) return {};
   const auto place = [&info](int component) {
     return static_cast<int>(GST_VIDEO_INFO_COMP_POFFSET(&info, component));
@@ -23,20 +23,16 @@ eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info) {
 }
 
 GType palette_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(PaletteName::light), "On white: ON blue, OFF dark, both dark blue",
-       "light"},
-      {static_cast<int>(PaletteName::dark), "On dark: ON white, OFF blue, both light blue", "dark"},
-      {static_cast<int>(PaletteName::grey), "On grey: ON white, OFF black, both dark grey", "grey"},
-      {static_cast<int>(PaletteName::red_blue), "On white: ON blue, OFF red, both purple",
-       "red-blue"},
-      {static_cast<int>(PaletteName::viridis),
-       "From purple through green to yellow, perceptually uniform", "viridis"},
-      {static_cast<int>(PaletteName::magma),
-       "From black through red to light yellow, perceptually uniform", "magma"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventPalette", values);
+  return enum_type<PaletteName>(
+      "GstEventPalette",
+      {{PaletteName::light, "On white: ON blue, OFF dark, both dark blue", "light"},
+       {PaletteName::dark, "On dark: ON white, OFF blue, both light blue", "dark"},
+       {PaletteName::grey, "On grey: ON white, OFF black, both dark grey", "grey"},
+       {PaletteName::red_blue, "On white: ON blue, OFF red, both purple", "red-blue"},
+       {PaletteName::viridis, "From purple through green to yellow, perceptually uniform",
+        "viridis"},
+       {PaletteName::magma, "From black through red to light yellow, perceptually uniform",
+        "magma"}});
 }
 
 /// True if a meta of type `api` depends neither on the colours of the pixels nor on their memory

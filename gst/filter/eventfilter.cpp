@@ -18,9 +18,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_filter_debug);
 #define GST_CAT_DEFAULT event_filter_debug
 
-using eventcamera::LabelledEvents;
-using eventcamera::Microseconds;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 
 namespace {
 
@@ -131,7 +129,7 @@ static void align_events(GstBuffer* buffer) {
   {
     const WritableBytes mapped(buffer, GST_MAP_READWRITE);
     const auto address = reinterpret_cast<std::uintptr_t>(mapped.get().data());
-    if (address % alignof(eventcamera::Event) == 0) return;
+    if (address % alignof(Event) == 0) return;
     copy.reset(copied_buffer(mapped.get()));
   }
   gst_buffer_replace_all_memory(buffer, gst_buffer_get_memory(copy.get(), 0));
@@ -152,10 +150,10 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
     const auto max_t = GST_BUFFER_DURATION_IS_VALID(buffer)
                            ? (interval->end - interval->start) / GST_USECOND
                            : GstClockTime{G_MAXUINT32};
-    eventcamera::InvalidEvents invalid;
-    const auto valid = eventcamera::keep_valid(
-        all, priv.stream->state->sensor,
-        static_cast<guint32>(std::min(max_t, GstClockTime{G_MAXUINT32})), invalid);
+    InvalidEvents invalid;
+    const auto valid =
+        keep_valid(all, priv.stream->state->sensor,
+                   static_cast<guint32>(std::min(max_t, GstClockTime{G_MAXUINT32})), invalid);
     const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
     const auto kept = priv.impl->filter(valid, continued(transform, valid, start));
     mapped.reset();

@@ -113,8 +113,9 @@ void describe_channels(const GstVideoInfo& video, eventcamera::gl::TextureFrame&
 
 /// A simulator on the GPU. The events of an interval are read once the next frame has been queued,
 /// so that the GPU has work while they are read and pushed; finish() reads them before. Both wait
-/// at a fence, in the thread of the context. Every frame, including first and drawn ones, is held
-/// until its fence has been reached.
+/// for a fence in the streaming thread: the thread of the context works for other elements, too.
+/// Only without EGL do they wait in that thread. Every frame, including first and drawn ones, is
+/// held until its fence has been reached.
 class TextureVideoSimulator final : public VideoSimulator {
  public:
   /// `context` belongs to `shared`, which must outlive this object.
@@ -189,6 +190,7 @@ class TextureVideoSimulator final : public VideoSimulator {
   std::optional<Interval> finish() override {
     if (!queued_) return std::nullopt;
     Queued done = *std::exchange(queued_, std::nullopt);
+    simulator_->wait();
     run([&] { done.interval.events = simulator_->read(); });
     if (done.is_drawn || done.interval.events == nullptr) return std::nullopt;
     return std::move(done.interval);

@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/eventreader.hpp"
 
-#include "gst/base/authors.hpp"
+#include <utility>
+
+#include "gst/base/element_type.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
+#include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/reader/event_reader.hpp"
+#include "src/formats/unsupported_format.hpp"
+
+using namespace eventcamera;
 
 GST_DEBUG_CATEGORY(event_reader_debug);
 #define GST_CAT_DEFAULT event_reader_debug
@@ -74,11 +80,9 @@ static void gst_event_reader_class_init(GstEventReaderClass* klass) {
   object_class->finalize = finalize;
   GST_ELEMENT_CLASS(klass)->change_state = change_state;
   Properties<settings_of>(object_class)
-      .add(&ReaderSettings::buffer_duration,
-           g_param_spec_uint64(
-               "buffer-duration", "Buffer duration",
-               "Duration of a buffer of events (nanoseconds, in whole microseconds)", GST_USECOND,
-               10 * GST_SECOND, ReaderSettings().buffer_duration, mutable_ready_flags));
+      .add_fixed(&ReaderSettings::buffer_duration, "buffer-duration",
+                 "Duration of a buffer of events (nanoseconds, in whole microseconds)", GST_USECOND,
+                 10 * GST_SECOND);
   install_stats(
       object_class, [](GObject* object) { return reader_of(object)->stats(); },
       "Counts since the start or the last seek: events, triggers, frames and imu-samples read; "
@@ -100,8 +104,7 @@ static void format_class_init(gpointer klass, gpointer data) {
   if (format.has_many_streams)
     add_pad_template(element_class, "video_%u", GST_PAD_SRC, RECORDED_VIDEO_CAPS,
                      GST_PAD_SOMETIMES);
-  gst_element_class_set_static_metadata(element_class, format.long_name, "Codec/Demuxer",
-                                        format.description, EVENTSIM_AUTHORS);
+  set_metadata(klass, format.long_name, "Codec/Demuxer", format.description);
   set_input_extensions(element_class, format.caps);
   if (format.add_properties != nullptr) {
     FormatProperties properties(G_OBJECT_CLASS(klass));
@@ -111,4 +114,58 @@ static void format_class_init(gpointer klass, gpointer data) {
 
 GType event_reader_type(const EventReaderFormat& format) {
   return row_type(GST_TYPE_EVENT_READER, format.type_name, format_class_init, &format);
+}
+
+TableSettings FormatSettings::table() const {
+  TableSettings settings;
+  if (time_unit > 0) settings.unit = static_cast<TimeUnit>(time_unit - 1);
+  if (column_order.empty()) return settings;
+  auto columns = columns_of(column_order);
+  if (!columns)
+    throw UnsupportedFormat("column-order \"" + column_order +
+                            "\" must have each of t, x, y and p once, and '-' for others");
+  settings.columns = *std::move(columns);
+  return settings;
+}
+
+void add_sensor_size(FormatProperties& properties) {
+  properties.add_fixed([](FormatSettings& settings) -> int& { return settings.sensor.width; },
+                       "width",
+                       "Width of the sensor in pixels, for files that do not state it; needs "
+                       "height. 0: of the smallest known sensor that contains the events",
+                       0, GST_EVENT_CAMERA_MAX_SIDE);
+  properties.add_fixed([](FormatSettings& settings) -> int& { return settings.sensor.height; },
+                       "height",
+                       "Height of the sensor in pixels, for files that do not state it; needs "
+                       "width. 0: of the smallest known sensor that contains the events",
+                       0, GST_EVENT_CAMERA_MAX_SIDE);
+}
+
+void add_topics(FormatProperties& properties) {
+  properties.add_fixed(&FormatSettings::topics, "topics",
+                       "Topics of events and images to read, separated by commas; empty = the "
+                       "first topic of events in the file, and all of images");
+}
+
+void add_events_path(FormatProperties& properties) {
+  properties.add_fixed(&FormatSettings::events_path, "events-path",
+                       "Path of the events in the file: of a dataset or a group, such as "
+                       "prophesee/right; empty = the first events");
+}
+
+void add_table_properties(FormatProperties& properties) {
+  add_sensor_size(properties);
+  properties.add_fixed(
+      &FormatSettings::time_unit, "time-unit",
+      "Unit of the times in the file; needed if the file is refused because its "
+      "time unit is ambiguous",
+      enum_type<int>("GstEventTimeUnit",
+                     {{0, "As stated in the file, or detected from its first rows", "auto"},
+                      {1, "Seconds", "seconds"},
+                      {2, "Milliseconds", "milliseconds"},
+                      {3, "Microseconds", "microseconds"},
+                      {4, "Nanoseconds", "nanoseconds"}}));
+  properties.add_fixed(&FormatSettings::column_order, "column-order",
+                       "Meaning of the columns: one letter t, x, y or p each, - for others, as in "
+                       "xytp; empty = as stated in the file, or detected from its first rows");
 }

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
@@ -19,7 +19,6 @@
 #include "gst/base/types.hpp"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/sensor_events.hpp"
-#include "gst/recording/stream_header.hpp"
 #include "gst/recording/writable_events.hpp"
 #include "src/core/event.hpp"
 #include "src/formats/waiting_items.hpp"
@@ -27,10 +26,7 @@
 GST_DEBUG_CATEGORY(event_writer_debug);
 #define GST_CAT_DEFAULT event_writer_debug
 
-using eventcamera::AbsoluteEvent;
-using eventcamera::Encoder;
-using eventcamera::Microseconds;
-using eventcamera::Trigger;
+using namespace eventcamera;
 
 namespace {
 
@@ -144,11 +140,10 @@ class WrittenFile {
   void warn_of_pending() const {
     const auto pending = encoder_->pending();
     if (pending == 0) return;
-    const Report report{
-        GST_STREAM_ERROR_ENCODE,
-        "Lost " + std::to_string(pending) + " event" + (pending == 1 ? "" : "s") +
-            ", and the file is incomplete, because the stream was stopped before its "
-            "end. Send EOS first, as gst-launch-1.0 -e does."};
+    const Report report{GST_STREAM_ERROR_ENCODE,
+                        "Lost " + std::to_string(pending) + " event" + (pending == 1 ? "" : "s") +
+                            ", and the file is incomplete, because the stream was stopped before "
+                            "its end. Send EOS first, as gst-launch-1.0 -e does."};
     GST_WARNING_OBJECT(element(), "%s", report.text.c_str());
     post_message(element(), GST_MESSAGE_WARNING, report,
                  "the format is written at the end of the stream");
@@ -185,7 +180,7 @@ class WrittenFile {
   }
 
   /// Overwrites part of the header.
-  GstFlowReturn push_patch(eventcamera::FilePatch patch) {
+  GstFlowReturn push_patch(FilePatch patch) {
     GST_DEBUG_OBJECT(element(),
                      "completing the header: %" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT,
                      patch.bytes.size(), patch.position);
@@ -258,7 +253,7 @@ class WrittenFile {
   }
 
   /// Encodes all queued triggers.
-  void encode_triggers() { encode(triggers_.pop_before(eventcamera::after_all_items)); }
+  void encode_triggers() { encode(triggers_.pop_before(after_all_items)); }
 
   /// Warns of the first pause that is removed, and at the end of the file of the total, if there
   /// are more.
@@ -268,14 +263,13 @@ class WrittenFile {
     if (removed == reported || (reported > 0 && !at_end)) return;
     pauses_reported_ = removed;
     const auto seconds = std::to_string(removed / 1'000'000) + " s";
-    post_message(
-        element(), GST_MESSAGE_WARNING,
-        {GST_STREAM_ERROR_ENCODE,
-         (reported == 0 ? "Left out a pause of " + seconds + ", which is"
-                        : "Left out pauses of " + seconds + " in total, which are") +
-             " too long for this format: later timestamps are shifted back by that much. Write "
-             "AEDAT4, HDF5, NumPy or text to keep them."},
-        "the clock of the format cannot represent " + std::to_string(removed) + " us");
+    post_message(element(), GST_MESSAGE_WARNING,
+                 {GST_STREAM_ERROR_ENCODE,
+                  (reported == 0 ? "Left out a pause of " + seconds + ", which is"
+                                 : "Left out pauses of " + seconds + " in total, which are") +
+                      " too long for this format: later timestamps are shifted back by that much. "
+                      "Write AEDAT4, HDF5, NumPy or text to keep them."},
+                 "the clock of the format cannot represent " + std::to_string(removed) + " us");
   }
 
   GstElement* element() const { return GST_PAD_PARENT(src_); }
@@ -289,7 +283,7 @@ class WrittenFile {
   std::vector<guint8> bytes_;  ///< encoded but not yet pushed
   guint mtu_ = G_MAXUINT;
   bool has_begun_ = false;
-  eventcamera::WaitingItems<Trigger> triggers_;
+  WaitingItems<Trigger> triggers_;
   Microseconds last_ = 0;              ///< time of the last encoded item
   std::uint64_t pauses_reported_ = 0;  ///< removed microseconds that a warning reported
 };
@@ -380,7 +374,7 @@ static GstFlowReturn negotiate(GstEventWriter* self, const GstEventCameraInfo& i
     GST_ELEMENT_ERROR(self, STREAM, FORMAT,
                       ("Downstream does not take this format, or not from a sensor of %s. Correct "
                        "the caps after this element.",
-                       eventcamera::in_pixels({info.width, info.height}).c_str()),
+                       in_pixels({info.width, info.height}).c_str()),
                       ("downstream takes %" GST_PTR_FORMAT, taken.get()));
     return GST_FLOW_NOT_NEGOTIATED;
   }
@@ -571,8 +565,8 @@ static void gst_event_writer_class_init(GstEventWriterClass* klass) {
 
 /// Specification of the enum property that selects a variant.
 static GParamSpec* spec_of(const EventWriterFormat::Variants& variants) {
-  return g_param_spec_enum(variants.property, variants.nick, variants.blurb, variants.type(),
-                           variants.default_value, mutable_ready_flags);
+  return g_param_spec_enum(variants.property, nick_of(variants.property), variants.blurb,
+                           variants.type(), variants.default_value, mutable_ready_flags);
 }
 
 static void format_class_init(gpointer klass, gpointer data) {
@@ -587,12 +581,10 @@ static void format_class_init(gpointer klass, gpointer data) {
     properties.add([](Settings& settings) -> int& { return settings.choice.compression; },
                    spec_of(*format.compressions));
   if (format.has_words)
-    properties.add(
-        &Settings::mtu,
-        g_param_spec_uint("mtu", "MTU",
-                          "Maximum size of a buffer of words in bytes, such as the payload of a "
-                          "network packet; words are never split",
-                          64, G_MAXUINT, G_MAXUINT, mutable_playing_flags));
+    properties.add(&Settings::mtu, "mtu",
+                   "Maximum size of a buffer of words in bytes, such as the payload of a network "
+                   "packet; words are never split",
+                   64, G_MAXUINT);
   install_stats(
       object_class,
       [](GObject* object) { return priv_of(GST_EVENT_WRITER(object)).writable.stats(); },
@@ -604,8 +596,7 @@ static void format_class_init(gpointer klass, gpointer data) {
                                     "width", GST_TYPE_INT_RANGE, 1, format.max_side, "height",
                                     GST_TYPE_INT_RANGE, 1, format.max_side, nullptr)));
   add_pad_template(element_class, "src", GST_PAD_SRC, format.caps);
-  gst_element_class_set_static_metadata(element_class, format.long_name, "Codec/Encoder",
-                                        format.description, EVENTSIM_AUTHORS);
+  set_metadata(klass, format.long_name, "Codec/Encoder", format.description);
   set_output_extensions(element_class, format.caps);
 }
 

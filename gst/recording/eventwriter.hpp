@@ -19,7 +19,6 @@ struct EventWriterFormat {
   /// Enum property that selects a variant of the format.
   struct Variants {
     const char* property;
-    const char* nick;
     const char* blurb;
     GType (*type)();  ///< enum type
     int default_value;

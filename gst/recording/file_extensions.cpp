@@ -6,7 +6,7 @@
 #include "gst/base/owned.hpp"
 #include "src/formats/file_formats.hpp"
 
-using eventcamera::FileFormat;
+using namespace eventcamera;
 
 /// Sets `key` to a field of each format of the caps, joined by `separator`.
 static void set_extensions(GstElementClass* klass, const char* key, const char* caps,
@@ -15,7 +15,7 @@ static void set_extensions(GstElementClass* klass, const char* key, const char* 
   std::string text;
   for (guint i = 0; i < gst_caps_get_size(types.get()); ++i) {
     const auto* const name = gst_structure_get_name(gst_caps_get_structure(types.get(), i));
-    const auto* const format = eventcamera::file_format_of(name);
+    const auto* const format = file_format_of(name);
     if (format == nullptr) continue;  // words without a header
     if (!text.empty()) text += separator;
     text += format->*field;

@@ -6,8 +6,7 @@
 
 #include "src/core/max_side.hpp"
 
-using eventcamera::Frame;
-using eventcamera::PixelFormat;
+using namespace eventcamera;
 
 static GstVideoFormat video_format(PixelFormat format) {
   switch (format) {
@@ -41,7 +40,7 @@ static const char* const frame_meta = "GstEventCameraFrame";
 /// Its times, as fields of the meta.
 struct TimeField {
   const char* name;
-  eventcamera::Microseconds Frame::*time;
+  Microseconds Frame::*time;
 };
 static constexpr TimeField time_fields[] = {{"begin", &Frame::begin},
                                             {"end", &Frame::end},
@@ -79,14 +78,14 @@ static void read_frame_meta(GstBuffer* buffer, Frame& frame) {
   int x = 0;
   int y = 0;
   if (gst_structure_get_int(fields, "x", &x) && gst_structure_get_int(fields, "y", &y) && x >= 0 &&
-      x < eventcamera::max_side && y >= 0 && y < eventcamera::max_side) {
+      x < max_side && y >= 0 && y < max_side) {
     frame.x = x;
     frame.y = y;
   }
 }
 
 bool frame_video_info(const Frame& frame, GstVideoInfo* info) {
-  return frame.width <= eventcamera::max_side && frame.height <= eventcamera::max_side &&
+  return frame.width <= max_side && frame.height <= max_side &&
          gst_video_info_set_format(info, video_format(frame.format),
                                    static_cast<guint>(frame.width),
                                    static_cast<guint>(frame.height));
@@ -97,7 +96,7 @@ GstBuffer* frame_buffer(const Frame& frame, const GstVideoInfo* info) {
   // GStreamer's own allocator would abort the process if memory is short.
   auto* const memory = static_cast<guint8*>(g_try_malloc0(size));
   if (memory == nullptr) throw std::bad_alloc();
-  const auto row = frame.width * eventcamera::bytes_per_pixel(frame.format);
+  const auto row = frame.width * bytes_per_pixel(frame.format);
   for (int y = 0; y < frame.height; ++y)
     std::copy_n(frame.pixels + y * frame.stride, row,
                 memory + std::ptrdiff_t{y} * GST_VIDEO_INFO_PLANE_STRIDE(info, 0));
@@ -106,7 +105,7 @@ GstBuffer* frame_buffer(const Frame& frame, const GstVideoInfo* info) {
   return buffer;
 }
 
-Frame recorded_frame(const GstVideoFrame* video, eventcamera::Microseconds t) {
+Frame recorded_frame(const GstVideoFrame* video, Microseconds t) {
   Frame frame;
   frame.t = frame.begin = frame.end = frame.exposure_begin = frame.exposure_end = t;
   read_frame_meta(video->buffer, frame);

@@ -8,9 +8,7 @@
 #include "gst/eventcamera/eventcamera.h"
 #include "src/formats/chunker.hpp"
 
-using eventcamera::Chunker;
-using eventcamera::ImuSample;
-using eventcamera::Trigger;
+using namespace eventcamera;
 
 static_assert(sizeof(GstEventCameraTrigger) == 16);
 static_assert(sizeof(GstEventCameraImuSample) == sizeof(ImuSample) &&

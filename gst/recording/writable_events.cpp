@@ -8,12 +8,7 @@
 
 #include "src/formats/temporary_file.hpp"
 
-using eventcamera::AbsoluteEvent;
-using eventcamera::Event;
-using eventcamera::Label;
-using eventcamera::Microseconds;
-using eventcamera::SensorSize;
-using eventcamera::TemporaryFileError;
+using namespace eventcamera;
 
 void WritableEvents::begin_file(SensorSize sensor) {
   sensor_ = sensor;
@@ -26,10 +21,10 @@ void WritableEvents::begin_file(SensorSize sensor) {
 bool WritableEvents::accepts(SensorSize sensor) const {
   if (sensor == sensor_) return true;
   post_message(element_, GST_MESSAGE_ERROR,
-               {GST_STREAM_ERROR_FORMAT,
-                "The sensor size changes from " + in_pixels(sensor_) + " to " + in_pixels(sensor) +
-                    " within a file. Start a new file for it, or set width and "
-                    "height where the events are read."},
+               {GST_STREAM_ERROR_FORMAT, "The sensor size changes from " + in_pixels(sensor_) +
+                                             " to " + in_pixels(sensor) +
+                                             " within a file. Start a new file for it, or set "
+                                             "width and height where the events are read."},
                "new caps after events were written");
   return false;
 }
@@ -47,14 +42,14 @@ Microseconds WritableEvents::time_of(GstClockTime pts) const {
 }
 
 void WritableEvents::report_buffer(GstBuffer* buffer) const {
-  post_message(element_, GST_MESSAGE_ERROR,
-               {GST_STREAM_ERROR_FORMAT,
-                "Cannot write a buffer that has no PTS or a partial event. Check the elements "
-                "upstream."},
-               GST_BUFFER_PTS(buffer) > G_MAXINT64
-                   ? "no PTS"
-                   : "cannot map " + std::to_string(gst_buffer_get_size(buffer)) +
-                         " bytes as events of 8 bytes");
+  post_message(
+      element_, GST_MESSAGE_ERROR,
+      {GST_STREAM_ERROR_FORMAT,
+       "Cannot write a buffer that has no PTS or a partial event. Check the elements upstream."},
+      GST_BUFFER_PTS(buffer) > G_MAXINT64
+          ? "no PTS"
+          : "cannot map " + std::to_string(gst_buffer_get_size(buffer)) +
+                " bytes as events of 8 bytes");
 }
 
 std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> events,
@@ -143,4 +138,17 @@ Report WritableEvents::failure(const std::exception& error, const Report& otherw
             std::string("Cannot keep events in a ") + error.what() +
                 ". Set the environment variable TMPDIR to a folder with enough space."};
   return otherwise;
+}
+
+OwnedCaps with_stream_header(OwnedCaps caps, GstBuffer* header) {
+  GST_BUFFER_FLAG_SET(header, GST_BUFFER_FLAG_HEADER);
+  GValue buffer = G_VALUE_INIT;
+  g_value_init(&buffer, GST_TYPE_BUFFER);
+  gst_value_set_buffer(&buffer, header);
+  GValue headers = G_VALUE_INIT;
+  g_value_init(&headers, GST_TYPE_ARRAY);
+  gst_value_array_append_and_take_value(&headers, &buffer);
+  GstCaps* const extended = gst_caps_make_writable(caps.release());
+  gst_structure_take_value(gst_caps_get_structure(extended, 0), "streamheader", &headers);
+  return OwnedCaps(extended);
 }

@@ -11,6 +11,7 @@
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/guarded.hpp"
+#include "gst/base/owned.hpp"
 #include "src/core/event.hpp"
 #include "src/core/sensor_size.hpp"
 
@@ -123,3 +124,7 @@ class WritableEvents {
   Dropped outside_;
   Guarded<Written> written_;
 };
+
+/// Adds `header` to caps as streamheader, which late joiners, such as clients of tcpserversink,
+/// receive first. Flags the buffer as a header.
+OwnedCaps with_stream_header(OwnedCaps caps, GstBuffer* header);

@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/event_pool.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"

@@ -2,7 +2,7 @@
  *
  * Example of reading events in C: runs a pipeline and counts the events that reach its appsink.
  *
- *   count_events "videotestsrc pattern=ball num-buffers=90 ! eventsim-diff ! appsink name=events"
+ *   count_events "videotestsrc pattern=ball num-buffers=90 ! eventsim-dvs ! appsink name=events"
  *
  * To build it outside this project:
  *   cc count_events.c $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
@@ -57,7 +57,7 @@ static gboolean check_caps(const GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) {
     g_printerr(
-        "The appsink receives %s, not events. Insert a simulator (! eventsim-diff ! appsink "
+        "The appsink receives %s, not events. Insert a simulator (! eventsim-dvs ! appsink "
         "name=events) or, for an event file, use: decodebin "
         "caps=\"application/x-event-camera,format=XYTP\" ! appsink name=events\n",
         gst_structure_get_name(gst_caps_get_structure(caps, 0)));

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Collects the events at the end of a pipeline in a NumPy file with the fields t (microseconds), x, y and p:
 
-    events_to_numpy.py "videotestsrc pattern=ball num-buffers=90 ! eventsim-diff" out.npy
+    events_to_numpy.py "videotestsrc pattern=ball num-buffers=90 ! eventsim-dvs" out.npy
 """
 import sys
 

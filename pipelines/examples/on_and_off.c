@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
 
   gst_init(&argc, &argv);
   pipeline = gst_parse_launch(
-      "videotestsrc pattern=ball num-buffers=40 ! eventsim-diff ! appsink name=events sync=false",
+      "videotestsrc pattern=ball num-buffers=40 ! eventsim-dvs ! appsink name=events sync=false",
       &error);
   if (error != NULL) {
     g_printerr("%s\n", error->message);
@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
     if (!gst_event_camera_info_from_caps(&info, gst_sample_get_caps(sample))) {
       g_printerr(
           "The appsink receives no events; insert a simulator or a reader: "
-          "! eventsim-diff ! appsink\n");
+          "! eventsim-dvs ! appsink\n");
       return 1;
     }
     if (events == 0) g_print("Events of a %dx%d sensor\n", info.width, info.height);

@@ -9,14 +9,14 @@ import {exit} from 'system';
 
 Gst.init(null);
 const pipeline = Gst.parse_launch(
-    'videotestsrc pattern=ball num-buffers=40 ! eventsim-diff ! appsink name=events sync=false');
+    'videotestsrc pattern=ball num-buffers=40 ! eventsim-dvs ! appsink name=events sync=false');
 const sink = pipeline.get_by_name('events');
 pipeline.set_state(Gst.State.PLAYING);
 let on = 0, events = 0, sample;
 while ((sample = sink.pull_sample())) {
     const [isEvents, info] = GstEventCamera.Info.from_caps(sample.get_caps());
     if (!isEvents) {
-        printerr('The appsink receives no events; insert a simulator or a reader: ! eventsim-diff ! appsink');
+        printerr('The appsink receives no events; insert a simulator or a reader: ! eventsim-dvs ! appsink');
         exit(1);
     }
     if (events === 0)

@@ -14,14 +14,14 @@ from gi.repository import Gst, GstApp, GstEventCamera  # noqa: E402, F401
 
 Gst.init(None)
 pipeline = Gst.parse_launch(
-    "videotestsrc pattern=ball num-buffers=40 ! eventsim-diff ! appsink name=events sync=false")
+    "videotestsrc pattern=ball num-buffers=40 ! eventsim-dvs ! appsink name=events sync=false")
 sink = pipeline.get_by_name("events")
 pipeline.set_state(Gst.State.PLAYING)
 on = events = 0
 while sample := sink.pull_sample():
     is_events, info = GstEventCamera.Info.from_caps(sample.get_caps())
     if not is_events:
-        sys.exit("The appsink receives no events; insert a simulator or a reader: ! eventsim-diff ! appsink")
+        sys.exit("The appsink receives no events; insert a simulator or a reader: ! eventsim-dvs ! appsink")
     if events == 0:
         print(f"Events of a {info.width}x{info.height} sensor")
     buffer = sample.get_buffer()

@@ -40,7 +40,7 @@ def simulate(video: str | os.PathLike[str], simulator: str = "eventsim-dvs") -> 
 
 
 def live(pipeline: str) -> Iterator[Events]:
-    """Yields the events at the end of a pipeline, such as "v4l2src ! eventsim-diff", an array a buffer.
+    """Yields the events at the end of a pipeline, such as "v4l2src ! eventsim-dvs", an array a buffer.
 
     Leaving the loop, by break, an exception or Ctrl-C, stops the pipeline. The pipeline waits while the loop is
     busy, but live sources drop events that are not read in time. Raises PipelineError."""

@@ -59,8 +59,8 @@ UnsupportedFormat not_sorted(const Chunker::Disorder& disorder) {
       "its events are not sorted by time: " + std::to_string(disorder.dropped) + " of " +
       std::to_string(disorder.rows) + " are more than 10 ms out of order, the first near row " +
       std::to_string(disorder.row) +
-      ". Sort its rows by time; a file of up to 16 million events that "
-      "filesrc reads is sorted without that");
+      ". Sort its rows by time; a file of up to 16 million events that filesrc reads is sorted "
+      "without that");
 }
 
 }  // namespace

@@ -16,8 +16,8 @@
 namespace eventcamera::gl {
 
 /// Simulator of 8-bit frames in textures. Must be made, used and destroyed while its context is
-/// current, except hold_until() and reset(). All other functions throw Error and std::bad_alloc;
-/// after that the simulator may only be destroyed.
+/// current, except hold_until(), reset(), wait() and drop(). All other functions throw Error and
+/// std::bad_alloc; after that the simulator may only be destroyed.
 ///
 /// Processing of a frame: a LumaKernel turns its texture into a GreyFrame; a method (frame_,
 /// dense_, sparse_ or diff_simulator) compares it with the last one and marks the pixels that fire
@@ -45,6 +45,10 @@ class Simulator : public IntervalSimulator {
   /// none.
   void draw(const TextureFrame& frame, Nanoseconds time, const Settings& settings,
             const Picture& picture);
+
+  /// Waits until the GPU has finished the first queued frame, if that is possible without a context
+  /// (EGL). Any thread may call it, so that read() need not wait in the context's.
+  void wait() const { queue_[first_].done.wait_without_context(); }
 
   /// Waits until the GPU has finished the first queued frame. Returns the sorted events of the
   /// interval that it ends, valid until the next call; nullptr if it ends none.

@@ -4,7 +4,7 @@
 set -eu
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-line="videotestsrc pattern=ball num-buffers=40 ! eventsim-diff ! appsink name=events sync=false"
+line="videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8 ! eventsim-dvs ! appsink name=events sync=false"
 
 "$BUILD/pipelines/count_events" "$line" | tee "$work/c"
 counted=$(sed -n 's/^Total *\([0-9]*\) events.*/\1/p' "$work/c")
@@ -24,7 +24,7 @@ refused() { # WORDS COMMAND...
   if grep -e Traceback -e CRITICAL "$work/errors"; then exit 1; fi
 }
 checks_pipelines() { # PROGRAM
-  refused "receives video/x-raw, not events..*! eventsim-diff ! appsink name=events" \
+  refused "receives video/x-raw, not events..*! eventsim-dvs ! appsink name=events" \
     "$1" "videotestsrc num-buffers=3 ! appsink name=events"
   refused "end it in: ! appsink name=events" "$1" "videotestsrc num-buffers=3 ! fakesink"
   refused "end it in: ! appsink name=events" "$1" "fakesink name=events"
@@ -56,7 +56,7 @@ PYTHON
 # PyTorch's workers read recordings and make voxel grids; the loss decreases.
 for name in first second; do
   "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=30 ! video/x-raw,width=64,height=48,framerate=30/1 ! \
-    eventsim-diff ! application/x-event-camera ! evtenc ! filesink location="$work/$name.raw"
+    eventsim-dvs ! application/x-event-camera ! evtenc ! filesink location="$work/$name.raw"
 done
 "$SOURCE/pipelines/examples/train_on_events.py" "$work/first.raw" "$work/second.raw" | tee "$work/training"
 awk '$1 == "epoch" { if (NR > 1 && ($6 + 0 >= last || $3 < 60)) exit 1; last = $6 } END { exit NR != 3 }' "$work/training"
@@ -73,7 +73,7 @@ for language in py js; do
 done
 # Without its simulator; in C, built with the pkg-config file of the build directory.
 for language in py js c; do
-  sed 's/eventsim-diff ! appsink name/appsink name/' "$SOURCE/pipelines/examples/on_and_off.$language" >"$work/video.$language"
+  sed 's/eventsim-dvs ! appsink name/appsink name/' "$SOURCE/pipelines/examples/on_and_off.$language" >"$work/video.$language"
 done
 export PKG_CONFIG_PATH=$BUILD/meson-uninstalled
 eval "flags=($(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0))" # escapes spaces

@@ -140,7 +140,7 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, context
     see_events(first)
     see_rate(first)
     wait_for("the state", lambda: first.evaluate("state.textContent") == "live")
-    assert first.evaluate("document.title") == "test scene, eventsim-diff", first.evaluate("document.title")
+    assert first.evaluate("document.title") == "test scene, eventsim-dvs", first.evaluate("document.title")
     wait_for("a curve of rates", lambda: len((first.evaluate("curve.getAttribute('points')") or "").split()) > 3)
     print("one viewer sees events, their rate and its curve, what is shown and the state")
 

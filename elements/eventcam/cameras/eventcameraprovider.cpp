@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "elements/eventcam/cameras/event_camera.hpp"
-#include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/evt_caps.hpp"
@@ -26,8 +26,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_camera_provider_debug);
 #define GST_CAT_DEFAULT event_camera_provider_debug
 
-using eventcamera::EventCamera;
-using eventcamera::VideoDevice;
+using namespace eventcamera;
 
 namespace {
 
@@ -166,7 +165,7 @@ std::optional<VideoDevice> described(const Device& video) {
 
 struct FoundDevice {
   std::string path;
-  eventcamera::VideoDevice device;
+  VideoDevice device;
 };
 
 /// The devices of Linux that capture video, /dev/video*.
@@ -246,7 +245,7 @@ static std::string elements_of(const FoundDevice& found, const EventCamera& came
               " ! video/x-raw,format=GRAY8,width=" + std::to_string(buffers.width) +
               ",height=" + std::to_string(buffers.height) + " ! evtparse name=parse";
   if (camera.format)
-    line += *camera.format == eventcamera::EvtFormat::evt21_legacy
+    line += *camera.format == EvtFormat::evt21_legacy
                 ? std::string(" format=EVT21-legacy")
                 : std::string(" format=") + evt_format_name(*camera.format);
   if (camera.sensor.width > 0)

@@ -54,7 +54,6 @@
 
 #include "elements/eventcam/cameras/event_camera.hpp"
 #include "gst/base/arrival_segment.hpp"
-#include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
@@ -74,11 +73,7 @@
 GST_DEBUG_CATEGORY_STATIC(evt_parse_debug);
 #define GST_CAT_DEFAULT evt_parse_debug
 
-using eventcamera::Chunker;
-using eventcamera::EvtFormat;
-using eventcamera::Framing;
-using eventcamera::Microseconds;
-using eventcamera::WordScanner;
+using namespace eventcamera;
 
 namespace {
 
@@ -86,12 +81,12 @@ namespace {
 class CameraBuffers {
  public:
   struct Transfer {
-    eventcamera::WordScanner::Transfer words;
+    WordScanner::Transfer words;
     GstClockTime arrival;  ///< running time, if the buffer has a time
     guint64 lost;          ///< buffers that the driver dropped before this one
   };
 
-  explicit CameraBuffers(eventcamera::Framing framing) : framing_(framing) {}
+  explicit CameraBuffers(Framing framing) : framing_(framing) {}
 
   /// Returns the transfer of a buffer of a segment, which holds `bytes`. Valid as long as these,
   /// and until the next call. May throw.
@@ -107,8 +102,7 @@ class CameraBuffers {
                       .lost = lost};
     if (GST_CLOCK_TIME_IS_VALID(arrival) && GST_CLOCK_TIME_IS_VALID(last) && arrival >= last &&
         arrival - last <= max_gap)
-      transfer.words.elapsed =
-          static_cast<eventcamera::Microseconds>((arrival - last) / GST_USECOND);
+      transfer.words.elapsed = static_cast<Microseconds>((arrival - last) / GST_USECOND);
     return transfer;
   }
 
@@ -122,13 +116,13 @@ class CameraBuffers {
     const auto arrival = segment.format == GST_FORMAT_TIME
                              ? gst_segment_to_running_time(&segment, GST_FORMAT_TIME, pts)
                              : pts;
-    constexpr auto max = static_cast<GstClockTime>(eventcamera::Chunker::max_time) * GST_USECOND;
+    constexpr auto max = static_cast<GstClockTime>(Chunker::max_time) * GST_USECOND;
     return arrival <= max ? arrival : GST_CLOCK_TIME_NONE;
   }
 
   /// Offsets of camera buffers are numbers; offsets of file buffers are in bytes.
   guint64 lost_before(GstBuffer* buffer, const GstSegment& segment) {
-    if (framing_ != eventcamera::Framing::padded || segment.format != GST_FORMAT_TIME) return 0;
+    if (framing_ != Framing::padded || segment.format != GST_FORMAT_TIME) return 0;
     const auto offset = GST_BUFFER_OFFSET(buffer);
     const auto last = std::exchange(last_offset_, offset);
     if (offset == GST_BUFFER_OFFSET_NONE || last == GST_BUFFER_OFFSET_NONE || offset <= last)
@@ -151,7 +145,7 @@ class CameraBuffers {
     return rows_;
   }
 
-  eventcamera::Framing framing_;
+  Framing framing_;
   std::vector<guint8> rows_;
   GstClockTime last_arrival_ = GST_CLOCK_TIME_NONE;
   guint64 last_offset_ = GST_BUFFER_OFFSET_NONE;
@@ -161,11 +155,9 @@ class CameraBuffers {
 /// arrive.
 class CameraSegment {
  public:
-  using Nanoseconds = eventcamera::Nanoseconds;
-
   /// Records the arrival of data up to the time `sent`. After a gap, the camera's clock may have
   /// been reset.
-  void arrive(eventcamera::Microseconds sent, GstClockTime arrival, bool after_gap) {
+  void arrive(Microseconds sent, GstClockTime arrival, bool after_gap) {
     is_due_ |= clock_.arrive(sent, static_cast<Nanoseconds>(arrival), after_gap);
   }
 
@@ -198,25 +190,15 @@ class CameraSegment {
   double drift() const { return clock_.drift(); }
 
  private:
-  eventcamera::ArrivalClock clock_;
+  ArrivalClock clock_;
   ArrivalSegment segment_{0};
   bool is_due_ = false;  ///< a segment that corrects the mapping
 };
 
-constexpr int max_side = 2048;
+constexpr int max_words_side = 2048;
 
 /// Value of `format`: as in the caps.
 constexpr int format_of_caps = -1;
-
-const GEnumValue word_formats[] = {
-    {format_of_caps, "As in the caps", "auto"},
-    {static_cast<int>(EvtFormat::evt2), "32-bit words, one event each", "EVT2"},
-    {static_cast<int>(EvtFormat::evt21), "64-bit words, up to 32 events each", "EVT21"},
-    {static_cast<int>(EvtFormat::evt21_legacy), "EVT21 with the upper half first", "EVT21-legacy"},
-    {static_cast<int>(EvtFormat::evt3), "16-bit words", "EVT3"},
-    {static_cast<int>(EvtFormat::evt4), "32-bit words, vectors of events", "EVT4"},
-    {0, nullptr, nullptr},
-};
 
 /// User-settable values.
 struct Settings {
@@ -229,7 +211,7 @@ struct Settings {
 /// Fields of the input's caps.
 struct Input {
   std::optional<EvtFormat> format;
-  eventcamera::SensorSize sensor;
+  SensorSize sensor;
   Framing framing = Framing::loose;
 };
 
@@ -294,7 +276,7 @@ static Guarded<Settings>& settings_of(GObject* object) {
 /* negotiation */
 
 static std::optional<EvtFormat> format_named(const char* name) {
-  const auto format = eventcamera::words_of_fourcc(name != nullptr ? name : "");
+  const auto format = words_of_fourcc(name != nullptr ? name : "");
   return format ? format : evt_format_named(name);
 }
 
@@ -326,8 +308,8 @@ static bool start_stream(GstEvtParse* self) {
   if (settings.format != format_of_caps) format = static_cast<EvtFormat>(settings.format);
   auto sensor = input.sensor;
   if (settings.width > 0 && settings.height > 0) sensor = {settings.width, settings.height};
-  if (!format || sensor.width < 1 || sensor.height < 1 || sensor.width > max_side ||
-      sensor.height > max_side) {
+  if (!format || sensor.width < 1 || sensor.height < 1 || sensor.width > max_words_side ||
+      sensor.height > max_words_side) {
     post_message(self, GST_MESSAGE_ERROR,
                  {GST_RESOURCE_ERROR_SETTINGS,
                   "Cannot read this camera: its caps do not tell the format of its words and the "
@@ -407,12 +389,11 @@ static void note_losses(GstEvtParse* self, const WordScanner::Counts& before, gu
                       buffers, guint64{counts.lost_bytes - before.lost_bytes},
                       guint64{counts.lost_events - before.lost_events});
   if (counts.lost_bytes > std::max<guint64>(counts.bytes, max_skipped))
-    priv.stream->warn_of_no_words(
-        self,
-        {GST_STREAM_ERROR_DECODE,
-         "Most of the camera's data is not valid in this format. Set format, width "
-         "and height to match the camera."},
-        std::to_string(counts.lost_bytes) + " bytes are not valid");
+    priv.stream->warn_of_no_words(self,
+                                  {GST_STREAM_ERROR_DECODE,
+                                   "Most of the camera's data is not valid in this format. Set "
+                                   "format, width and height to match the camera."},
+                                  std::to_string(counts.lost_bytes) + " bytes are not valid");
 }
 
 /// Raises the latency to the duration of the longest transfer.
@@ -579,24 +560,25 @@ static void gst_evt_parse_class_init(GstEvtParseClass* klass) {
   object_class->finalize = finalize;
 
   Properties<settings_of> properties(object_class);
-  properties.add(&Settings::format,
-                 g_param_spec_enum("format", "Format", "Format of the camera's words",
-                                   enum_type("GstEvtParseFormat", word_formats), format_of_caps,
-                                   mutable_ready_flags));
-  properties.add(
-      &Settings::width,
-      g_param_spec_uint("width", "Width", "Width of the sensor (pixels); 0 = as in the caps", 0,
-                        max_side, 0, mutable_ready_flags));
-  properties.add(
-      &Settings::height,
-      g_param_spec_uint("height", "Height", "Height of the sensor (pixels); 0 = as in the caps", 0,
-                        max_side, 0, mutable_ready_flags));
-  properties.add(
-      &Settings::latency,
-      g_param_spec_uint64("latency", "Latency",
-                          "Minimum time that live sinks wait for an event; they wait longer if a "
-                          "transfer takes longer (ns)",
-                          0, GST_SECOND, Settings().latency, mutable_ready_flags));
+  properties.add_fixed(
+      &Settings::format, "format", "Format of the camera's words",
+      enum_type<int>(
+          "GstEvtParseFormat",
+          {{format_of_caps, "As in the caps", "auto"},
+           {static_cast<int>(EvtFormat::evt2), "32-bit words, one event each", "EVT2"},
+           {static_cast<int>(EvtFormat::evt21), "64-bit words, up to 32 events each", "EVT21"},
+           {static_cast<int>(EvtFormat::evt21_legacy), "EVT21 with the upper half first",
+            "EVT21-legacy"},
+           {static_cast<int>(EvtFormat::evt3), "16-bit words", "EVT3"},
+           {static_cast<int>(EvtFormat::evt4), "32-bit words, vectors of events", "EVT4"}}));
+  properties.add_fixed(&Settings::width, "width",
+                       "Width of the sensor (pixels); 0 = as in the caps", 0, max_words_side);
+  properties.add_fixed(&Settings::height, "height",
+                       "Height of the sensor (pixels); 0 = as in the caps", 0, max_words_side);
+  properties.add_fixed(&Settings::latency, "latency",
+                       "Minimum time that live sinks wait for an event; they wait longer if a "
+                       "transfer takes longer (ns)",
+                       0, GST_SECOND);
   install_stats(
       object_class,
       [](GObject* object) { return structure_of(GST_EVT_PARSE(object)->priv->stats.copy()); },
@@ -609,7 +591,6 @@ static void gst_evt_parse_class_init(GstEvtParseClass* klass) {
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   element_class->change_state = change_state;
   add_pad_templates(element_class, "ANY", EVT_WORDS_CAPS);
-  gst_element_class_set_static_metadata(
-      element_class, "EVT word parser", "Codec/Parser",
-      "Finds the words of a live event camera in V4L2 buffers or loose bytes", EVENTSIM_AUTHORS);
+  set_metadata(klass, "EVT word parser", "Codec/Parser",
+               "Finds the words of a live event camera in V4L2 buffers or loose bytes");
 }

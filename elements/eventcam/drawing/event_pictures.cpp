@@ -13,8 +13,7 @@
 
 #define GST_CAT_DEFAULT category_
 
-using eventcamera::Microseconds;
-using eventcamera::Renderer;
+using namespace eventcamera;
 
 namespace {
 
@@ -349,10 +348,9 @@ gboolean decide_allocation(GstAggregator*, GstQuery* query) {
 
 void init_pictures_class(GstEventAggregatorClass* klass, const char* formats) {
   add_aggregator_pad_template(klass, "sink", GST_PAD_SINK, EVENT_CAPS);
-  const std::string video = std::string("video/x-raw, format = (string) ") + formats +
-                            ", " SIZE_CAPS
-                            ", framerate = (fraction) [ 0, max ], "
-                            "pixel-aspect-ratio = (fraction) 1/1";
+  const std::string video =
+      std::string("video/x-raw, format = (string) ") + formats +
+      ", " SIZE_CAPS ", framerate = (fraction) [ 0, max ], pixel-aspect-ratio = (fraction) 1/1";
   add_aggregator_pad_template(klass, "src", GST_PAD_SRC, video.c_str());
 
   GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);

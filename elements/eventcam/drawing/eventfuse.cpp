@@ -36,7 +36,7 @@
 
 #include "elements/eventcam/drawing/frame_times.hpp"
 #include "elements/eventcam/drawing/frames_with_events.hpp"
-#include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
@@ -48,9 +48,7 @@ GST_DEBUG_CATEGORY_STATIC(event_fuse_debug);
 
 namespace {
 
-using eventcamera::ComplementaryFilter;
-using eventcamera::Microseconds;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 
 class EventFuse final : public FramesWithEvents {
  public:
@@ -137,8 +135,8 @@ class EventFuse final : public FramesWithEvents {
     return current;
   }
 
-  eventcamera::InvalidEvents add(std::span<const eventcamera::Event> events, Microseconds origin,
-                                 Microseconds length) override {
+  InvalidEvents add(std::span<const Event> events, Microseconds origin,
+                    Microseconds length) override {
     if (!filter_) return {};
     const SensorSize frame{GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)};
     if (sensor_ != frame) {
@@ -207,9 +205,9 @@ class EventFuse final : public FramesWithEvents {
           ("%" GST_PTR_FORMAT, buffer));
       return false;
     }
-    const eventcamera::ImageView<std::uint8_t> view{
-        reinterpret_cast<const std::uint8_t*>(frame.data()), frame.stride(),
-        GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)};
+    const ImageView<std::uint8_t> view{reinterpret_cast<const std::uint8_t*>(frame.data()),
+                                       frame.stride(), GST_VIDEO_INFO_WIDTH(&*video_),
+                                       GST_VIDEO_INFO_HEIGHT(&*video_)};
     const auto time = static_cast<Microseconds>(running(start) / 1000);
     if (filter_)
       filter_->set_frame(view, time);
@@ -267,21 +265,15 @@ DEFINE_EVENT_AGGREGATOR(GstEventFuse, gst_event_fuse, EVENT_FUSE, EventFuse, eve
 
 static void gst_event_fuse_class_init(GstEventFuseClass* klass) {
   using Settings = ComplementaryFilter::Settings;
-  constexpr Settings defaults;
   Properties<aggregator_settings<EventFuse>> properties(G_OBJECT_CLASS(klass));
-  properties.add(&Settings::cutoff,
-                 g_param_spec_double("cutoff", "Cutoff",
-                                     "Frequency below which frames decide, and above which events "
-                                     "do (Hz; 0 = events only, after the first frame)",
-                                     0, 1000, defaults.cutoff, mutable_playing_flags));
-  properties.add(&Settings::positive_threshold,
-                 g_param_spec_double("positive-threshold", "Positive threshold",
-                                     "Rise of the logarithmic brightness by an ON event", 1e-3, 10,
-                                     defaults.positive_threshold, mutable_playing_flags));
-  properties.add(&Settings::negative_threshold,
-                 g_param_spec_double("negative-threshold", "Negative threshold",
-                                     "Fall of the logarithmic brightness by an OFF event", 1e-3, 10,
-                                     defaults.negative_threshold, mutable_playing_flags));
+  properties.add(&Settings::cutoff, "cutoff",
+                 "Frequency below which frames decide, and above which events do (Hz; 0 = events "
+                 "only, after the first frame)",
+                 0, 1000);
+  properties.add(&Settings::positive_threshold, "positive-threshold",
+                 "Rise of the logarithmic brightness by an ON event", 1e-3, 10);
+  properties.add(&Settings::negative_threshold, "negative-threshold",
+                 "Fall of the logarithmic brightness by an OFF event", 1e-3, 10);
 
 #define FUSED_VIDEO_CAPS \
   "video/x-raw, format = (string) GRAY8, " SIZE_CAPS ", framerate = (fraction) [ 0, max ]"
@@ -289,7 +281,6 @@ static void gst_event_fuse_class_init(GstEventFuseClass* klass) {
   add_aggregator_pad_template(aggregator, "video_sink", GST_PAD_SINK, FUSED_VIDEO_CAPS);
   add_aggregator_pad_template(aggregator, "event_sink", GST_PAD_SINK, EVENT_CAPS);
   add_aggregator_pad_template(aggregator, "src", GST_PAD_SRC, FUSED_VIDEO_CAPS);
-  gst_element_class_set_static_metadata(
-      GST_ELEMENT_CLASS(klass), "Event fusion", "Filter/Converter/Video",
-      "Fuses grey video and events into video of any framerate", EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event fusion", "Filter/Converter/Video",
+               "Fuses grey video and events into video of any framerate");
 }

@@ -16,7 +16,7 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 videotestsrc pattern=ball ! tee name=t  t. ! queue ! videoconvert ! eventoverlay
- * name=overlay ! videoconvert ! autovideosink  t. ! queue ! eventsim-diff ! overlay.event_sink
+ * name=overlay ! videoconvert ! autovideosink  t. ! queue ! eventsim-dvs ! overlay.event_sink
  * ]|
  *
  * Since: 0.1
@@ -32,7 +32,7 @@
 #include <span>
 
 #include "elements/eventcam/drawing/frames_with_events.hpp"
-#include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/properties.hpp"
@@ -43,11 +43,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_overlay_debug);
 #define GST_CAT_DEFAULT event_overlay_debug
 
-using eventcamera::Event;
-using eventcamera::Microseconds;
-using eventcamera::Overlay;
-using eventcamera::PaletteName;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 
 namespace {
 
@@ -124,9 +120,9 @@ class EventOverlay final : public FramesWithEvents {
  private:
   void start_over() noexcept override { overlay_.reset(); }
 
-  eventcamera::InvalidEvents add(std::span<const Event> events, Microseconds origin,
-                                 Microseconds length) override {
-    return overlay_ ? overlay_->add(events, origin, length) : eventcamera::InvalidEvents{};
+  InvalidEvents add(std::span<const Event> events, Microseconds origin,
+                    Microseconds length) override {
+    return overlay_ ? overlay_->add(events, origin, length) : InvalidEvents{};
   }
 
   /// Interval during which a frame is shown, in running time; since the last frame if its end is
@@ -180,8 +176,8 @@ class EventOverlay final : public FramesWithEvents {
     const auto start = current.accumulation_time > 0
                            ? end - static_cast<Microseconds>(current.accumulation_time / 1000)
                            : static_cast<Microseconds>(interval.start / 1000);
-    overlay_->draw(start, end, eventcamera::palette(current.palette), current.opacity,
-                   pixel_layout_of(*drawn_), frame.data(), frame.stride());
+    overlay_->draw(start, end, palette(current.palette), current.opacity, pixel_layout_of(*drawn_),
+                   frame.data(), frame.stride());
     return GST_FLOW_OK;
   }
 
@@ -224,21 +220,14 @@ DEFINE_EVENT_AGGREGATOR(GstEventOverlay, gst_event_overlay, EVENT_OVERLAY, Event
                         eventoverlay, GST_RANK_NONE, "events drawn over video")
 
 static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
-  const Settings defaults;
   Properties<aggregator_settings<EventOverlay>> properties(G_OBJECT_CLASS(klass));
-  properties.add(&Settings::palette,
-                 g_param_spec_enum(
-                     "palette", "Palette", "Colours of pixels with ON events, OFF events, and both",
-                     palette_type(), static_cast<int>(defaults.palette), mutable_playing_flags));
-  properties.add(&Settings::opacity,
-                 g_param_spec_double("opacity", "Opacity",
-                                     "Opacity of drawn events (0 = invisible, 1 = opaque)", 0, 1,
-                                     defaults.opacity, mutable_playing_flags));
-  properties.add(&Settings::accumulation_time,
-                 g_param_spec_uint64("accumulation-time", "Accumulation time",
-                                     "Time for which an event is shown (ns; 0 = one frame)", 0,
-                                     std::numeric_limits<gint64>::max(), defaults.accumulation_time,
-                                     mutable_playing_flags));
+  properties.add(&Settings::palette, "palette",
+                 "Colours of pixels with ON events, OFF events, and both", palette_type());
+  properties.add(&Settings::opacity, "opacity",
+                 "Opacity of drawn events (0 = invisible, 1 = opaque)", 0, 1);
+  properties.add(&Settings::accumulation_time, "accumulation-time",
+                 "Time for which an event is shown (ns; 0 = one frame)", 0,
+                 std::numeric_limits<gint64>::max());
 
 #define DRAWN_VIDEO_CAPS                                               \
   "video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS ", " SIZE_CAPS \
@@ -247,7 +236,5 @@ static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
   add_aggregator_pad_template(aggregator, "video_sink", GST_PAD_SINK, DRAWN_VIDEO_CAPS);
   add_aggregator_pad_template(aggregator, "event_sink", GST_PAD_SINK, EVENT_CAPS);
   add_aggregator_pad_template(aggregator, "src", GST_PAD_SRC, DRAWN_VIDEO_CAPS);
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event overlay",
-                                        "Filter/Editor/Video", "Draws events over video",
-                                        EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event overlay", "Filter/Editor/Video", "Draws events over video");
 }

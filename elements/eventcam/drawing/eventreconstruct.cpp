@@ -24,7 +24,7 @@
  * Since: 0.1
  */
 #include "elements/eventcam/drawing/event_pictures.hpp"
-#include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/drawing/drawn_video.hpp"
 
@@ -33,7 +33,7 @@ GST_DEBUG_CATEGORY_STATIC(event_reconstruct_debug);
 
 namespace {
 
-using eventcamera::Reconstruction;
+using namespace eventcamera;
 
 class EventReconstruct final : public EventPictures {
  public:
@@ -42,10 +42,10 @@ class EventReconstruct final : public EventPictures {
   Guarded<Reconstruction::Settings> settings;
 
  private:
-  eventcamera::RenderSettings render_settings() const override {
-    eventcamera::RenderSettings render;
-    render.mode = eventcamera::RenderMode::reconstruct;
-    render.palette = eventcamera::PaletteName::grey;
+  RenderSettings render_settings() const override {
+    RenderSettings render;
+    render.mode = RenderMode::reconstruct;
+    render.palette = PaletteName::grey;
     render.reconstruction = settings.copy();
     return render;
   }
@@ -57,23 +57,16 @@ DEFINE_EVENT_AGGREGATOR(GstEventReconstruct, gst_event_reconstruct, EVENT_RECONS
                         EventReconstruct, eventreconstruct, GST_RANK_NONE, "grey video from events")
 
 static void gst_event_reconstruct_class_init(GstEventReconstructClass* klass) {
-  constexpr Reconstruction::Settings defaults;
   Properties<aggregator_settings<EventReconstruct>> properties(G_OBJECT_CLASS(klass));
-  properties.add(&Reconstruction::Settings::cutoff,
-                 g_param_spec_double(
-                     "cutoff", "Cutoff",
-                     "Period of the temporal high pass: more shows larger and slower structures, "
-                     "and traces longer (events of a pixel)",
-                     Reconstruction::min_cutoff, 1e6, defaults.cutoff, mutable_playing_flags));
-  properties.add(&Reconstruction::Settings::smoothing,
-                 g_param_spec_double("smoothing", "Smoothing",
-                                     "Standard deviation of the Gaussian that smooths the picture "
-                                     "(pixels; 0 = none)",
-                                     0, Reconstruction::max_smoothing, defaults.smoothing,
-                                     mutable_playing_flags));
+  properties.add(&Reconstruction::Settings::cutoff, "cutoff",
+                 "Period of the temporal high pass: more shows larger and slower structures, and "
+                 "traces longer (events of a pixel)",
+                 Reconstruction::min_cutoff, 1e6);
+  properties.add(&Reconstruction::Settings::smoothing, "smoothing",
+                 "Standard deviation of the Gaussian that smooths the picture (pixels; 0 = none)",
+                 0, Reconstruction::max_smoothing);
   init_pictures_class(GST_EVENT_AGGREGATOR_CLASS(klass),
                       "{ GRAY8, BGRx, RGBx, xRGB, xBGR, BGRA, RGBA, ARGB, ABGR, RGB, BGR }");
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event reconstruction",
-                                        "Codec/Decoder/Video",
-                                        "Reconstructs grey video from events", EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event reconstruction", "Codec/Decoder/Video",
+               "Reconstructs grey video from events");
 }

@@ -28,33 +28,77 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc pattern=ball ! eventsim-diff ! eventrender mode=decay !
+ * gst-launch-1.0 videotestsrc pattern=ball ! eventsim-dvs ! eventrender mode=decay !
  * video/x-raw,framerate=60/1 ! videoconvert ! autovideosink
  * ]|
  *
  * Since: 0.1
  */
+#include <algorithm>
+#include <limits>
+
 #include "elements/eventcam/drawing/event_pictures.hpp"
-#include "elements/eventcam/drawing/render_properties.hpp"
-#include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/types.hpp"
 #include "gst/drawing/drawn_video.hpp"
+#include "src/render/renderer.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_render_debug);
 #define GST_CAT_DEFAULT event_render_debug
 
+using namespace eventcamera;
+
 namespace {
+
+/// User-settable values, copied once per picture.
+struct Settings {
+  RenderMode mode = RenderMode::accumulate;
+  PaletteName palette = PaletteName::dark;
+  GstClockTime accumulation_time = 0;
+  guint event_count = 0;
+  guint area_event_count = 0;
+  guint area_size = 16;
+  gdouble full_scale = 2;
+
+  /// Settings of the renderer. Those that a mode does not use keep their defaults, so that changing
+  /// them does not reset the picture.
+  RenderSettings of_renderer() const {
+    /// Default time constant of decay and maximum age of time-surface.
+    constexpr GstClockTime default_memory = 100 * GST_MSECOND;
+    RenderSettings settings;
+    settings.mode = mode;
+    settings.palette = palette;
+    const auto time = accumulation_time > 0 ? accumulation_time : default_memory;
+    if (mode == RenderMode::decay || mode == RenderMode::time_surface)
+      settings.time_constant = static_cast<Microseconds>(std::max(time / 1000, GstClockTime{1}));
+    else
+      settings.limits = {event_count, area_event_count, static_cast<int>(area_size)};
+    if (mode == RenderMode::decay || mode == RenderMode::count)
+      settings.full_scale = static_cast<float>(full_scale);
+    return settings;
+  }
+
+  /// Start of the window for the picture of an interval.
+  Microseconds window_start(const EventInterval& interval) const {
+    if (accumulation_time > 0)
+      return interval.end > accumulation_time
+                 ? static_cast<Microseconds>((interval.end - accumulation_time) / 1000)
+                 : -1;
+    if (event_count > 0 || area_event_count > 0) return -1;
+    return static_cast<Microseconds>(interval.start / 1000);
+  }
+};
 
 class EventRender final : public EventPictures {
  public:
   explicit EventRender(GstAggregator* element) : EventPictures(element, GST_CAT_DEFAULT) {}
 
-  Guarded<RenderProperties> settings;
+  Guarded<Settings> settings;
 
  private:
-  eventcamera::RenderSettings render_settings() const override {
-    return settings.copy().of_renderer();
-  }
-  eventcamera::Microseconds window_start(const EventInterval& interval) const override {
+  RenderSettings render_settings() const override { return settings.copy().of_renderer(); }
+  Microseconds window_start(const EventInterval& interval) const override {
     return settings.copy().window_start(interval);
   }
 };
@@ -66,9 +110,35 @@ DEFINE_EVENT_AGGREGATOR(GstEventRender, gst_event_render, EVENT_RENDER, EventRen
 
 static void gst_event_render_class_init(GstEventRenderClass* klass) {
   Properties<aggregator_settings<EventRender>> properties(G_OBJECT_CLASS(klass));
-  add_render_properties(properties);
+  properties.add(
+      &Settings::mode, "mode", "What a picture shows",
+      enum_type<RenderMode>(
+          "GstEventRenderMode",
+          {{RenderMode::accumulate, "Polarities that fired within a window", "accumulate"},
+           {RenderMode::decay, "Exponentially decaying sum of ON minus OFF", "decay"},
+           {RenderMode::time_surface, "Age and polarity of the last event", "time-surface"},
+           {RenderMode::count, "ON minus OFF within a window", "count"}}));
+  properties.add(&Settings::palette, "palette",
+                 "Colours of the picture; viridis and magma show magnitude, not polarity",
+                 palette_type());
+  properties.add(&Settings::accumulation_time, "accumulation-time",
+                 "Length of the window of accumulate and count, time constant of decay, maximum "
+                 "age of time-surface (ns; 0 = for accumulate and count, one frame, or as long as "
+                 "event-count and area-event-count allow; for the others, 100 ms)",
+                 0, std::numeric_limits<gint64>::max());
+  properties.add(
+      &Settings::event_count, "event-count",
+      "Maximum number of events in the window of accumulate and count (events; 0 = no limit)", 0,
+      RecentEvents::max_size);
+  properties.add(&Settings::area_event_count, "area-event-count",
+                 "Maximum number of events per area in the window of accumulate and count: the "
+                 "busiest area determines its length (events; 0 = no limit)",
+                 0, RecentEvents::max_size);
+  properties.add(&Settings::area_size, "area-size",
+                 "Side of the squares that area-event-count counts in (pixels)", 1, max_side);
+  properties.add(&Settings::full_scale, "full-scale",
+                 "Number of events of a pixel shown in full colour by decay and count (events)",
+                 0.1, 1e6);
   init_pictures_class(GST_EVENT_AGGREGATOR_CLASS(klass), DRAWN_VIDEO_FORMATS);
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event renderer",
-                                        "Codec/Decoder/Video", "Draws events as video",
-                                        EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event renderer", "Codec/Decoder/Video", "Draws events as video");
 }

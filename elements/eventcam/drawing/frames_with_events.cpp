@@ -12,9 +12,7 @@
 
 #define GST_CAT_DEFAULT category_
 
-using eventcamera::Event;
-using eventcamera::Microseconds;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 
 std::optional<EventInterval> running_interval(GstAggregatorPad* pad,
                                               const EventInterval& interval) {

@@ -9,9 +9,7 @@
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/sensor_events.hpp"
 
-using eventcamera::Aedat4Encoder;
-using eventcamera::Microseconds;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 
 /// Maximum time that events wait to be written as a packet.
 static constexpr Microseconds max_wait = 100'000;
@@ -42,7 +40,7 @@ bool AedatFile::handle_items(GstEvent* event) {
 
 /* bytes */
 
-AedatFile::Bytes AedatFile::begin(eventcamera::Aedat4Settings settings) {
+AedatFile::Bytes AedatFile::begin(Aedat4Settings settings) {
   settings.size = size_;
   if (!has_sensor() && video_)
     settings.size = {GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)};
@@ -65,7 +63,7 @@ AedatFile::Bytes AedatFile::begin(eventcamera::Aedat4Settings settings) {
 template <class Item>
 std::size_t AedatFile::encode(Waiting<Item>& waiting, const char* name, Bytes& out) {
   const std::span<const Item> items =
-      waiting ? waiting->pop_before(eventcamera::after_all_items) : std::span<Item>();
+      waiting ? waiting->pop_before(after_all_items) : std::span<Item>();
   const auto count = encoder_->encode(items, out);
   if (!items.empty())
     GST_CAT_LOG_OBJECT(category_, element_, "wrote %" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT " %s",

@@ -41,7 +41,6 @@
 
 #include "elements/eventcam/files/aedat_file.hpp"
 #include "gst/aggregator/sink_pads.hpp"
-#include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
@@ -55,14 +54,13 @@
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/frame_buffer.hpp"
-#include "gst/recording/stream_header.hpp"
+#include "gst/recording/writable_events.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(aedat_mux_debug);
 #define GST_CAT_DEFAULT aedat_mux_debug
 
-using eventcamera::Aedat4Compression;
-using eventcamera::Microseconds;
+using namespace eventcamera;
 
 namespace {
 
@@ -96,18 +94,6 @@ DEFINE_EVENT_ELEMENT(GstAedatMux, gst_aedat_mux, AEDAT_MUX, GstAggregator, GST_T
 constexpr const char* any_pad = "sink_%u";
 
 /* properties */
-
-static GType compression_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(Aedat4Compression::none), "No compression", "none"},
-      {static_cast<int>(Aedat4Compression::lz4), "LZ4, the fastest", "lz4"},
-      {static_cast<int>(Aedat4Compression::lz4_high), "LZ4, slower and smaller", "lz4-high"},
-      {static_cast<int>(Aedat4Compression::zstd), "Zstandard", "zstd"},
-      {static_cast<int>(Aedat4Compression::zstd_high), "Zstandard, the smallest", "zstd-high"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstAedatCompression", values);
-}
 
 /* input */
 
@@ -210,7 +196,7 @@ static void send_segment(GstAedatMux* self, guint64 position) {
 /// Writes the header. May throw.
 static GstFlowReturn begin_file(GstAedatMux* self) {
   self->priv->has_header = true;
-  eventcamera::Aedat4Settings settings;
+  Aedat4Settings settings;
   settings.frames = std::ranges::any_of(
       sink_pads(self), [](const Pad& pad) { return kind_of(pad.get()) != Kind::events; });
   settings.table = peer_can_seek(GST_AGGREGATOR_SRC_PAD(self), GST_FORMAT_BYTES);
@@ -364,12 +350,11 @@ static bool handle_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps*
   auto& latest = kind == Kind::events ? self->priv->events_pad : self->priv->video_pad;
   for (const Pad& other : sink_pads(self)) {
     if (other.get() == pad || (other.get() != latest && kind_of(other.get()) != kind)) continue;
-    GST_ELEMENT_ERROR(
-        self, STREAM, MUX,
-        ("Cannot write two streams of %s into one file; link one stream of events and "
-         "one of video.",
-         kind == Kind::events ? "events" : "video"),
-        ("pads %s and %s", GST_PAD_NAME(other.get()), GST_PAD_NAME(pad)));
+    GST_ELEMENT_ERROR(self, STREAM, MUX,
+                      ("Cannot write two streams of %s into one file; link one stream of events "
+                       "and one of video.",
+                       kind == Kind::events ? "events" : "video"),
+                      ("pads %s and %s", GST_PAD_NAME(other.get()), GST_PAD_NAME(pad)));
     return false;
   }
   for (auto* const of_kind : {&self->priv->events_pad, &self->priv->video_pad})
@@ -514,10 +499,15 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
   Properties<settings_of> properties(object_class);
-  properties.add(
-      &Settings::compression,
-      g_param_spec_enum("compression", "Compression", "Compression of the file", compression_type(),
-                        static_cast<int>(Settings().compression), mutable_ready_flags));
+  properties.add_fixed(
+      &Settings::compression, "compression", "Compression of the file",
+      enum_type<Aedat4Compression>(
+          "GstAedatCompression",
+          {{Aedat4Compression::none, "No compression", "none"},
+           {Aedat4Compression::lz4, "LZ4, the fastest", "lz4"},
+           {Aedat4Compression::lz4_high, "LZ4, slower and smaller", "lz4-high"},
+           {Aedat4Compression::zstd, "Zstandard", "zstd"},
+           {Aedat4Compression::zstd_high, "Zstandard, the smallest", "zstd-high"}}));
   install_stats(
       object_class, [](GObject* object) { return GST_AEDAT_MUX(object)->priv->file.stats(); },
       WritableEvents::stats_blurb);
@@ -532,9 +522,8 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
   add_sinks("video_%u", RECORDED_VIDEO_CAPS);
   add_pad_template(element_class, "src", GST_PAD_SRC, "application/x-aedat, version = (int) 4",
                    GST_PAD_ALWAYS, GST_TYPE_AGGREGATOR_PAD);
-  gst_element_class_set_static_metadata(element_class, "AEDAT 4 muxer", "Codec/Muxer",
-                                        "Writes events and frames into AEDAT 4 files",
-                                        EVENTSIM_AUTHORS);
+  set_metadata(klass, "AEDAT 4 muxer", "Codec/Muxer",
+               "Writes events and frames into AEDAT 4 files");
   set_output_extensions(element_class, "application/x-aedat");
 
   GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);

@@ -5,16 +5,12 @@
 #include "src/formats/es/es.hpp"
 
 /// Property `origin` of the Event Stream reader and writer.
-#define ES_ORIGIN_NICK "Origin"
 #define ES_ORIGIN_BLURB "Position of row 0, which the file does not contain"
 
 inline GType es_origin_type() {
   using eventcamera::EsOrigin;
-  static const GEnumValue values[] = {
-      {static_cast<int>(EsOrigin::bottom_left),
-       "Row 0 at the bottom, as in sepia and command_line_tools", "bottom-left"},
-      {static_cast<int>(EsOrigin::top_left), "Row 0 at the top, as in faery", "top-left"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEsOrigin", values);
+  return enum_type<EsOrigin>(
+      "GstEsOrigin", {{EsOrigin::bottom_left,
+                       "Row 0 at the bottom, as in sepia and command_line_tools", "bottom-left"},
+                      {EsOrigin::top_left, "Row 0 at the top, as in faery", "top-left"}});
 }

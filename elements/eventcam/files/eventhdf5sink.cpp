@@ -15,7 +15,7 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventhdf5sink format=metavision
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventhdf5sink format=metavision
  * location=events.hdf5
  * ]|
  *
@@ -31,7 +31,6 @@
 #include <system_error>
 #include <utility>
 
-#include "gst/base/authors.hpp"
 #include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_caps.hpp"
@@ -48,10 +47,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_hdf5_sink_debug);
 #define GST_CAT_DEFAULT event_hdf5_sink_debug
 
-using eventcamera::AbsoluteEvent;
-using eventcamera::Hdf5Format;
-using eventcamera::Hdf5Writer;
-using eventcamera::Trigger;
+using namespace eventcamera;
 
 namespace {
 
@@ -85,27 +81,6 @@ DEFINE_EVENT_ELEMENT(GstEventHdf5Sink, gst_event_hdf5_sink, EVENT_HDF5_SINK, Gst
                      "writer of HDF5 files of events")
 
 /* properties */
-
-static GType format_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(Hdf5Format::dsec), "DSEC: /events/{t,x,y,p}, /ms_to_idx, /t_offset",
-       "dsec"},
-      {static_cast<int>(Hdf5Format::metavision),
-       "Metavision: /CD/events, compressed with ECF; at most 2048x2048 pixels", "metavision"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventHdf5Format", values);
-}
-
-static GType compression_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(Hdf5Writer::Compression::none), "No compression", "none"},
-      {static_cast<int>(Hdf5Writer::Compression::gzip), "gzip, which every reader supports",
-       "gzip"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventHdf5Compression", values);
-}
 
 /* the file */
 
@@ -272,30 +247,30 @@ static void gst_event_hdf5_sink_init(GstEventHdf5Sink* self) {
 static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  const Settings defaults;
   Properties<settings_of> properties(object_class);
-  properties.add(
-      &Settings::location,
-      g_param_spec_string("location", "Location", "File to write; an existing file is overwritten",
-                          "", mutable_ready_flags));
-  properties.add(
-      &Settings::format,
-      g_param_spec_enum("format", "Format", "Format of the events in the file", format_type(),
-                        static_cast<int>(defaults.format), mutable_ready_flags));
-  properties.add(
-      &Settings::compression,
-      g_param_spec_enum("compression", "Compression",
-                        "Compression of format=dsec: gzip for small files, none for speed. "
-                        "format=metavision ignores it, since it always uses ECF",
-                        compression_type(), static_cast<int>(defaults.compression),
-                        mutable_ready_flags));
-  properties.add(
-      &Settings::commit_interval,
-      g_param_spec_uint64("commit-interval", "Commit interval",
-                          "Interval between flushes; data before the last flush survives a crash "
-                          "(ns of the clock; 0 = flush only at the end, and the same events in the "
-                          "same buffers make the same bytes)",
-                          0, G_MAXINT64, defaults.commit_interval, mutable_ready_flags));
+  properties.add_fixed(&Settings::location, "location",
+                       "File to write; an existing file is overwritten");
+  properties.add_fixed(
+      &Settings::format, "format", "Format of the events in the file",
+      enum_type<Hdf5Format>(
+          "GstEventHdf5Format",
+          {{Hdf5Format::dsec, "DSEC: /events/{t,x,y,p}, /ms_to_idx, /t_offset", "dsec"},
+           {Hdf5Format::metavision,
+            "Metavision: /CD/events, compressed with ECF; at most 2048x2048 pixels",
+            "metavision"}}));
+  properties.add_fixed(
+      &Settings::compression, "compression",
+      "Compression of format=dsec: gzip for small files, none for speed. format=metavision ignores "
+      "it, since it always uses ECF",
+      enum_type<Hdf5Writer::Compression>(
+          "GstEventHdf5Compression",
+          {{Hdf5Writer::Compression::none, "No compression", "none"},
+           {Hdf5Writer::Compression::gzip, "gzip, which every reader supports", "gzip"}}));
+  properties.add_fixed(
+      &Settings::commit_interval, "commit-interval",
+      "Interval between flushes; data before the last flush survives a crash (ns of the clock; 0 = "
+      "flush only at the end, and the same events in the same buffers make the same bytes)",
+      0, G_MAXINT64);
   install_stats(
       object_class,
       [](GObject* object) { return GST_EVENT_HDF5_SINK(object)->priv->writable.stats(); },
@@ -303,9 +278,7 @@ static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_template(element_class, "sink", GST_PAD_SINK, EVENT_CAPS);
-  gst_element_class_set_static_metadata(element_class, "HDF5 file sink", "Sink/File",
-                                        "Writes events as HDF5: DSEC or Metavision",
-                                        EVENTSIM_AUTHORS);
+  set_metadata(klass, "HDF5 file sink", "Sink/File", "Writes events as HDF5: DSEC or Metavision");
   set_output_extensions(element_class, "application/x-hdf5");
   element_class->change_state = change_state;
 

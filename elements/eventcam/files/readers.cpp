@@ -24,7 +24,7 @@
 #include "src/formats/ros/bag_decoder.hpp"
 #endif
 
-using eventcamera::Decoder;
+using namespace eventcamera;
 
 namespace {
 
@@ -40,13 +40,13 @@ std::unique_ptr<Decoder> make_raw_decoder(const GstCaps* caps, const FormatSetti
   if (caps != nullptr) {
     const GstStructure* const structure = gst_caps_get_structure(caps, 0);
     if (const auto words = evt_format_named(gst_structure_get_string(structure, "format"))) {
-      eventcamera::SensorSize size;
+      SensorSize size;
       gst_structure_get_int(structure, "width", &size.width);
       gst_structure_get_int(structure, "height", &size.height);
-      return eventcamera::make_evt_decoder(*words, size);
+      return make_evt_decoder(*words, size);
     }
   }
-  return eventcamera::make_prophesee_raw_decoder();
+  return make_prophesee_raw_decoder();
 }
 
 }  // namespace
@@ -103,7 +103,7 @@ static const EventReaderFormat dat = {
     .has_triggers = true,
     .add_properties = add_sensor_size,
     .make_decoder = [](const GstCaps*, const FormatSettings&) -> std::unique_ptr<Decoder> {
-      return eventcamera::make_dat_decoder();
+      return make_dat_decoder();
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_reader_type(dat))
@@ -136,13 +136,11 @@ static const EventReaderFormat es = {
     .caps = "application/x-es",
     .add_properties =
         [](FormatProperties& properties) {
-          properties.add(&FormatSettings::variant,
-                         g_param_spec_enum("origin", ES_ORIGIN_NICK, ES_ORIGIN_BLURB,
-                                           es_origin_type(), 0, mutable_ready_flags));
+          properties.add_fixed(&FormatSettings::variant, "origin", ES_ORIGIN_BLURB,
+                               es_origin_type());
         },
     .make_decoder = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Decoder> {
-      return eventcamera::make_event_stream_decoder(
-          static_cast<eventcamera::EsOrigin>(settings.variant));
+      return make_event_stream_decoder(static_cast<EsOrigin>(settings.variant));
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_reader_type(es))
@@ -173,7 +171,7 @@ static const EventReaderFormat atis = {
     .caps = "application/x-atis-bin",
     .add_properties = add_sensor_size,
     .make_decoder = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Decoder> {
-      return eventcamera::make_atis_bin_decoder(settings.sensor);
+      return make_atis_bin_decoder(settings.sensor);
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventatisdec, "eventatisdec", GST_RANK_PRIMARY, event_reader_type(atis))
@@ -206,7 +204,7 @@ static const EventReaderFormat csv = {
     .description = "Reads CSV files of events",
     .caps = "application/x-event-csv",
     .add_properties = add_table_properties,
-    .make_decoder = make_table_decoder<eventcamera::CsvDecoder>,
+    .make_decoder = make_table_decoder<CsvDecoder>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_reader_type(csv))
 
@@ -237,7 +235,7 @@ static const EventReaderFormat npy = {
     .description = "Reads NumPy files of events",
     .caps = "application/x-npy",
     .add_properties = add_table_properties,
-    .make_decoder = make_table_decoder<eventcamera::NpyDecoder>,
+    .make_decoder = make_table_decoder<NpyDecoder>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_reader_type(npy))
 
@@ -268,7 +266,7 @@ static const EventReaderFormat npz = {
     .add_properties = add_table_properties,
     .make_decoder =
         [](const GstCaps*, const FormatSettings& settings) {
-          return eventcamera::make_npz_decoder(settings.table());
+          return make_npz_decoder(settings.table());
         },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_reader_type(npz))
@@ -317,7 +315,7 @@ static const EventReaderFormat hdf5 = {
         },
     .make_decoder =
         [](const GstCaps*, const FormatSettings& settings) {
-          return eventcamera::make_hdf5_decoder({settings.events_path, settings.table()});
+          return make_hdf5_decoder({settings.events_path, settings.table()});
         },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, event_reader_type(hdf5))
@@ -367,7 +365,7 @@ static const EventReaderFormat aedat = {
     .has_triggers = true,
     .add_properties = add_sensor_size,
     .make_decoder = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Decoder> {
-      return std::make_unique<eventcamera::AedatDecoder>(settings.sensor);
+      return std::make_unique<AedatDecoder>(settings.sensor);
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_reader_type(aedat))
@@ -404,7 +402,7 @@ GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_re
  */
 static std::unique_ptr<Decoder> make_bag_decoder(const GstCaps* /*caps*/,
                                                  const FormatSettings& settings) {
-  return std::make_unique<eventcamera::BagDecoder>(settings.topics);
+  return std::make_unique<BagDecoder>(settings.topics);
 }
 
 static const EventReaderFormat mcap = {

@@ -10,8 +10,7 @@
 #include "src/formats/file_formats.hpp"
 #include "src/formats/unsupported_format.hpp"
 
-using eventcamera::FileFormat;
-using eventcamera::Likelihood;
+using namespace eventcamera;
 
 /// Peeks at up to `max_bytes` at the start of the file.
 static std::span<const guint8> first_bytes(GstTypeFind* find, guint64 max_bytes) {
@@ -29,14 +28,13 @@ static std::span<const guint8> first_bytes(GstTypeFind* find, guint64 max_bytes)
 /// Decompresses the part at the start of a file that likelihood() examines.
 static std::vector<guint8> decompressed(std::span<const guint8> start) {
   std::vector<guint8> content;
-  eventcamera::FileDecompressor decompressor;
+  FileDecompressor decompressor;
   decompressor.push(start);
   try {
-    for (auto part = decompressor.next();
-         !part.empty() && content.size() < eventcamera::max_recognised_bytes;
+    for (auto part = decompressor.next(); !part.empty() && content.size() < max_recognised_bytes;
          part = decompressor.next())
       content.insert(content.end(), part.begin(), part.end());
-  } catch (const eventcamera::UnsupportedFormat&) {
+  } catch (const UnsupportedFormat&) {
   }
   return content;
 }
@@ -59,9 +57,9 @@ static void find_format(GstTypeFind* find, gpointer data) {
   const auto& format = *static_cast<const FileFormat*>(data);
   // A block of Zstandard gives nothing before its end, and typefind sees no more than this.
   constexpr guint64 max_compressed = 1U << 17;
-  auto bytes = first_bytes(find, eventcamera::max_recognised_bytes);
+  auto bytes = first_bytes(find, max_recognised_bytes);
   std::vector<guint8> content;
-  if (eventcamera::FileDecompressor::is_compressed(bytes)) {
+  if (FileDecompressor::is_compressed(bytes)) {
     content = decompressed(first_bytes(find, max_compressed));
     bytes = content;
   }
@@ -77,7 +75,7 @@ static void find_format(GstTypeFind* find, gpointer data) {
 /// Registers a typefinder for each format, named after its media type.
 static gboolean register_typefinders(GstPlugin* plugin) {
   gboolean registered = FALSE;
-  for (const auto& format : eventcamera::file_formats()) {
+  for (const auto& format : file_formats()) {
     const OwnedCaps caps(gst_caps_new_empty_simple(format.media_type));
     registered |= gst_type_find_register(
         plugin, format.media_type, format.has_signature ? GST_RANK_PRIMARY : GST_RANK_SECONDARY,

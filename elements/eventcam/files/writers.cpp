@@ -19,8 +19,7 @@
 #include "src/formats/ros/mcap_encoder.hpp"
 #endif
 
-using eventcamera::EvtFormat;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 
 /**
  * SECTION:element-evtenc
@@ -33,32 +32,29 @@ using eventcamera::SensorSize;
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 v4l2src ! eventsim-diff ! evtenc format=EVT3 ! filesink location=out.raw
+ * gst-launch-1.0 v4l2src ! eventsim-dvs ! evtenc format=EVT3 ! filesink location=out.raw
  * ]|
  *
  * Since: 0.1
  */
-static const GEnumValue evt_formats[] = {
-    {static_cast<int>(EvtFormat::evt2), "32-bit words, one event each", "EVT2"},
-    {static_cast<int>(EvtFormat::evt21), "64-bit words, up to 32 events each", "EVT21"},
-    {static_cast<int>(EvtFormat::evt3), "16-bit words, the most compact", "EVT3"},
-    {static_cast<int>(EvtFormat::evt4), "32-bit words, vectors of events", "EVT4"},
-    {0, nullptr, nullptr},
-};
-
 static const EventWriterFormat::Variants evt_variants = {
     .property = "format",
-    .nick = "Format",
     .blurb =
         "EVT words to write; read when the stream begins. Downstream caps that request words "
         "without a header take precedence",
-    .type = [] { return enum_type("GstEvtFormat", evt_formats); },
+    .type =
+        [] {
+          return enum_type<EvtFormat>(
+              "GstEvtFormat", {{EvtFormat::evt2, "32-bit words, one event each", "EVT2"},
+                               {EvtFormat::evt21, "64-bit words, up to 32 events each", "EVT21"},
+                               {EvtFormat::evt3, "16-bit words, the most compact", "EVT3"},
+                               {EvtFormat::evt4, "32-bit words, vectors of events", "EVT4"}});
+        },
     .default_value = static_cast<int>(EvtFormat::evt3),
 };
 
-static std::unique_ptr<eventcamera::Encoder> make_evt(SensorSize size,
-                                                      EventWriterFormat::Choice choice,
-                                                      const GstCaps* caps) {
+static std::unique_ptr<Encoder> make_evt(SensorSize size, EventWriterFormat::Choice choice,
+                                         const GstCaps* caps) {
   const auto* words = gst_structure_get_string(gst_caps_get_structure(caps, 0), "format");
   if (const auto format = evt_format_named(words)) return make_evt_encoder(*format, size);
   return make_prophesee_raw_encoder(static_cast<EvtFormat>(choice.variant), size);
@@ -105,7 +101,7 @@ GST_ELEMENT_REGISTER_DEFINE(evtenc, "evtenc", GST_RANK_PRIMARY, event_writer_typ
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventdatenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventdatenc ! filesink
  * location=test.dat
  * ]|
  *
@@ -117,7 +113,7 @@ static const EventWriterFormat dat = {
     .description = "Writes events as Prophesee DAT",
     .caps = "application/x-prophesee-dat",
     .create = [](SensorSize size, EventWriterFormat::Choice,
-                 const GstCaps*) { return eventcamera::make_dat_encoder(size); },
+                 const GstCaps*) { return make_dat_encoder(size); },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_writer_type(dat))
 
@@ -132,7 +128,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventesenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventesenc ! filesink
  * location=test.es
  * ]|
  *
@@ -140,10 +136,9 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_
  */
 static const EventWriterFormat::Variants es_variants = {
     .property = "origin",
-    .nick = ES_ORIGIN_NICK,
     .blurb = ES_ORIGIN_BLURB ". Read when the stream begins",
     .type = es_origin_type,
-    .default_value = static_cast<int>(eventcamera::EsOrigin::bottom_left),
+    .default_value = static_cast<int>(EsOrigin::bottom_left),
 };
 
 static const EventWriterFormat event_stream = {
@@ -154,8 +149,7 @@ static const EventWriterFormat event_stream = {
     .variants = &es_variants,
     .create =
         [](SensorSize size, EventWriterFormat::Choice choice, const GstCaps*) {
-          return eventcamera::make_event_stream_encoder(
-              size, static_cast<eventcamera::EsOrigin>(choice.variant));
+          return make_event_stream_encoder(size, static_cast<EsOrigin>(choice.variant));
         },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
@@ -171,7 +165,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventcsvenc format=rpg ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventcsvenc format=rpg ! filesink
  * location=events.txt
  * ]|
  *
@@ -180,7 +174,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
 static GType csv_format_type() {
   static const auto values = [] {
     std::vector<GEnumValue> formats;
-    for (const auto& [name, description, format] : eventcamera::csv_formats())
+    for (const auto& [name, description, format] : csv_formats())
       formats.push_back({static_cast<gint>(formats.size()), description.data(), name.data()});
     formats.push_back({0, nullptr, nullptr});
     return formats;
@@ -190,7 +184,6 @@ static GType csv_format_type() {
 
 static const EventWriterFormat::Variants csv_variants = {
     .property = "format",
-    .nick = "Format",
     .blurb = "Columns, separators, time unit and header; read when the stream begins",
     .type = csv_format_type,
     .default_value = 0,
@@ -203,9 +196,9 @@ static const EventWriterFormat csv = {
     .caps = "application/x-event-csv",
     .variants = &csv_variants,
     .create = [](SensorSize size, EventWriterFormat::Choice choice,
-                 const GstCaps*) -> std::unique_ptr<eventcamera::Encoder> {
-      const auto& named = eventcamera::csv_formats()[static_cast<std::size_t>(choice.variant)];
-      return std::make_unique<eventcamera::CsvEncoder>(named.format, size);
+                 const GstCaps*) -> std::unique_ptr<Encoder> {
+      const auto& named = csv_formats()[static_cast<std::size_t>(choice.variant)];
+      return std::make_unique<CsvEncoder>(named.format, size);
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventcsvenc, "eventcsvenc", GST_RANK_PRIMARY, event_writer_type(csv))
@@ -221,7 +214,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvenc, "eventcsvenc", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventnpyenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventnpyenc ! filesink
  * location=events.npy
  * ]|
  *
@@ -232,10 +225,8 @@ static const EventWriterFormat npy = {
     .long_name = "NumPy writer",
     .description = "Writes events as NumPy",
     .caps = "application/x-npy",
-    .create = [](SensorSize, EventWriterFormat::Choice,
-                 const GstCaps*) -> std::unique_ptr<eventcamera::Encoder> {
-      return std::make_unique<eventcamera::NpyEncoder>();
-    },
+    .create = [](SensorSize, EventWriterFormat::Choice, const GstCaps*)
+        -> std::unique_ptr<Encoder> { return std::make_unique<NpyEncoder>(); },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpyenc, "eventnpyenc", GST_RANK_PRIMARY, event_writer_type(npy))
 
@@ -256,7 +247,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpyenc, "eventnpyenc", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventnpzenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventnpzenc ! filesink
  * location=events.npz
  * ]|
  *
@@ -270,7 +261,7 @@ static const EventWriterFormat npz = {
         "sensor's width and height in pixels",
     .caps = "application/x-npz",
     .create = [](SensorSize size, EventWriterFormat::Choice,
-                 const GstCaps*) { return eventcamera::make_npz_encoder(size); },
+                 const GstCaps*) { return make_npz_encoder(size); },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpzenc, "eventnpzenc", GST_RANK_PRIMARY, event_writer_type(npz))
 #endif
@@ -292,40 +283,36 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzenc, "eventnpzenc", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventmcapenc ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-dvs ! eventmcapenc ! filesink
  * location=events.mcap
  * ]|
  *
  * Since: 0.1
  */
-static const GEnumValue bag_events[] = {
-    {static_cast<int>(eventcamera::BagEvents::evt3), "EVT3 words, the most compact", "evt3"},
-    {static_cast<int>(eventcamera::BagEvents::mono), "64 bits an event, sensors of any size",
-     "mono"},
-    {0, nullptr, nullptr},
-};
-
-static const GEnumValue bag_compressions[] = {
-    {static_cast<int>(eventcamera::BagCompression::none), "No compression", "none"},
-    {static_cast<int>(eventcamera::BagCompression::lz4), "LZ4, fast", "lz4"},
-    {static_cast<int>(eventcamera::BagCompression::zstd), "Zstandard, smaller", "zstd"},
-    {0, nullptr, nullptr},
-};
-
 static const EventWriterFormat::Variants mcap_variants = {
     .property = "format",
-    .nick = "Format",
     .blurb = "Encoding of the events in the messages; read when the stream begins",
-    .type = [] { return enum_type("GstEventBagFormat", bag_events); },
-    .default_value = static_cast<int>(eventcamera::BagEvents::evt3),
+    .type =
+        [] {
+          return enum_type<BagEvents>(
+              "GstEventBagFormat",
+              {{BagEvents::evt3, "EVT3 words, the most compact", "evt3"},
+               {BagEvents::mono, "64 bits an event, sensors of any size", "mono"}});
+        },
+    .default_value = static_cast<int>(BagEvents::evt3),
 };
 
 static const EventWriterFormat::Variants mcap_compressions = {
     .property = "compression",
-    .nick = "Compression",
     .blurb = "Compression of the file; read when the stream begins",
-    .type = [] { return enum_type("GstEventBagCompression", bag_compressions); },
-    .default_value = static_cast<int>(eventcamera::BagCompression::none),
+    .type =
+        [] {
+          return enum_type<BagCompression>("GstEventBagCompression",
+                                           {{BagCompression::none, "No compression", "none"},
+                                            {BagCompression::lz4, "LZ4, fast", "lz4"},
+                                            {BagCompression::zstd, "Zstandard, smaller", "zstd"}});
+        },
+    .default_value = static_cast<int>(BagCompression::none),
 };
 
 static const EventWriterFormat mcap = {
@@ -337,9 +324,8 @@ static const EventWriterFormat mcap = {
     .compressions = &mcap_compressions,
     .create =
         [](SensorSize size, EventWriterFormat::Choice choice, const GstCaps*) {
-          return eventcamera::make_mcap_encoder(
-              {size, static_cast<eventcamera::BagEvents>(choice.variant),
-               static_cast<eventcamera::BagCompression>(choice.compression)});
+          return make_mcap_encoder({size, static_cast<BagEvents>(choice.variant),
+                                    static_cast<BagCompression>(choice.compression)});
         },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventmcapenc, "eventmcapenc", GST_RANK_PRIMARY, event_writer_type(mcap))

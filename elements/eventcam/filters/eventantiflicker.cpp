@@ -31,57 +31,34 @@
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/flicker_filter.hpp"
 
-using eventcamera::FlickerFilter;
-using eventcamera::FlickerMode;
+using namespace eventcamera;
 
 DEFINE_EVENT_FILTER(GstEventAntiFlicker, gst_event_anti_flicker, EVENT_ANTI_FLICKER,
                     EventFilterOf<FlickerFilter>, eventantiflicker)
-
-static GType mode_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(FlickerMode::band_stop), "Drop flicker in the band", "band-stop"},
-      {static_cast<int>(FlickerMode::band_pass), "Keep only flicker in the band", "band-pass"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventAntiFlickerMode", values);
-}
 
 static void gst_event_anti_flicker_class_init(GstEventAntiFlickerClass* klass) {
   using Settings = FlickerFilter::Settings;
   constexpr guint min_frequency = 50;
   constexpr guint max_frequency = 520;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(
-      &Settings::mode,
-      g_param_spec_enum("mode", "Mode", "Drop flicker, or keep only flicker", mode_type(),
-                        static_cast<int>(Settings().mode), mutable_playing_flags));
-  properties.add(&Settings::min_frequency,
-                 g_param_spec_uint("min-frequency", "Minimum frequency",
-                                   "Lower end of the band of flicker (Hz)", min_frequency,
-                                   max_frequency, Settings().min_frequency, mutable_playing_flags));
-  properties.add(&Settings::max_frequency,
-                 g_param_spec_uint("max-frequency", "Maximum frequency",
-                                   "Upper end of the band of flicker (Hz); raised to "
-                                   "min-frequency if lower",
-                                   min_frequency, max_frequency, Settings().max_frequency,
-                                   mutable_playing_flags));
-  properties.add(&Settings::duty_cycle,
-                 g_param_spec_double("duty-cycle", "Duty cycle",
-                                     "Share of a period from the first ON event to the first OFF "
-                                     "event",
-                                     0.01, 0.99, Settings().duty_cycle, mutable_playing_flags));
-  properties.add(&Settings::start_threshold,
-                 g_param_spec_uint("start-threshold", "Start threshold",
-                                   "Count of phases at which a pixel begins to flicker", 1,
-                                   FlickerFilter::max_threshold, Settings().start_threshold,
-                                   mutable_playing_flags));
-  properties.add(
-      &Settings::stop_threshold,
-      g_param_spec_uint("stop-threshold", "Stop threshold",
-                        "Count of phases below which a pixel no longer flickers; lowered to "
-                        "start-threshold if higher",
-                        1, FlickerFilter::max_threshold, Settings().stop_threshold,
-                        mutable_playing_flags));
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Anti-flicker filter", "Filter",
-                                        "Drops the events of flickering lamps", EVENTSIM_AUTHORS);
+  properties.add(&Settings::mode, "mode", "Drop flicker, or keep only flicker",
+                 enum_type<FlickerMode>(
+                     "GstEventAntiFlickerMode",
+                     {{FlickerMode::band_stop, "Drop flicker in the band", "band-stop"},
+                      {FlickerMode::band_pass, "Keep only flicker in the band", "band-pass"}}));
+  properties.add(&Settings::min_frequency, "min-frequency", "Lower end of the band of flicker (Hz)",
+                 min_frequency, max_frequency);
+  properties.add(&Settings::max_frequency, "max-frequency",
+                 "Upper end of the band of flicker (Hz); raised to min-frequency if lower",
+                 min_frequency, max_frequency);
+  properties.add(&Settings::duty_cycle, "duty-cycle",
+                 "Share of a period from the first ON event to the first OFF event", 0.01, 0.99);
+  properties.add(&Settings::start_threshold, "start-threshold",
+                 "Count of phases at which a pixel begins to flicker", 1,
+                 FlickerFilter::max_threshold);
+  properties.add(&Settings::stop_threshold, "stop-threshold",
+                 "Count of phases below which a pixel no longer flickers; lowered to "
+                 "start-threshold if higher",
+                 1, FlickerFilter::max_threshold);
+  set_metadata(klass, "Anti-flicker filter", "Filter", "Drops the events of flickering lamps");
 }

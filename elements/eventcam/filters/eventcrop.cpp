@@ -22,8 +22,7 @@
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/crop_filter.hpp"
 
-using eventcamera::CropFilter;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 using Settings = CropFilter::Settings;
 
 namespace {
@@ -65,18 +64,16 @@ static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection dire
 static void gst_event_crop_class_init(GstEventCropClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   Properties<settings_of> properties(object_class);
-  const auto add = [&](auto field, const char* name, const char* nick, const char* blurb) {
-    properties.add(field, g_param_spec_uint(name, nick, blurb, 0, eventcamera::max_side, 0,
-                                            mutable_playing_flags));
+  const auto add = [&](auto field, const char* name, const char* blurb) {
+    properties.add(field, name, blurb, 0, max_side);
   };
-  add(&Settings::left, "left", "Left", "Columns to cut off at the left (pixels)");
-  add(&Settings::right, "right", "Right", "Columns to cut off at the right (pixels)");
-  add(&Settings::top, "top", "Top", "Rows to cut off at the top (pixels)");
-  add(&Settings::bottom, "bottom", "Bottom", "Rows to cut off at the bottom (pixels)");
+  add(&Settings::left, "left", "Columns to cut off at the left (pixels)");
+  add(&Settings::right, "right", "Columns to cut off at the right (pixels)");
+  add(&Settings::top, "top", "Rows to cut off at the top (pixels)");
+  add(&Settings::bottom, "bottom", "Rows to cut off at the bottom (pixels)");
   object_class->notify = [](GObject* object, GParamSpec*) {
     gst_base_transform_reconfigure_src(GST_BASE_TRANSFORM(object));
   };
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event crop", "Filter",
-                                        "Cuts a region out of the sensor", EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event crop", "Filter", "Cuts a region out of the sensor");
   GST_BASE_TRANSFORM_CLASS(klass)->transform_caps = transform_caps;
 }

@@ -36,7 +36,6 @@
 #include <utility>
 #include <vector>
 
-#include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
@@ -59,12 +58,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_cut_debug);
 #define GST_CAT_DEFAULT event_cut_debug
 
-using eventcamera::AbsoluteEvent;
-using eventcamera::Event;
-using eventcamera::EventValidator;
-using eventcamera::Microseconds;
-using eventcamera::SensorSize;
-using eventcamera::Trigger;
+using namespace eventcamera;
 
 namespace {
 
@@ -100,13 +94,13 @@ struct Counters {
 /// State from start to stop.
 struct Stream {
   SensorSize sensor{};
-  std::optional<EventValidator> validator;      ///< once the sensor is known
-  eventcamera::WaitingItems<Trigger> triggers;  ///< not reached yet
-  std::optional<Microseconds> start;            ///< of the window; none before a trigger
-  std::vector<AbsoluteEvent> events;            ///< of the window
-  bool is_labelled = false;                     ///< some events had labels
-  GstClockTime reached = 0;                     ///< end of the last interval
-  bool is_discontinuous = true;                 ///< the next buffer is
+  std::optional<EventValidator> validator;  ///< once the sensor is known
+  WaitingItems<Trigger> triggers;           ///< not reached yet
+  std::optional<Microseconds> start;        ///< of the window; none before a trigger
+  std::vector<AbsoluteEvent> events;        ///< of the window
+  bool is_labelled = false;                 ///< some events had labels
+  GstClockTime reached = 0;                 ///< end of the last interval
+  bool is_discontinuous = true;             ///< the next buffer is
   EventBuffers buffers;
   EventFaults faults{"cut", GST_CAT_DEFAULT};
   WarnOnce warn_of_excess{GST_CAT_DEFAULT};
@@ -134,8 +128,7 @@ static Guarded<Settings>& settings_of(GObject* object) {
 /// Runs `work`; reports any exception.
 template <class Work>
 static auto reported(gpointer self, const Work& work) {
-  const auto report = [](const std::exception& error) { return events_report("cut", error); };
-  return catch_exceptions(self, report, work);
+  return catch_exceptions(self, events_report("cut"), work);
 }
 
 /* windows */
@@ -184,8 +177,7 @@ static GstFlowReturn push_window(GstEventCut* self, std::span<const AbsoluteEven
                            return Event{static_cast<guint32>(event.t - start), event.x, event.y_p};
                          });
   if (stream->is_labelled)
-    std::ranges::transform(events, add_labels(buffer.get(), events.size()).begin(),
-                           eventcamera::label_of);
+    std::ranges::transform(events, add_labels(buffer.get(), events.size()).begin(), label_of);
   GST_BUFFER_PTS(buffer.get()) = pts;
   GST_BUFFER_DURATION(buffer.get()) = duration;
   if (std::exchange(stream->is_discontinuous, false))
@@ -405,16 +397,6 @@ static GstStructure* stats_of(GObject* object) {
                            G_TYPE_UINT64, counters.windows, nullptr);
 }
 
-static GType edge_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(Edge::rising), "Rising edges", "rising"},
-      {static_cast<int>(Edge::falling), "Falling edges", "falling"},
-      {static_cast<int>(Edge::both), "Both edges", "both"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventCutEdge", values);
-}
-
 static void gst_event_cut_init(GstEventCut* self) {
   self->priv = new Private(GST_BASE_TRANSFORM(self));
   gst_base_transform_set_passthrough(GST_BASE_TRANSFORM(self), FALSE);
@@ -424,9 +406,10 @@ static void gst_event_cut_class_init(GstEventCutClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
   Properties<settings_of> properties(object_class);
-  properties.add(&Settings::edge,
-                 g_param_spec_enum("edge", "Edge", "Edges of triggers to cut at", edge_type(),
-                                   static_cast<int>(Settings().edge), mutable_playing_flags));
+  properties.add(&Settings::edge, "edge", "Edges of triggers to cut at",
+                 enum_type<Edge>("GstEventCutEdge", {{Edge::rising, "Rising edges", "rising"},
+                                                     {Edge::falling, "Falling edges", "falling"},
+                                                     {Edge::both, "Both edges", "both"}}));
   properties.add(
       &Settings::input,
       g_param_spec_int64("input", "Input", "Number of the trigger input to cut at (-1 = all)", -1,
@@ -435,8 +418,7 @@ static void gst_event_cut_class_init(GstEventCutClass* klass) {
                 "Counts since the start: events (received), dropped-events (outside of windows), "
                 "rejected-events (outside the sensor or out of order), windows (pushed)");
   add_pad_templates(GST_ELEMENT_CLASS(klass), EVENT_CAPS, EVENT_CAPS);
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event cutter", "Filter",
-                                        "Cuts a stream at external triggers", EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event cutter", "Filter", "Cuts a stream at external triggers");
 
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
   transform_class->start = start;

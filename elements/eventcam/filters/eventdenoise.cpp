@@ -33,57 +33,34 @@
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/denoise_filter.hpp"
 
-using eventcamera::DenoiseFilter;
-using eventcamera::DenoiseMethod;
+using namespace eventcamera;
 
 DEFINE_EVENT_FILTER(GstEventDenoise, gst_event_denoise, EVENT_DENOISE, EventFilterOf<DenoiseFilter>,
                     eventdenoise)
 
-static GType method_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(DenoiseMethod::baf), "Background activity filter: one neighbour", "baf"},
-      {static_cast<int>(DenoiseMethod::stcf),
-       "Spatio-temporal correlation filter: several neighbours", "stcf"},
-      {static_cast<int>(DenoiseMethod::time_kernel),
-       "Time kernel: recent neighbours of equal polarity", "time-kernel"},
-      {static_cast<int>(DenoiseMethod::dwf), "Double window filter: near one of the last events",
-       "dwf"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventDenoiseMethod", values);
-}
-
 static void gst_event_denoise_class_init(GstEventDenoiseClass* klass) {
   using Settings = DenoiseFilter::Settings;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(&Settings::method,
-                 g_param_spec_enum("method", "Method", "Denoising method", method_type(),
-                                   static_cast<int>(Settings().method), mutable_playing_flags));
-  properties.add(&Settings::correlation_time,
-                 g_param_spec_uint64("correlation-time", "Correlation time",
-                                     "Maximum time between events that support each other (ns; "
-                                     "0 = the default of the method)",
-                                     0, DenoiseFilter::max_correlation_time,
-                                     Settings().correlation_time, mutable_playing_flags));
-  properties.add(&Settings::min_neighbours,
-                 g_param_spec_uint("min-neighbours", "Minimum neighbours",
-                                   "Minimum number of supporting neighbours (stcf)", 1, 8,
-                                   Settings().min_neighbours, mutable_playing_flags));
   properties.add(
-      &Settings::match_polarity,
-      g_param_spec_boolean("match-polarity", "Match polarity",
-                           "Require support by events of equal polarity "
-                           "(baf, stcf)",
-                           Settings().match_polarity ? TRUE : FALSE, mutable_playing_flags));
+      &Settings::method, "method", "Denoising method",
+      enum_type<DenoiseMethod>(
+          "GstEventDenoiseMethod",
+          {{DenoiseMethod::baf, "Background activity filter: one neighbour", "baf"},
+           {DenoiseMethod::stcf, "Spatio-temporal correlation filter: several neighbours", "stcf"},
+           {DenoiseMethod::time_kernel, "Time kernel: recent neighbours of equal polarity",
+            "time-kernel"},
+           {DenoiseMethod::dwf, "Double window filter: near one of the last events", "dwf"}}));
   properties.add(
-      &Settings::threshold,
-      g_param_spec_double("threshold", "Threshold", "Minimum support by neighbours (time-kernel)",
-                          0, 24, Settings().threshold, mutable_playing_flags));
-  properties.add(&Settings::search_distance,
-                 g_param_spec_uint("search-distance", "Search distance",
-                                   "Maximum distance of a supporting event, across plus down "
-                                   "(pixels; dwf)",
-                                   0, 100, Settings().search_distance, mutable_playing_flags));
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event denoiser", "Filter",
-                                        "Drops events that are noise", EVENTSIM_AUTHORS);
+      &Settings::correlation_time, "correlation-time",
+      "Maximum time between events that support each other (ns; 0 = the default of the method)", 0,
+      DenoiseFilter::max_correlation_time);
+  properties.add(&Settings::min_neighbours, "min-neighbours",
+                 "Minimum number of supporting neighbours (stcf)", 1, 8);
+  properties.add(&Settings::match_polarity, "match-polarity",
+                 "Require support by events of equal polarity (baf, stcf)");
+  properties.add(&Settings::threshold, "threshold", "Minimum support by neighbours (time-kernel)",
+                 0, 24);
+  properties.add(&Settings::search_distance, "search-distance",
+                 "Maximum distance of a supporting event, across plus down (pixels; dwf)", 0, 100);
+  set_metadata(klass, "Event denoiser", "Filter", "Drops events that are noise");
 }

@@ -24,11 +24,7 @@
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/flip_filter.hpp"
 
-using eventcamera::FlipFilter;
-using eventcamera::LabelledEvents;
-using eventcamera::Microseconds;
-using eventcamera::Orientation;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 
 namespace {
 
@@ -123,14 +119,11 @@ static void gst_event_flip_class_init(GstEventFlipClass* klass) {
   Properties<settings_of> properties(object_class);
   // Implements the property of GstVideoDirection, which does not say that it may change at any
   // time.
-  properties.add(&Settings::direction,
-                 g_param_spec_enum("video-direction", "Direction", "How to flip or rotate",
-                                   GST_TYPE_VIDEO_ORIENTATION_METHOD, Settings().direction,
-                                   mutable_playing_flags));
+  properties.add(&Settings::direction, "video-direction", "How to flip or rotate",
+                 GST_TYPE_VIDEO_ORIENTATION_METHOD);
   object_class->notify = [](GObject* object, GParamSpec*) {
     gst_base_transform_reconfigure_src(GST_BASE_TRANSFORM(object));
   };
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event flip", "Filter",
-                                        "Flips and rotates the sensor", EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event flip", "Filter", "Flips and rotates the sensor");
   GST_BASE_TRANSFORM_CLASS(klass)->transform_caps = transform_caps;
 }

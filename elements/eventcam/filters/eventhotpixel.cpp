@@ -42,8 +42,7 @@
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/hot_pixel_filter.hpp"
 
-using eventcamera::HotPixelFilter;
-using eventcamera::PixelPosition;
+using namespace eventcamera;
 
 namespace {
 
@@ -56,12 +55,12 @@ struct Settings : HotPixelFilter::Settings {
 constexpr std::size_t max_file_size = std::size_t{64} << 20;
 
 std::vector<PixelPosition> read_hot_pixels(const std::string& location) {
-  return read_named_file("the hot pixels", location, max_file_size, eventcamera::parse_pixel_list);
+  return read_named_file("the hot pixels", location, max_file_size, parse_pixel_list);
 }
 
 void write_hot_pixels(const std::string& location, const std::vector<PixelPosition>& pixels) {
   try {
-    write_bytes(location, eventcamera::pixel_list_text(pixels));
+    write_bytes(location, pixel_list_text(pixels));
   } catch (const std::runtime_error& error) {
     throw std::runtime_error("cannot write the hot pixels \"" + location + "\": " + error.what());
   }
@@ -69,7 +68,7 @@ void write_hot_pixels(const std::string& location, const std::vector<PixelPositi
 
 class HotPixels final : public EventFilterOf<HotPixelFilter, Settings> {
  public:
-  void start(eventcamera::SensorSize in, eventcamera::SensorSize out) override {
+  void start(SensorSize in, SensorSize out) override {
     stop();
     const auto [location, learn] = file();
     std::vector<PixelPosition> pixels;
@@ -118,29 +117,18 @@ DEFINE_EVENT_FILTER(GstEventHotPixel, gst_event_hot_pixel, EVENT_HOT_PIXEL, HotP
 
 static void gst_event_hot_pixel_class_init(GstEventHotPixelClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(&Settings::location,
-                 g_param_spec_string("location", "Location",
-                                     "Text file of hot pixels, read at the start and, with learn, "
-                                     "written on stop if they have changed",
-                                     "", mutable_ready_flags));
-  properties.add(&Settings::learn,
-                 g_param_spec_boolean("learn", "Learn",
-                                      "Detect hot pixels; if false, use only those in location",
-                                      Settings().learn ? TRUE : FALSE, mutable_playing_flags));
-  properties.add(
-      &Settings::learning_period,
-      g_param_spec_uint64("learning-period", "Learning period",
-                          "Time after which hot pixels are detected again (ns)", GST_MSECOND,
-                          3600 * GST_SECOND, Settings().learning_period, mutable_playing_flags));
-  properties.add(&Settings::min_rate,
-                 g_param_spec_double("min-rate", "Minimum rate",
-                                     "Minimum event rate of a hot pixel (events/s)", 0, 1e6,
-                                     Settings().min_rate, mutable_playing_flags));
-  properties.add(&Settings::ratio,
-                 g_param_spec_double("ratio", "Ratio",
-                                     "Minimum event rate of a hot pixel, as a multiple of the "
-                                     "median of its neighbours",
-                                     1, 1e6, Settings().ratio, mutable_playing_flags));
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Hot pixel filter", "Filter",
-                                        "Drops the events of hot pixels", EVENTSIM_AUTHORS);
+  properties.add_fixed(&Settings::location, "location",
+                       "Text file of hot pixels, read at the start and, with learn, written on "
+                       "stop if they have changed");
+  properties.add(&Settings::learn, "learn",
+                 "Detect hot pixels; if false, use only those in location");
+  properties.add(&Settings::learning_period, "learning-period",
+                 "Time after which hot pixels are detected again (ns)", GST_MSECOND,
+                 3600 * GST_SECOND);
+  properties.add(&Settings::min_rate, "min-rate", "Minimum event rate of a hot pixel (events/s)", 0,
+                 1e6);
+  properties.add(&Settings::ratio, "ratio",
+                 "Minimum event rate of a hot pixel, as a multiple of the median of its neighbours",
+                 1, 1e6);
+  set_metadata(klass, "Hot pixel filter", "Filter", "Drops the events of hot pixels");
 }

@@ -36,7 +36,7 @@
 #include <vector>
 
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/event_faults.hpp"
@@ -47,11 +47,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_label_debug);
 #define GST_CAT_DEFAULT event_label_debug
 
-using eventcamera::Event;
-using eventcamera::Label;
-using eventcamera::Microseconds;
-using eventcamera::Nanoseconds;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 
 namespace {
 
@@ -104,8 +100,8 @@ class EventLabeller final : public EventAggregator {
         warn_of_missing_(
             element(),
             {GST_CORE_ERROR_PAD,
-             "No class images: link a source of images to the pad \"video_sink\". Until "
-             "then, events from a live source get no class, and other events wait."},
+             "No class images: link a source of images to the pad \"video_sink\". Until then, "
+             "events from a live source get no class, and other events wait."},
             "the pad \"video_sink\" is not linked");
       return true;
     }
@@ -211,12 +207,12 @@ class EventLabeller final : public EventAggregator {
   GstFlowReturn read_image(GstBuffer* buffer) {
     const auto time = signed_running_time(images_pad_, GST_BUFFER_PTS(buffer));
     if (!time || *time < image_time_) {
-      warn_of_times_(element(),
-                     {GST_STREAM_ERROR_FORMAT,
-                      "Cannot match all class images to events: one has no PTS, or an earlier one "
-                      "than the previous image; skipping it. Set the PTS of the frames that they "
-                      "belong to."},
-                     "buffer of video_sink");
+      warn_of_times_(
+          element(),
+          {GST_STREAM_ERROR_FORMAT,
+           "Cannot match all class images to events: one has no PTS, or an earlier one than the "
+           "previous image; skipping it. Set the PTS of the frames that they belong to."},
+          "buffer of video_sink");
       return GST_FLOW_OK;
     }
     if (!format_) return GST_FLOW_NOT_NEGOTIATED;
@@ -331,7 +327,6 @@ static void gst_event_label_class_init(GstEventLabelClass* klass) {
                               "video/x-raw, format = (string) { GRAY8, GRAY16_LE }, " SIZE_CAPS
                               ", framerate = (fraction) [ 0, max ]");
   add_aggregator_pad_template(aggregator, "src", GST_PAD_SRC, EVENT_CAPS);
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event labeller", "Filter",
-                                        "Labels events with the class of the object that they show",
-                                        EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event labeller", "Filter",
+               "Labels events with the class of the object that they show");
 }

@@ -22,10 +22,7 @@
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/pixel_mask.hpp"
 
-using eventcamera::LabelledEvents;
-using eventcamera::Microseconds;
-using eventcamera::PixelMask;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 
 namespace {
 
@@ -66,11 +63,8 @@ DEFINE_EVENT_FILTER(GstEventMask, gst_event_mask, EVENT_MASK, Mask, eventmask)
 
 static void gst_event_mask_class_init(GstEventMaskClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(&Settings::location,
-                 g_param_spec_string("location", "Location",
-                                     "PNG picture of the sensor's size, read when a stream begins; "
-                                     "black pixels are dropped",
-                                     "", mutable_ready_flags));
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event mask", "Filter",
-                                        "Drops the events of masked pixels", EVENTSIM_AUTHORS);
+  properties.add_fixed(
+      &Settings::location, "location",
+      "PNG picture of the sensor's size, read when a stream begins; black pixels are dropped");
+  set_metadata(klass, "Event mask", "Filter", "Drops the events of masked pixels");
 }

@@ -30,7 +30,7 @@
  * gst-launch-1.0 eventmerge name=m sink_1::xpos=346 ! eventrender ! videoconvert ! autovideosink
  * filesrc location=left.raw ! evtdec ! m.sink_0  filesrc location=right.raw ! evtdec ! m.sink_1
  * gst-launch-1.0 eventmerge name=m ! eventrender ! videoconvert ! autovideosink  videotestsrc
- * num-buffers=300 is-live=true pattern=ball ! eventsim-diff ! queue ! m.  videotestsrc
+ * num-buffers=300 is-live=true pattern=ball ! eventsim-dvs ! queue ! m.  videotestsrc
  * num-buffers=300 is-live=true pattern=snow ! eventsim-frame ! queue ! m.
  * ]|
  *
@@ -47,7 +47,7 @@
 #include "elements/eventcam/filters/eventmerge_pad.hpp"
 #include "elements/eventcam/filters/merged_timeline.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
@@ -62,13 +62,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_merge_debug);
 #define GST_CAT_DEFAULT event_merge_debug
 
-using eventcamera::EventMerger;
-using eventcamera::LabelledEvents;
-using eventcamera::max_side;
-using eventcamera::MergedInterval;
-using eventcamera::MergeInput;
-using eventcamera::Microseconds;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 
 namespace {
 
@@ -227,8 +221,8 @@ class EventMerge final : public EventAggregator {
     const auto text = in_pixels(needed);
     if (std::max(needed.width, needed.height) > max_side) {
       GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
-                        ("Cannot merge: the output would have %s, more than %d a side. Lower "
-                         "xpos and ypos of the pads.",
+                        ("Cannot merge: the output would have %s, more than %d a side. Lower xpos "
+                         "and ypos of the pads.",
                          text.c_str(), max_side),
                         ("xpos + width or ypos + height of a pad is too large"));
       return GST_FLOW_NOT_NEGOTIATED;
@@ -253,8 +247,8 @@ class EventMerge final : public EventAggregator {
     *result = gst_caps_intersect_full(downstream, ours.get(), GST_CAPS_INTERSECT_FIRST);
     if (!gst_caps_is_empty(*result)) return GST_FLOW_OK;
     GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
-                      ("Cannot merge: the sensors need %s, and downstream does not take that "
-                       "size. Do not set a smaller one downstream.",
+                      ("Cannot merge: the sensors need %s, and downstream does not take that size. "
+                       "Do not set a smaller one downstream.",
                        text.c_str()),
                       ("downstream takes %" GST_PTR_FORMAT, downstream));
     return GST_FLOW_NOT_NEGOTIATED;
@@ -292,8 +286,8 @@ class EventMerge final : public EventAggregator {
     if (g_get_monotonic_time() - waiting_since_ > patience)
       warn_of_missing_(element(),
                        {GST_CORE_ERROR_PAD,
-                        "Waiting for another stream to merge: link one, or set "
-                        "min-streams to the number of streams."},
+                        "Waiting for another stream to merge: link one, or set min-streams to the "
+                        "number of streams."},
                        std::to_string(linked) + " pads are linked");
     g_usleep(pause);
     return false;
@@ -384,7 +378,7 @@ class EventMerge final : public EventAggregator {
     const auto start = static_cast<GstClockTime>(interval.start) * GST_USECOND;
     const auto duration = static_cast<GstClockTime>(interval.end - interval.start) * GST_USECOND;
     if (interval.events == 0) return push_empty_interval(start, duration);
-    const gsize size = interval.events * sizeof(eventcamera::Event);
+    const gsize size = interval.events * sizeof(Event);
     OwnedBuffer buffer;
     const GstFlowReturn result = buffers_.acquire(size, buffer);
     if (result != GST_FLOW_OK) return result;
@@ -432,9 +426,7 @@ struct _GstEventMerge {
   GstEventAggregator parent;
 };
 
-static Report failure(const std::exception& error) {
-  return events_report("merge", error);
-}
+static const auto failure = events_report("merge");
 
 static guint children_count(GstChildProxy* self) {
   return catch_exceptions(self, failure,
@@ -515,12 +507,10 @@ static void gst_event_merge_init(GstEventMerge* self) {
 
 static void gst_event_merge_class_init(GstEventMergeClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(
-      &Settings::min_streams,
-      g_param_spec_uint("min-streams", "Minimum streams",
-                        "Number of linked streams that the output needs to start; live sources "
-                        "wait for them no longer than the latency",
-                        1, G_MAXUINT, Settings().min_streams, mutable_ready_flags));
+  properties.add_fixed(&Settings::min_streams, "min-streams",
+                       "Number of linked streams that the output needs to start; live sources wait "
+                       "for them no longer than the latency",
+                       1, G_MAXUINT);
   install_stats(
       G_OBJECT_CLASS(klass),
       [](GObject* object) { return aggregator_impl<EventMerge>(object).stats(); },
@@ -531,8 +521,7 @@ static void gst_event_merge_class_init(GstEventMergeClass* klass) {
   add_pad_template(element_class, "sink_%u", GST_PAD_SINK, EVENT_CAPS, GST_PAD_REQUEST,
                    GST_TYPE_EVENT_MERGE_PAD);
   add_aggregator_pad_template(GST_EVENT_AGGREGATOR_CLASS(klass), "src", GST_PAD_SRC, EVENT_CAPS);
-  gst_element_class_set_static_metadata(element_class, "Event merger", "Generic",
-                                        "Merges event streams into one", EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event merger", "Generic", "Merges event streams into one");
   element_class->request_new_pad = request_new_pad;
   element_class->release_pad = release_pad;
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_MERGE_PAD, static_cast<GstPluginAPIFlags>(0));

@@ -29,14 +29,11 @@ static void gst_event_merge_pad_class_init(GstEventMergePadClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
   Properties<position_of> properties(object_class);
-  properties.add(&SensorPosition::x,
-                 g_param_spec_uint("xpos", "X position",
-                                   "Column of the output where this sensor starts (pixels)", 0,
-                                   eventcamera::max_side - 1, 0, mutable_playing_flags));
-  properties.add(
-      &SensorPosition::y,
-      g_param_spec_uint("ypos", "Y position", "Row of the output where this sensor starts (pixels)",
-                        0, eventcamera::max_side - 1, 0, mutable_playing_flags));
+  properties.add(&SensorPosition::x, "xpos",
+                 "Column of the output where this sensor starts (pixels)", 0,
+                 eventcamera::max_side - 1);
+  properties.add(&SensorPosition::y, "ypos", "Row of the output where this sensor starts (pixels)",
+                 0, eventcamera::max_side - 1);
 }
 
 void GstEventMergePadPrivate::unload() {

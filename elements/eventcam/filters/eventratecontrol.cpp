@@ -25,7 +25,7 @@
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/rate_filter.hpp"
 
-using eventcamera::RateFilter;
+using namespace eventcamera;
 
 DEFINE_EVENT_FILTER(GstEventRateControl, gst_event_rate_control, EVENT_RATE_CONTROL,
                     EventFilterOf<RateFilter>, eventratecontrol)
@@ -33,16 +33,9 @@ DEFINE_EVENT_FILTER(GstEventRateControl, gst_event_rate_control, EVENT_RATE_CONT
 static void gst_event_rate_control_class_init(GstEventRateControlClass* klass) {
   using Settings = RateFilter::Settings;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(
-      &Settings::max_rate,
-      g_param_spec_uint64("max-rate", "Maximum rate", "Limit of events per second (0 = no limit)",
-                          0, G_GUINT64_CONSTANT(1'000'000'000'000), Settings().max_rate,
-                          mutable_playing_flags));
-  properties.add(
-      &Settings::reference_period,
-      g_param_spec_uint64("reference-period", "Reference period",
-                          "Time over which events are counted (ns)", 10 * GST_USECOND, GST_SECOND,
-                          Settings().reference_period, mutable_playing_flags));
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event rate control", "Filter",
-                                        "Limits the event rate", EVENTSIM_AUTHORS);
+  properties.add(&Settings::max_rate, "max-rate", "Limit of events per second (0 = no limit)", 0,
+                 G_GUINT64_CONSTANT(1'000'000'000'000));
+  properties.add(&Settings::reference_period, "reference-period",
+                 "Time over which events are counted (ns)", 10 * GST_USECOND, GST_SECOND);
+  set_metadata(klass, "Event rate control", "Filter", "Limits the event rate");
 }

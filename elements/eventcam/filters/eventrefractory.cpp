@@ -22,7 +22,7 @@
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/refractory_filter.hpp"
 
-using eventcamera::RefractoryFilter;
+using namespace eventcamera;
 
 DEFINE_EVENT_FILTER(GstEventRefractory, gst_event_refractory, EVENT_REFRACTORY,
                     EventFilterOf<RefractoryFilter>, eventrefractory)
@@ -30,13 +30,9 @@ DEFINE_EVENT_FILTER(GstEventRefractory, gst_event_refractory, EVENT_REFRACTORY,
 static void gst_event_refractory_class_init(GstEventRefractoryClass* klass) {
   using Settings = RefractoryFilter::Settings;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(
-      &Settings::refractory_period,
-      g_param_spec_uint64("refractory-period", "Refractory period",
-                          "Minimum time between two events of a pixel (ns; 0 = keep all events)", 0,
-                          eventcamera::max_filter_time, Settings().refractory_period,
-                          mutable_playing_flags));
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Refractory period", "Filter",
-                                        "Drops events of a pixel that follow another too soon",
-                                        EVENTSIM_AUTHORS);
+  properties.add(&Settings::refractory_period, "refractory-period",
+                 "Minimum time between two events of a pixel (ns; 0 = keep all events)", 0,
+                 max_filter_time);
+  set_metadata(klass, "Refractory period", "Filter",
+               "Drops events of a pixel that follow another too soon");
 }

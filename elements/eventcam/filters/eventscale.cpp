@@ -32,7 +32,7 @@
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/scale_filter.hpp"
 
-using eventcamera::ScaleFilter;
+using namespace eventcamera;
 using Settings = ScaleFilter::Settings;
 
 DEFINE_EVENT_FILTER(GstEventScale, gst_event_scale, EVENT_SCALE, EventFilterOf<ScaleFilter>,
@@ -84,14 +84,11 @@ static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection, GstCaps* caps, G
 
 static void gst_event_scale_class_init(GstEventScaleClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(&Settings::min_events,
-                 g_param_spec_uint("min-events", "Minimum events",
-                                   "Number of events of a polarity for which an output pixel "
-                                   "fires once, at the time of the last one (events)",
-                                   1, ScaleFilter::max_min_events, Settings().min_events,
-                                   mutable_playing_flags));
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event scaler", "Filter",
-                                        "Scales the sensor", EVENTSIM_AUTHORS);
+  properties.add(&Settings::min_events, "min-events",
+                 "Number of events of a polarity for which an output pixel fires once, at the time "
+                 "of the last one (events)",
+                 1, ScaleFilter::max_min_events);
+  set_metadata(klass, "Event scaler", "Filter", "Scales the sensor");
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
   transform_class->transform_caps = transform_caps;
   transform_class->fixate_caps = fixate_caps;

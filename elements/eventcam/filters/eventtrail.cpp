@@ -27,36 +27,24 @@
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/trail_filter.hpp"
 
-using eventcamera::TrailFilter;
-using eventcamera::TrailMode;
+using namespace eventcamera;
 
 DEFINE_EVENT_FILTER(GstEventTrail, gst_event_trail, EVENT_TRAIL, EventFilterOf<TrailFilter>,
                     eventtrail)
 
-static GType mode_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(TrailMode::trail), "Keep the first event of a burst", "trail"},
-      {static_cast<int>(TrailMode::stc_cut_trail), "Keep the second event of a burst",
-       "stc-cut-trail"},
-      {static_cast<int>(TrailMode::stc_keep_trail), "Keep all events of a burst but the first",
-       "stc-keep-trail"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventTrailMode", values);
-}
-
 static void gst_event_trail_class_init(GstEventTrailClass* klass) {
   using Settings = TrailFilter::Settings;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(&Settings::mode,
-                 g_param_spec_enum("mode", "Mode", "Part of a burst to keep", mode_type(),
-                                   static_cast<int>(Settings().mode), mutable_playing_flags));
   properties.add(
-      &Settings::threshold,
-      g_param_spec_uint64("threshold", "Threshold",
-                          "Time after an event at which a new burst begins (ns)", GST_MSECOND,
-                          100 * GST_MSECOND, Settings().threshold, mutable_playing_flags));
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event trail filter", "Filter",
-                                        "Keeps one event of each burst of a pixel",
-                                        EVENTSIM_AUTHORS);
+      &Settings::mode, "mode", "Part of a burst to keep",
+      enum_type<TrailMode>(
+          "GstEventTrailMode",
+          {{TrailMode::trail, "Keep the first event of a burst", "trail"},
+           {TrailMode::stc_cut_trail, "Keep the second event of a burst", "stc-cut-trail"},
+           {TrailMode::stc_keep_trail, "Keep all events of a burst but the first",
+            "stc-keep-trail"}}));
+  properties.add(&Settings::threshold, "threshold",
+                 "Time after an event at which a new burst begins (ns)", GST_MSECOND,
+                 100 * GST_MSECOND);
+  set_metadata(klass, "Event trail filter", "Filter", "Keeps one event of each burst of a pixel");
 }

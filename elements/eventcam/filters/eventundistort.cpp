@@ -31,11 +31,7 @@
 #include "src/filter/camera_calibration.hpp"
 #include "src/filter/undistort_filter.hpp"
 
-using eventcamera::CameraCalibration;
-using eventcamera::LabelledEvents;
-using eventcamera::Microseconds;
-using eventcamera::SensorSize;
-using eventcamera::UndistortFilter;
+using namespace eventcamera;
 
 namespace {
 
@@ -49,7 +45,7 @@ constexpr std::size_t max_file_size = 1 << 20;
 
 /// Throws std::invalid_argument.
 CameraCalibration calibration_of(const std::string& text, SensorSize sensor) {
-  const auto calibration = eventcamera::parse_calibration(text);
+  const auto calibration = parse_calibration(text);
   const auto [width, height] = calibration.size;
   const SensorSize size{width != 0 ? width : sensor.width, height != 0 ? height : sensor.height};
   if (size != sensor)
@@ -94,16 +90,11 @@ DEFINE_EVENT_FILTER(GstEventUndistort, gst_event_undistort, EVENT_UNDISTORT, Und
 
 static void gst_event_undistort_class_init(GstEventUndistortClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(&Settings::location,
-                 g_param_spec_string("location", "Location",
-                                     "YAML or XML file with the calibration of the camera, read "
-                                     "when a stream begins",
-                                     "", mutable_ready_flags));
-  properties.add(&Settings::calibration,
-                 g_param_spec_string("settings", "Settings",
-                                     "Calibration of the camera as YAML or XML text, such as the "
-                                     "property `settings` of cameracalibrate; instead of location",
-                                     "", mutable_ready_flags));
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event undistortion", "Filter",
-                                        "Undoes the distortion of a lens", EVENTSIM_AUTHORS);
+  properties.add_fixed(
+      &Settings::location, "location",
+      "YAML or XML file with the calibration of the camera, read when a stream begins");
+  properties.add_fixed(&Settings::calibration, "settings",
+                       "Calibration of the camera as YAML or XML text, such as the property "
+                       "`settings` of cameracalibrate; instead of location");
+  set_metadata(klass, "Event undistortion", "Filter", "Undoes the distortion of a lens");
 }

@@ -59,7 +59,7 @@
 
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/event_faults.hpp"
@@ -71,13 +71,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_compare_debug);
 #define GST_CAT_DEFAULT event_compare_debug
 
-using eventcamera::both_roles;
-using eventcamera::Classification;
-using eventcamera::Nanoseconds;
-using eventcamera::PerRole;
-using eventcamera::SensorSize;
-using eventcamera::StreamComparison;
-using eventcamera::StreamRole;
+using namespace eventcamera;
 
 namespace {
 
@@ -91,14 +85,14 @@ void put_structure(GstStructure* structure, const char* field, GstStructure* val
   gst_structure_free(value);
 }
 
-GstStructure* matches_of(const eventcamera::MatchFigures& matches) {
+GstStructure* matches_of(const MatchFigures& matches) {
   return gst_structure_new("matches", "within-1ms", G_TYPE_DOUBLE, matches.shares[0], "within-5ms",
                            G_TYPE_DOUBLE, matches.shares[1], "within-10ms", G_TYPE_DOUBLE,
                            matches.shares[2], "nearest-distance", G_TYPE_UINT64,
                            static_cast<guint64>(matches.nearest_distance * GST_USECOND), nullptr);
 }
 
-GstStructure* curve_of(const eventcamera::RateCurve& rates) {
+GstStructure* curve_of(const RateCurve& rates) {
   GstStructure* curve =
       gst_structure_new("rate-curve", "bin", G_TYPE_UINT64,
                         static_cast<guint64>(rates.bin_length()) * GST_USECOND, nullptr);
@@ -323,8 +317,8 @@ class EventCompare final : public EventAggregator {
     GST_DEBUG_OBJECT(element(), "concluding%s",
                      comparison_ ? "" : ": the caps of one of the streams never came");
     report(element(), settings.copy(), structure_of(comparison), [&] {
-      return eventcamera::draw_maps(comparison.map(StreamRole::reference),
-                                    comparison.map(StreamRole::candidate));
+      return draw_maps(comparison.map(StreamRole::reference),
+                       comparison.map(StreamRole::candidate));
     });
   }
 
@@ -346,15 +340,13 @@ static void gst_event_compare_class_init(GstEventCompareClass* klass) {
   Properties<aggregator_settings<EventCompare>> properties(G_OBJECT_CLASS(klass));
   add_report_properties(
       properties,
-      "PNG file of the events per pixel, of both streams and of their "
-      "difference, with bars of the counts, written at EOS, at the end of a segment "
-      "or on stop");
+      "PNG file of the events per pixel, of both streams and of their difference, with bars of the "
+      "counts, written at EOS, at the end of a segment or on stop");
 
   auto* const aggregator = GST_EVENT_AGGREGATOR_CLASS(klass);
   add_aggregator_pad_template(aggregator, "reference", GST_PAD_SINK, EVENT_CAPS);
   add_aggregator_pad_template(aggregator, "candidate", GST_PAD_SINK, EVENT_CAPS);
   add_aggregator_pad_template(aggregator, "src", GST_PAD_SRC, EVENT_CAPS);
-  gst_element_class_set_static_metadata(
-      GST_ELEMENT_CLASS(klass), "Event comparison", "Filter/Analyzer",
-      "Measures the similarity of two event streams", EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event comparison", "Filter/Analyzer",
+               "Measures the similarity of two event streams");
 }

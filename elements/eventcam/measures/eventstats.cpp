@@ -46,7 +46,6 @@
 #include <optional>
 
 #include "elements/eventcam/measures/report.hpp"
-#include "gst/base/authors.hpp"
 #include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
@@ -62,11 +61,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_stats_debug);
 #define GST_CAT_DEFAULT event_stats_debug
 
-using eventcamera::CauseCounts;
-using eventcamera::EventStatistics;
-using eventcamera::EventValidator;
-using eventcamera::LastTimes;
-using eventcamera::Nanoseconds;
+using namespace eventcamera;
 
 namespace {
 
@@ -138,8 +133,7 @@ static Guarded<Settings>& settings_of(GObject* object) {
 /// Runs `work`; reports any exception.
 template <class Work>
 static auto reported(gpointer self, const Work& work) {
-  const auto report = [](const std::exception& error) { return events_report("count", error); };
-  return catch_exceptions(self, report, work);
+  return catch_exceptions(self, events_report("count"), work);
 }
 
 /* figures */
@@ -167,8 +161,7 @@ static void conclude(GstEventStats* self, const ReportFiles& files) {
   measurement.concluded = true;
   GstStructure* figures = figures_of(measurement.cumulative, measurement.end.value_or(0), true);
   GST_DEBUG_OBJECT(self, "concluding: %" GST_PTR_FORMAT, figures);
-  report(self, files, figures,
-         [&] { return eventcamera::draw_map(measurement.cumulative.statistics.map()); });
+  report(self, files, figures, [&] { return draw_map(measurement.cumulative.statistics.map()); });
 }
 
 /// True if there were events since the last report.
@@ -232,7 +225,7 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
   const bool is_labelled = !labels.empty();
   const auto skipped = measurement.validator.take(
       events, stream_time(GST_BASE_TRANSFORM(self)->segment, whole.start) / 1000, length_of(whole),
-      [&](const eventcamera::AbsoluteEvent& event) {
+      [&](const AbsoluteEvent& event) {
         measurement.concluded = false;
         const auto interval = measurement.last_times.take(event);
         for (auto* part : {&measurement.cumulative, &measurement.recent}) {
@@ -354,21 +347,16 @@ static void gst_event_stats_class_init(GstEventStatsClass* klass) {
   object_class->finalize = finalize;
 
   Properties<settings_of> properties(object_class);
-  properties.add(
-      &Settings::interval,
-      g_param_spec_uint64(
-          "interval", "Interval",
-          "Time between statistics messages, in stream time (ns; 0 = at the end only)", 0,
-          std::numeric_limits<gint64>::max(), Settings().interval, mutable_playing_flags));
-  add_report_properties(
-      properties,
-      "PNG file of the events per pixel, with a bar of the counts, written at EOS, "
-      "at the end of a segment or on stop");
+  properties.add(&Settings::interval, "interval",
+                 "Time between statistics messages, in stream time (ns; 0 = at the end only)", 0,
+                 std::numeric_limits<gint64>::max());
+  add_report_properties(properties,
+                        "PNG file of the events per pixel, with a bar of the counts, written at "
+                        "EOS, at the end of a segment or on stop");
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_templates(element_class, EVENT_CAPS, EVENT_CAPS);
-  gst_element_class_set_static_metadata(element_class, "Event statistics", "Filter/Analyzer",
-                                        "Measures an event stream", EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event statistics", "Filter/Analyzer", "Measures an event stream");
 
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
   transform_class->start = start;

@@ -11,9 +11,7 @@
 
 #include "gst/base/named_file.hpp"
 
-using eventcamera::CauseCounts;
-using eventcamera::interval_shares;
-using eventcamera::StreamFigures;
+using namespace eventcamera;
 
 namespace {
 
@@ -107,11 +105,10 @@ void put_causes(GstStructure* structure, const CauseCounts& causes) {
                       nullptr);
 }
 
-eventcamera::Nanoseconds stream_time(const GstSegment& segment, GstClockTime time) {
+Nanoseconds stream_time(const GstSegment& segment, GstClockTime time) {
   guint64 result = time;
   const gint sign = gst_segment_to_stream_time_full(&segment, GST_FORMAT_TIME, time, &result);
-  const auto magnitude =
-      static_cast<eventcamera::Nanoseconds>(std::min<guint64>(result, G_MAXINT64));
+  const auto magnitude = static_cast<Nanoseconds>(std::min<guint64>(result, G_MAXINT64));
   return sign < 0 ? -magnitude : magnitude;
 }
 
@@ -128,7 +125,7 @@ bool can_report(gpointer element, const ReportFiles& files) {
 }
 
 void report(gpointer element, const ReportFiles& files, GstStructure* figures,
-            const std::function<eventcamera::RgbPicture()>& draw) {
+            const std::function<RgbPicture()>& draw) {
   std::string path = files.location;
   try {
     if (!path.empty()) write_json(figures, path);

@@ -55,13 +55,10 @@ struct ReportFiles {
 /// For class_init: adds the properties location and map, for settings derived from ReportFiles.
 template <class Properties>
 void add_report_properties(Properties& properties, const char* map_blurb) {
-  properties.add(&ReportFiles::location,
-                 g_param_spec_string("location", "Location",
-                                     "JSON file of the statistics, written at EOS, at the end of a "
-                                     "segment or on stop",
-                                     "", mutable_ready_flags));
-  properties.add(&ReportFiles::map,
-                 g_param_spec_string("map", "Map", map_blurb, "", mutable_ready_flags));
+  properties.add_fixed(
+      &ReportFiles::location, "location",
+      "JSON file of the statistics, written at EOS, at the end of a segment or on stop");
+  properties.add_fixed(&ReportFiles::map, "map", map_blurb);
 }
 
 /// Converts a timestamp of a segment to stream time.

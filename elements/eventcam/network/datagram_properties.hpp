@@ -21,20 +21,15 @@ struct DatagramCounts {
 
 inline GType datagram_format_type() {
   using eventcamera::DatagramFormat;
-  static const GEnumValue values[] = {
-      {static_cast<int>(DatagramFormat::spif),
-       "SPIF without timestamps: SpiNNaker, AEStream, EventCV", "spif"},
-      {static_cast<int>(DatagramFormat::spif_timestamps),
-       "SPIF with timestamps: SpiNNaker, EventCV", "spif-timestamps"},
-      {static_cast<int>(DatagramFormat::t64_x16_y16_on8), "faery, 13 bytes per event",
-       "t64-x16-y16-on8"},
-      {static_cast<int>(DatagramFormat::t32_x16_y15_on1), "faery, 8 bytes per event",
-       "t32-x16-y15-on1"},
-      {static_cast<int>(DatagramFormat::es), "Event Stream", "es"},
-      {static_cast<int>(DatagramFormat::jaer), "jAER's AER-UDP", "jaer"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventDatagramFormat", values);
+  return enum_type<DatagramFormat>(
+      "GstEventDatagramFormat",
+      {{DatagramFormat::spif, "SPIF without timestamps: SpiNNaker, AEStream, EventCV", "spif"},
+       {DatagramFormat::spif_timestamps, "SPIF with timestamps: SpiNNaker, EventCV",
+        "spif-timestamps"},
+       {DatagramFormat::t64_x16_y16_on8, "faery, 13 bytes per event", "t64-x16-y16-on8"},
+       {DatagramFormat::t32_x16_y15_on1, "faery, 8 bytes per event", "t32-x16-y15-on1"},
+       {DatagramFormat::es, "Event Stream", "es"},
+       {DatagramFormat::jaer, "jAER's AER-UDP", "jaer"}});
 }
 
 inline const char* name_of(eventcamera::DatagramFormat format) {
@@ -43,13 +38,10 @@ inline const char* name_of(eventcamera::DatagramFormat format) {
 }
 
 inline GType datagram_byte_order_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(std::endian::little), "Little-endian, like AEStream on a PC",
-       "little-endian"},
-      {static_cast<int>(std::endian::big), "Big-endian, network byte order", "big-endian"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventDatagramByteOrder", values);
+  return enum_type<std::endian>(
+      "GstEventDatagramByteOrder",
+      {{std::endian::little, "Little-endian, like AEStream on a PC", "little-endian"},
+       {std::endian::big, "Big-endian, network byte order", "big-endian"}});
 }
 
 /// Adds the properties that sender and receiver must share. Settings are derived from
@@ -57,19 +49,11 @@ inline GType datagram_byte_order_type() {
 template <auto settings_of>
 void add_datagram_properties(Properties<settings_of>& properties) {
   using eventcamera::DatagramSettings;
-  constexpr DatagramSettings defaults;
-  properties.add(
-      &DatagramSettings::format,
-      g_param_spec_enum("format", "Format", "Format of the datagrams", datagram_format_type(),
-                        static_cast<int>(defaults.format), mutable_ready_flags));
-  properties.add(&DatagramSettings::byte_order,
-                 g_param_spec_enum("byte-order", "Byte order",
-                                   "Byte order of SPIF; the other formats define their own",
-                                   datagram_byte_order_type(),
-                                   static_cast<int>(defaults.byte_order), mutable_ready_flags));
-  properties.add(
-      &DatagramSettings::has_sequence_number,
-      g_param_spec_boolean("sequence-number", "Sequence number",
-                           "Datagrams of jAER start with a sequence number, which reveals losses",
-                           defaults.has_sequence_number, mutable_ready_flags));
+  properties.add_fixed(&DatagramSettings::format, "format", "Format of the datagrams",
+                       datagram_format_type());
+  properties.add_fixed(&DatagramSettings::byte_order, "byte-order",
+                       "Byte order of SPIF; the other formats define their own",
+                       datagram_byte_order_type());
+  properties.add_fixed(&DatagramSettings::has_sequence_number, "sequence-number",
+                       "Datagrams of jAER start with a sequence number, which reveals losses");
 }

@@ -29,7 +29,7 @@
  * |[
  * gst-launch-1.0 udpsrc port=3333 ! eventdatagramdepay format=spif width=640 height=480 !
  * eventrender ! videoconvert ! autovideosink
- * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-diff !
+ * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-dvs !
  * eventdatagrampay format=spif ! udpsink host=receiver port=3333
  * ]|
  *
@@ -48,7 +48,6 @@
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "elements/eventcam/network/reception_reports.hpp"
 #include "gst/base/arrival_segment.hpp"
-#include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
@@ -63,13 +62,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_datagram_depay_debug);
 #define GST_CAT_DEFAULT event_datagram_depay_debug
 
-using eventcamera::AbsoluteEvent;
-using eventcamera::DatagramFormat;
-using eventcamera::DatagramSettings;
-using eventcamera::DatagramUnpacker;
-using eventcamera::Event;
-using eventcamera::Microseconds;
-using eventcamera::Reception;
+using namespace eventcamera;
 
 namespace {
 
@@ -113,7 +106,7 @@ constexpr GstClockTimeDiff max_drift = GST_SECOND;
 
 /// Shorter gaps belong to the interval of the next buffer, longer ones are sent as a GAP event.
 constexpr Microseconds min_gap = 1000;
-static_assert(min_gap + eventcamera::max_datagram_span <= G_MAXUINT32, "wraps times in buffers");
+static_assert(min_gap + max_datagram_span <= G_MAXUINT32, "wraps times in buffers");
 
 /// State of the stream, from start to stop.
 struct State {
@@ -234,10 +227,9 @@ static void reject(GstEventDatagramDepay* self, const char* fault, gsize size,
                                  size, GST_TIME_ARGS(arrival));
   self->priv->stream->warn_of_rejected(
       self,
-      {GST_STREAM_ERROR_DECODE,
-       std::string("Rejected a datagram: ") + fault +
-           ". Set format, width and height to match the sender; stats counts the rejected "
-           "datagrams."},
+      {GST_STREAM_ERROR_DECODE, std::string("Rejected a datagram: ") + fault +
+                                    ". Set format, width and height to match the sender; stats "
+                                    "counts the rejected datagrams."},
       cause);
   g_free(cause);
 }
@@ -422,20 +414,14 @@ static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klas
 
   Properties<settings_of> properties(object_class);
   add_datagram_properties(properties);
-  properties.add(
-      &DatagramSettings::width,
-      g_param_spec_uint("width", "Width", "Width of the sender's sensor (pixels); required", 0,
-                        eventcamera::max_side, 0, mutable_ready_flags));
-  properties.add(
-      &DatagramSettings::height,
-      g_param_spec_uint("height", "Height", "Height of the sender's sensor (pixels); required", 0,
-                        eventcamera::max_side, 0, mutable_ready_flags));
-  properties.add(
-      &Settings::latency,
-      g_param_spec_uint64("latency", "Latency",
-                          "Maximum delay of events relative to the first one; live sinks wait for "
-                          "it (ns)",
-                          0, 10 * GST_SECOND, Settings().latency, mutable_ready_flags));
+  properties.add_fixed(&DatagramSettings::width, "width",
+                       "Width of the sender's sensor (pixels); required", 0, max_side);
+  properties.add_fixed(&DatagramSettings::height, "height",
+                       "Height of the sender's sensor (pixels); required", 0, max_side);
+  properties.add_fixed(
+      &Settings::latency, "latency",
+      "Maximum delay of events relative to the first one; live sinks wait for it (ns)", 0,
+      10 * GST_SECOND);
   install_stats(
       object_class,
       [](GObject* object) {
@@ -453,7 +439,6 @@ static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klas
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   element_class->change_state = change_state;
   add_pad_templates(element_class, "ANY", EVENT_CAPS);
-  gst_element_class_set_static_metadata(
-      element_class, "Event datagram depayloader", "Codec/Depayloader/Network",
-      "Unpacks events from datagrams of other tools", EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event datagram depayloader", "Codec/Depayloader/Network",
+               "Unpacks events from datagrams of other tools");
 }

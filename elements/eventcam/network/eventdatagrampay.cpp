@@ -35,7 +35,6 @@
 
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "elements/eventcam/network/flush_timer.hpp"
-#include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
@@ -56,15 +55,12 @@ GST_DEBUG_CATEGORY_STATIC(event_datagram_pay_debug);
   "application/x-event-datagram, format = (string) { spif, spif-timestamps, " \
   "t64-x16-y16-on8, t32-x16-y15-on1, es, jaer }"
 
-using eventcamera::AbsoluteEvent;
-using eventcamera::Datagram;
-using eventcamera::DatagramPacker;
-using eventcamera::Microseconds;
+using namespace eventcamera;
 
 namespace {
 
 /// User-settable values.
-struct Settings : eventcamera::DatagramSettings, PayloaderSettings {};
+struct Settings : DatagramSettings, PayloaderSettings {};
 
 /// State from start to stop.
 struct Stream {
@@ -346,7 +342,6 @@ static void gst_event_datagram_pay_class_init(GstEventDatagramPayClass* klass) {
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   element_class->change_state = change_state;
   add_pad_templates(element_class, EVENT_CAPS, DATAGRAM_CAPS);
-  gst_element_class_set_static_metadata(
-      element_class, "Event datagram payloader", "Codec/Payloader/Network",
-      "Packs events into datagrams of other tools", EVENTSIM_AUTHORS);
+  set_metadata(klass, "Event datagram payloader", "Codec/Payloader/Network",
+               "Packs events into datagrams of other tools");
 }

@@ -19,12 +19,10 @@ struct PayloaderSettings {
 /// Adds the property max-latency. Settings are derived from PayloaderSettings.
 template <auto settings_of>
 void add_max_latency(Properties<settings_of>& properties) {
-  properties.add(
-      &PayloaderSettings::max_latency,
-      g_param_spec_uint64("max-latency", "Maximum latency",
-                          "Maximum time for which an event waits for others to fill its packet "
-                          "(ns; 0 = send each buffer at once)",
-                          0, GST_SECOND, PayloaderSettings().max_latency, mutable_playing_flags));
+  properties.add(&PayloaderSettings::max_latency, "max-latency",
+                 "Maximum time for which an event waits for others to fill its packet (ns; 0 = "
+                 "send each buffer at once)",
+                 0, GST_SECOND);
 }
 
 /// Calls a function, in a thread of its own, when a deadline passes. The thread starts with the

@@ -35,7 +35,7 @@
  * gst-launch-1.0 udpsrc port=5000
  * caps="application/x-rtp,media=application,clock-rate=1000000,encoding-name=X-EVENT-CAMERA,width=640,height=480"
  * ! rtpjitterbuffer ! rtpeventdepay ! eventrender ! videoconvert ! autovideosink
- * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-diff !
+ * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-dvs !
  * rtpeventpay ! udpsink host=receiver port=5000
  * ]|
  *
@@ -54,7 +54,6 @@
 #include "elements/eventcam/network/reception_reports.hpp"
 #include "elements/eventcam/network/rtp_events.hpp"
 #include "gst/base/arrival_segment.hpp"
-#include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
@@ -70,13 +69,7 @@
 GST_DEBUG_CATEGORY_STATIC(rtp_event_depay_debug);
 #define GST_CAT_DEFAULT rtp_event_depay_debug
 
-using eventcamera::is_side;
-using eventcamera::RtpEventFormat;
-using eventcamera::RtpInterval;
-using eventcamera::RtpPacket;
-using eventcamera::RtpStatistics;
-using eventcamera::RtpUnpacker;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 
 namespace {
 
@@ -385,9 +378,8 @@ static void gst_rtp_event_depay_class_init(GstRtpEventDepayClass* klass) {
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_templates(element_class, RTP_EVENT_CAPS, EVENT_CAPS);
-  gst_element_class_set_static_metadata(element_class, "RTP event depayloader",
-                                        "Codec/Depayloader/Network/RTP",
-                                        "Extracts events from RTP packets", EVENTSIM_AUTHORS);
+  set_metadata(klass, "RTP event depayloader", "Codec/Depayloader/Network/RTP",
+               "Extracts events from RTP packets");
   element_class->change_state = change_state;
 
   GstRTPBaseDepayloadClass* depayload_class = GST_RTP_BASE_DEPAYLOAD_CLASS(klass);

@@ -21,7 +21,7 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 v4l2src ! eventsim-diff ! rtpeventpay ! udpsink host=receiver port=5000
+ * gst-launch-1.0 v4l2src ! eventsim-dvs ! rtpeventpay ! udpsink host=receiver port=5000
  * ]|
  *
  * Since: 0.1
@@ -38,7 +38,6 @@
 
 #include "elements/eventcam/network/flush_timer.hpp"
 #include "elements/eventcam/network/rtp_events.hpp"
-#include "gst/base/authors.hpp"
 #include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
@@ -59,13 +58,7 @@
 GST_DEBUG_CATEGORY_STATIC(rtp_event_pay_debug);
 #define GST_CAT_DEFAULT rtp_event_pay_debug
 
-using eventcamera::Event;
-using eventcamera::InvalidEvents;
-using eventcamera::Nanoseconds;
-using eventcamera::PendingInterval;
-using eventcamera::RtpEventFormat;
-using eventcamera::RtpPacker;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 
 namespace {
 
@@ -320,7 +313,7 @@ static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken)
   priv.stream->csrc_count = static_cast<guint8>(
       std::min(gst_rtp_base_payload_get_source_count(payload, taken), max_csrc_count));
   const auto interval = interval_of(taken);
-  if (!interval || interval->start > static_cast<GstClockTime>(eventcamera::max_rtp_start))
+  if (!interval || interval->start > static_cast<GstClockTime>(max_rtp_start))
     return reject(self, interval_fault(taken), taken);
   const MappedEvents mapped(taken);
   if (!mapped) return reject(self, EventFault::partial_event, taken);
@@ -338,11 +331,10 @@ static void handle_gap(GstRtpEventPay* self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
-  if (!self->priv->stream->state || start > static_cast<GstClockTime>(eventcamera::max_rtp_start))
-    return;
+  if (!self->priv->stream->state || start > static_cast<GstClockTime>(max_rtp_start)) return;
   const bool is_known = GST_CLOCK_TIME_IS_VALID(duration);
   const GstClockTime end =
-      is_known ? start + std::min(duration, GstClockTime{eventcamera::max_interval}) : start;
+      is_known ? start + std::min(duration, GstClockTime{max_interval}) : start;
   reported(self, [&] {
     add_interval(self, {start, end}, {});
     if (!is_known) send(self);
@@ -446,34 +438,24 @@ static void gst_rtp_event_pay_init(GstRtpEventPay* self) {
   announce_latency(GST_CAT_DEFAULT, self, "max-latency");
 }
 
-static GType format_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(RtpEventFormat::evt3), "16-bit words, the most compact", "EVT3"},
-      {static_cast<int>(RtpEventFormat::xytp), "8 bytes per event, for sensors of any size",
-       "XYTP"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstRtpEventFormat", values);
-}
-
 static void gst_rtp_event_pay_class_init(GstRtpEventPayClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
 
   Properties<settings_of> properties(object_class);
-  properties.add(
-      &Settings::format,
-      g_param_spec_enum("format", "Format",
-                        "Format of the events in packets; read when the stream begins",
-                        format_type(), static_cast<int>(Settings().format), mutable_ready_flags));
+  properties.add_fixed(
+      &Settings::format, "format", "Format of the events in packets; read when the stream begins",
+      enum_type<RtpEventFormat>(
+          "GstRtpEventFormat",
+          {{RtpEventFormat::evt3, "16-bit words, the most compact", "EVT3"},
+           {RtpEventFormat::xytp, "8 bytes per event, for sensors of any size", "XYTP"}}));
   add_max_latency(properties);
   install_stats(object_class, stats_of, "Counters of packets and events sent");
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_templates(element_class, EVENT_CAPS, RTP_EVENT_CAPS ", payload = (int) [ 96, 127 ]");
-  gst_element_class_set_static_metadata(element_class, "RTP event payloader",
-                                        "Codec/Payloader/Network/RTP",
-                                        "Packs events into RTP packets", EVENTSIM_AUTHORS);
+  set_metadata(klass, "RTP event payloader", "Codec/Payloader/Network/RTP",
+               "Packs events into RTP packets");
   element_class->change_state = change_state;
 
   GstRTPBasePayloadClass* payload_class = GST_RTP_BASE_PAYLOAD_CLASS(klass);

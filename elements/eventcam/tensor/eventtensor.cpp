@@ -64,9 +64,6 @@
 #include <utility>
 
 #include "elements/eventcam/tensor/tensor_format.hpp"
-#include "elements/eventcam/tensor/tensor_meta.hpp"
-#include "elements/eventcam/tensor/tensor_properties.hpp"
-#include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
@@ -85,10 +82,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_tensor_debug);
 #define GST_CAT_DEFAULT event_tensor_debug
 
-using eventcamera::EventTensor;
-using eventcamera::Microseconds;
-using eventcamera::Nanoseconds;
-using eventcamera::WindowQueue;
+using namespace eventcamera;
 
 namespace {
 
@@ -146,9 +140,9 @@ static Guarded<TensorProperties>& settings_of(GObject* object) {
   return GST_EVENT_TENSOR(object)->priv->settings;
 }
 
-static const Report no_memory{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
-                              "Not enough memory for a tensor; lower bins, the resolution or the "
-                              "length of windows."};
+static const Report no_memory{
+    GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+    "Not enough memory for a tensor; lower bins, the resolution or the length of windows."};
 
 /// Longest pause that is filled with empty tensors.
 static GstClockTime max_pause_of(const State& state) {
@@ -211,8 +205,8 @@ static GstFlowReturn approach(GstEventTensor* self, const EventInterval& interva
 }
 
 /// Adds an interval, and pushes the tensors of the windows that it completes. May throw.
-static GstFlowReturn add(GstEventTensor* self, std::span<const eventcamera::Event> events,
-                         Microseconds base, const EventInterval& interval, GstBuffer* buffer) {
+static GstFlowReturn add(GstEventTensor* self, std::span<const Event> events, Microseconds base,
+                         const EventInterval& interval, GstBuffer* buffer) {
   auto& priv = *self->priv;
   const GstClockTime start = std::max(interval.start, priv.stream->segment.start);
   if (interval.end < start || (interval.end == start && interval.start < start)) return GST_FLOW_OK;
@@ -315,7 +309,7 @@ static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
     post_message(self, GST_MESSAGE_ERROR,
                  {GST_STREAM_ERROR_FORMAT,
                   "Cannot make tensors that take more than 1 GiB; lower bins or the resolution."},
-                 eventcamera::in_pixels({info.width, info.height}) + " and " +
+                 in_pixels({info.width, info.height}) + " and " +
                      std::to_string(format.tensors.bins) + " bins make " + std::to_string(bytes) +
                      " bytes");
     return false;
@@ -413,14 +407,55 @@ static void gst_event_tensor_class_init(GstEventTensorClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
   Properties<settings_of> properties(object_class);
-  add_tensor_properties(properties);
+  constexpr guint max_frame_count = 10'000;
+  properties.add_fixed(
+      &TensorProperties::representation, "representation", "Content of a tensor",
+      enum_type<Representation>(
+          "GstEventTensorRepresentation",
+          {{Representation::voxel_grid,
+            "Polarities, shared out to the two nearest of several instants", "voxel-grid"},
+           {Representation::histogram, "Numbers of OFF and of ON events", "histogram"},
+           {Representation::time_surface, "Decayed age of the last OFF and the last ON event",
+            "time-surface"},
+           {Representation::event_frame, "ON minus OFF events", "event-frame"}}));
+  properties.add_fixed(&TensorProperties::bins, "bins", "Channels of a voxel grid", 1,
+                       GST_EVENT_CAMERA_MAX_BINS);
+  properties.add_fixed(
+      &TensorProperties::decay, "decay", "How the values of a time surface decrease",
+      enum_type<Decay>("GstEventTensorDecay",
+                       {{Decay::exponential, "exp(-age / time-constant)", "exponential"},
+                        {Decay::linear, "1 - age / time-constant, at least 0", "linear"}}));
+  properties.add_fixed(&TensorProperties::time_constant, "time-constant",
+                       "Time constant of the decay of a time surface (ns)", GST_USECOND,
+                       max_tensor_time);
+  properties.add_fixed(
+      &TensorProperties::normalization, "normalization", "How the values of a tensor are scaled",
+      enum_type<Normalization>(
+          "GstEventTensorNormalization",
+          {{Normalization::none, "As counted", "none"},
+           {Normalization::mean_std,
+            "Nonzero values get the mean 0 and the standard deviation 1, as for E2VID", "mean-std"},
+           {Normalization::max, "The largest magnitude becomes 1", "max"}}));
+  properties.add_fixed(&TensorProperties::type, "data-type", "Type of the numbers in a tensor",
+                       tensor_data_type());
+  properties.add_fixed(&TensorProperties::event_count, "event-count",
+                       "Number of events in a window (0 = not limited by count)", 0,
+                       static_cast<guint>(WindowQueue::max_events));
+  properties.add_fixed(
+      &TensorProperties::accumulation_time, "accumulation-time",
+      "Length of a window without event-count (ns, at least 1000; 0 = frame-count buffers)", 0,
+      max_tensor_gap);
+  properties.add_fixed(&TensorProperties::frame_count, "frame-count",
+                       "Number of buffers in a window without event-count and accumulation-time, "
+                       "such as intervals between frames",
+                       1, max_frame_count);
+  properties.add_fixed(&TensorProperties::overlap, "overlap",
+                       "Share of a window that the next one repeats", 0, 0.99);
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   element_class->change_state = change_state;
   add_pad_templates(element_class, EVENT_CAPS,
-                    "other/tensors, format = (string) static, num_tensors = (int) 1, "
-                    "types = (string) { float32, float16, uint8 }, "
-                    "framerate = (fraction) [ 0, max ]");
-  gst_element_class_set_static_metadata(element_class, "Event tensors", "Converter",
-                                        "Turns windows of events into tensors", EVENTSIM_AUTHORS);
+                    "other/tensors, format = (string) static, num_tensors = (int) 1, types = "
+                    "(string) { float32, float16, uint8 }, framerate = (fraction) [ 0, max ]");
+  set_metadata(klass, "Event tensors", "Converter", "Turns windows of events into tensors");
 }

@@ -35,7 +35,7 @@
 #include <utility>
 
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/authors.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/video_frame.hpp"
@@ -110,12 +110,11 @@ class FlowJoin final : public EventAggregator {
                                : GST_FLOW_OK;
     if (flow && !add_flow(out.get(), flow.get())) return GST_FLOW_ERROR;
     if (!flow && !has_ended(flow_pad_))
-      warn_of_no_flow_(
-          element(),
-          {GST_STREAM_ERROR_FORMAT,
-           "A frame has no optical flow; passing it without. Give the flow from a frame "
-           "to the next one the PTS and the duration of the frame."},
-          "no matching buffer on flow_sink");
+      warn_of_no_flow_(element(),
+                       {GST_STREAM_ERROR_FORMAT,
+                        "A frame has no optical flow; passing it without. Give the flow from a "
+                        "frame to the next one the PTS and the duration of the frame."},
+                       "no matching buffer on flow_sink");
     return push(std::move(out));
   }
 
@@ -215,7 +214,6 @@ static void gst_flow_join_class_init(GstFlowJoinClass* klass) {
       aggregator, "flow_sink", GST_PAD_SINK,
       "other/tensors, format = (string) static, num_tensors = (int) 1, types = (string) float32");
   add_aggregator_pad_template(aggregator, "src", GST_PAD_SRC, ANY_VIDEO_CAPS);
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Optical flow joiner",
-                                        "Filter/Video", "Adds known optical flow to video frames",
-                                        EVENTSIM_AUTHORS);
+  set_metadata(klass, "Optical flow joiner", "Filter/Video",
+               "Adds known optical flow to video frames");
 }

@@ -1,7 +1,14 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "elements/eventcam/tensor/tensor_format.hpp"
 
-using eventcamera::Nanoseconds;
+#include "features.hpp"
+#ifdef HAVE_TENSOR_META
+#include <gst/analytics/analytics.h>
+
+#include <array>
+#endif
+
+using namespace eventcamera;
 
 /// Framerate of the tensors: 0/1 if it varies or is not a fraction of integers.
 std::pair<gint, gint> TensorFormat::framerate() const {
@@ -33,11 +40,13 @@ OwnedCaps TensorFormat::caps() const {
   const auto dimensions = std::to_string(of.width) + ":" + std::to_string(of.height) + ":" +
                           std::to_string(of.channels) + ":1";
   const auto [fps_n, fps_d] = framerate();
-  return OwnedCaps(gst_caps_new_simple(
-      "other/tensors", "format", G_TYPE_STRING, "static", "num_tensors", G_TYPE_INT, 1,
-      "dimensions", G_TYPE_STRING, dimensions.c_str(), "types", G_TYPE_STRING,
-      tensor_data_types()[static_cast<int>(tensors.type)].value_nick, "framerate",
-      GST_TYPE_FRACTION, fps_n, fps_d, nullptr));
+  const auto* const type =
+      g_enum_get_value(static_cast<GEnumClass*>(g_type_class_peek(tensor_data_type())),
+                       static_cast<gint>(tensors.type));
+  return OwnedCaps(gst_caps_new_simple("other/tensors", "format", G_TYPE_STRING, "static",
+                                       "num_tensors", G_TYPE_INT, 1, "dimensions", G_TYPE_STRING,
+                                       dimensions.c_str(), "types", G_TYPE_STRING, type->value_nick,
+                                       "framerate", GST_TYPE_FRACTION, fps_n, fps_d, nullptr));
 }
 
 /// Caps fields, and the properties that determine them.
@@ -62,3 +71,43 @@ std::string mismatch_text(GstCaps* wanted, GstCaps* made) {
   }
   return wishes;
 }
+
+#ifdef HAVE_TENSOR_META
+
+static GstTensorDataType data_type_of(ElementType type) {
+  switch (type) {
+    case ElementType::float32:
+      return GST_TENSOR_DATA_TYPE_FLOAT32;
+    case ElementType::float16:
+      return GST_TENSOR_DATA_TYPE_FLOAT16;
+    case ElementType::uint8:
+      break;
+  }
+  return GST_TENSOR_DATA_TYPE_UINT8;
+}
+
+/// A buffer of the same memory: a meta that refers to its own buffer would never be freed.
+static GstBuffer* same_memory(GstBuffer* buffer) {
+  GstBuffer* const same = gst_buffer_new();
+  for (guint i = 0; i < gst_buffer_n_memory(buffer); ++i)
+    gst_buffer_append_memory(same, gst_buffer_get_memory(buffer, i));
+  return same;
+}
+
+void add_tensor_meta(GstBuffer* buffer, const TensorShape& shape, const TensorSettings& settings) {
+  static const GQuark id = g_quark_from_static_string("event-tensor");
+  std::array<gsize, 4> dimensions = {1, static_cast<gsize>(shape.channels),
+                                     static_cast<gsize>(shape.height),
+                                     static_cast<gsize>(shape.width)};
+  auto** const tensors = g_new(GstTensor*, 1);
+  tensors[0] =
+      gst_tensor_new_simple(id, data_type_of(settings.type), same_memory(buffer),
+                            GST_TENSOR_DIM_ORDER_ROW_MAJOR, dimensions.size(), dimensions.data());
+  gst_tensor_meta_set(gst_buffer_add_tensor_meta(buffer), 1, tensors);
+}
+
+#else
+
+void add_tensor_meta(GstBuffer*, const TensorShape&, const TensorSettings&) {}
+
+#endif

@@ -20,11 +20,7 @@
 GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
 #define GST_CAT_DEFAULT event_reader_debug
 
-using eventcamera::FileDecompressor;
-using eventcamera::Microseconds;
-using eventcamera::RecordingReader;
-using eventcamera::TemporaryFileError;
-using eventcamera::UnsupportedFormat;
+using namespace eventcamera;
 
 namespace {
 
@@ -55,9 +51,8 @@ void wait_until_added(GstElement* element) {
 Report not_linked() {
   return {
       GST_STREAM_ERROR_FAILED,
-      "Nothing is linked downstream. Insert eventrender before elements that take video. "
-      "decodebin draws events as video; for the events themselves, set decodebin " ASK_FOR_EVENTS
-      "."};
+      "Nothing is linked downstream. Insert eventrender before elements that take video. decodebin "
+      "draws events as video; for the events themselves, set decodebin " ASK_FOR_EVENTS "."};
 }
 
 Report report_of(const std::exception& error, const EventReaderFormat& format) {

@@ -22,10 +22,7 @@
 GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
 #define GST_CAT_DEFAULT event_reader_debug
 
-using eventcamera::Microseconds;
-using eventcamera::RecordingReader;
-using eventcamera::SensorSize;
-using eventcamera::StreamKind;
+using namespace eventcamera;
 
 GstEvent* with_seqnum(GstEvent* event, guint32 seqnum) {
   if (seqnum != GST_SEQNUM_INVALID) gst_event_set_seqnum(event, seqnum);
@@ -38,7 +35,7 @@ namespace {
 /// buffers need as much, and up to a limit.
 class SpareMemory {
  public:
-  std::vector<eventcamera::Event> pop() {
+  std::vector<Event> pop() {
     const std::lock_guard lock(mutex_);
     if (count_ == 0) return {};
     auto memory = std::exchange(spare_[--count_], {});
@@ -46,7 +43,7 @@ class SpareMemory {
     return memory;
   }
 
-  void push(std::vector<eventcamera::Event> memory) noexcept {
+  void push(std::vector<Event> memory) noexcept {
     constexpr std::size_t min_needed = 512;
     const std::lock_guard lock(mutex_);
     needed_ = std::max({memory.size(), needed_ - needed_ / 64, min_needed});
@@ -61,7 +58,7 @@ class SpareMemory {
   static constexpr std::size_t max_events = std::size_t{1} << 23;  // 64 MiB
 
   std::mutex mutex_;
-  std::array<std::vector<eventcamera::Event>, 16> spare_;
+  std::array<std::vector<Event>, 16> spare_;
   std::size_t count_ = 0;     ///< number of them
   std::size_t capacity_ = 0;  ///< of all of them, in events
   std::size_t needed_ = 0;    ///< events of a recent buffer: a maximum that decays
@@ -182,16 +179,15 @@ class ReaderPad {
 
   /// Pushes the first `count` events of `memory`, at least one, without copying them, and their
   /// labels, if there are any. Throws std::bad_alloc.
-  GstFlowReturn push(std::vector<eventcamera::Event> memory, std::size_t count,
-                     std::span<const eventcamera::Label> labels, GstClockTime pts,
-                     GstClockTime duration) {
+  GstFlowReturn push(std::vector<Event> memory, std::size_t count, std::span<const Label> labels,
+                     GstClockTime pts, GstClockTime duration) {
     struct Owner {
       std::shared_ptr<SpareMemory> spare;
-      std::vector<eventcamera::Event> memory;
+      std::vector<Event> memory;
     };
     auto owner = std::make_unique<Owner>(Owner{spare_, std::move(memory)});
     auto* const events = owner->memory.data();
-    const gsize size = count * sizeof(eventcamera::Event);
+    const gsize size = count * sizeof(Event);
     OwnedBuffer buffer(gst_buffer_new_wrapped_full(
         static_cast<GstMemoryFlags>(0), events, size, 0, size, owner.release(), [](gpointer data) {
           const std::unique_ptr<Owner> last(static_cast<Owner*>(data));
@@ -203,7 +199,7 @@ class ReaderPad {
   }
 
   /// Memory of a buffer that was freed, or none.
-  std::vector<eventcamera::Event> spare_memory() { return spare_->pop(); }
+  std::vector<Event> spare_memory() { return spare_->pop(); }
 
   GstFlowReturn push_gap(GstClockTime pts, GstClockTime duration) {
     return push_event(pad_, gst_event_new_gap(pts, duration));
@@ -357,11 +353,11 @@ GstFlowReturn ReaderOutput::push_to_first(std::span<const Sample> samples) {
   return GST_FLOW_OK;
 }
 
-GstFlowReturn ReaderOutput::push(const eventcamera::TriggerItem& item) {
+GstFlowReturn ReaderOutput::push(const TriggerItem& item) {
   return push_to_first(item.triggers);
 }
 
-GstFlowReturn ReaderOutput::push(const eventcamera::ImuItem& item) {
+GstFlowReturn ReaderOutput::push(const ImuItem& item) {
   return push_to_first(item.samples);
 }
 
@@ -407,10 +403,10 @@ GstFlowReturn ReaderOutput::begin() {
   }
   for (GstEvent* event : std::exchange(waiting_, {})) push_to_pads(event);
   // Writers must know these streams before the first buffer.
-  if (format_.has_triggers) push(eventcamera::TriggerItem{});
+  if (format_.has_triggers) push(TriggerItem{});
   if (std::ranges::any_of(streams,
                           [](const auto& stream) { return stream.info.kind == StreamKind::imu; }))
-    push(eventcamera::ImuItem{});
+    push(ImuItem{});
   return GST_FLOW_OK;
 }
 
@@ -488,13 +484,12 @@ bool ReaderOutput::find_size(std::size_t index) {
     }
   }
   if (stream.is_implausible) {
-    constexpr int max_side = eventcamera::UsedPixels::max_guessed_side;
+    constexpr int max_side = UsedPixels::max_guessed_side;
     post_message(
         element_, GST_MESSAGE_ERROR,
         {GST_STREAM_ERROR_FORMAT,
          "The file does not state its sensor size, and its events lie beyond " +
-             eventcamera::in_pixels({max_side, max_side}) +
-             ". If that is right, set width and height."},
+             in_pixels({max_side, max_side}) + ". If that is right, set width and height."},
         "columns and rows may have fractions, or other columns may have been read for them");
     return false;
   }

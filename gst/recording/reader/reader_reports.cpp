@@ -9,7 +9,7 @@
 GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
 #define GST_CAT_DEFAULT event_reader_debug
 
-using eventcamera::RecordingReader;
+using namespace eventcamera;
 
 ReaderReports::ReaderReports(GstElement* element, bool has_many_streams)
     : element_(element),
@@ -52,8 +52,7 @@ void ReaderReports::update(const RecordingReader& recording) {
         element_,
         {data_error_, "Corrupt data at byte " + std::to_string(corruption.first_at) + ": " +
                           corruption.first +
-                          "; skipping it. The stats property counts what is "
-                          "dropped."},
+                          "; skipping it. The stats property counts what is dropped."},
         std::to_string(counts.corrupt_places) + " corrupt places, the last at byte " +
             std::to_string(corruption.last_at));
   }
@@ -85,11 +84,10 @@ void ReaderReports::post_cut(const std::optional<std::uint64_t>& corrupt_at) {
 
 void ReaderReports::post_sorted(const RecordingReader& recording) {
   if (!recording.is_sorted()) return;
-  post_message(element_, GST_MESSAGE_WARNING,
-               {data_error_,
-                "The file is not sorted by time. Its events were read into memory and "
-                "sorted."},
-               "more than one event in a hundred is over 10 ms out of order");
+  post_message(
+      element_, GST_MESSAGE_WARNING,
+      {data_error_, "The file is not sorted by time. Its events were read into memory and sorted."},
+      "more than one event in a hundred is over 10 ms out of order");
 }
 
 void ReaderReports::post_unread_streams(const RecordingReader& recording) {
@@ -120,8 +118,8 @@ void ReaderReports::post_end(const RecordingReader& recording, bool is_timed) {
       element_, GST_MESSAGE_WARNING,
       {data_error_, text_of(counts.outside) + " events outside the sensor, and " +
                         text_of(untimely) + " items with times out of order, were dropped." +
-                        (is_assumed ? " The file does not state its sensor size: if the "
-                                      "sensor is larger, set width and height."
+                        (is_assumed ? " The file does not state its sensor size: if the sensor is "
+                                      "larger, set width and height."
                                     : "")},
       text_of(counts.late) + " late, " + text_of(counts.stray) + " at stray times");
 }

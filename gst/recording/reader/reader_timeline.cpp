@@ -5,7 +5,7 @@
 
 #include "gst/base/pads.hpp"
 
-using eventcamera::RecordingReader;
+using namespace eventcamera;
 
 void ReaderTimeline::reset() {
   const auto state = state_.lock();

@@ -109,8 +109,7 @@ Type read_type(std::string_view text) {
   if (text.ends_with('O'))
     throw UnsupportedFormat(
         "the NumPy file holds pickled Python objects, which are not read; save arrays of numbers, "
-        "as "
-        "numpy.savez(file, t=t, x=x, y=y, p=p) does");
+        "as numpy.savez(file, t=t, x=x, y=y, p=p) does");
   if (text.size() < 3) Literal::fail();
   Literal size(text.substr(2));
   const auto number = size.integer();

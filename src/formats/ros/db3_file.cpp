@@ -353,8 +353,7 @@ class Db3File final : public BagFile {
     constexpr std::size_t max_topics = 4096;
     if (!database_->has_table("topics") || !database_->has_table("messages"))
       throw UnsupportedFormat(
-          "this SQLite database is not a ROS 2 bag: it has no ordinary tables topics and "
-          "messages");
+          "this SQLite database is not a ROS 2 bag: it has no ordinary tables topics and messages");
     auto rows =
         database_->query("SELECT id, name, type, serialization_format FROM topics ORDER BY id");
     // Counts rows: a few pages could refer to each other for ever.

@@ -203,8 +203,8 @@ void CsvDecoder::find_commas(const std::vector<std::vector<std::string_view>>& r
     }
   if (is_decimal && is_grouping)
     throw UnsupportedFormat(
-        "numbers have commas before decimals and before thousands; write a "
-        "decimal point, and no separators of thousands");
+        "numbers have commas before decimals and before thousands; write a decimal point, and no "
+        "separators of thousands");
   if (!is_decimal && !is_grouping && !either.empty())
     throw UnsupportedFormat("the comma in " + std::string(either) +
                             " may be before decimals or thousands; write a decimal point, and no "
