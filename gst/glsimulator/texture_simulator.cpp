@@ -153,19 +153,21 @@ class TextureVideoSimulator final : public VideoSimulator {
   void set_drawn_video(const GstVideoInfo& drawn) override { drawn_ = drawn; }
 
   std::optional<Interval> push(Interval interval, const eventcamera::Settings& settings,
-                               const KnownFlow&) override {
+                               const KnownFlow& flow) override {
     {
       const OwnedBuffer uploaded = in_texture(interval.frame.get());
       const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
       if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
       frame_.texture = texture.name();
+      simulator_->set_flow(flow);
       run([&] { simulator_->queue(frame_, interval.end, settings); });
     }
     return finish_before({std::move(interval), false});
   }
 
   void draw(OwnedBuffer frame, Nanoseconds time, const eventcamera::Settings& settings,
-            const KnownFlow&, const eventcamera::Palette& palette, GstBuffer* picture) override {
+            const KnownFlow& flow, const eventcamera::Palette& palette,
+            GstBuffer* picture) override {
     {
       const OwnedBuffer uploaded = in_texture(frame.get());
       const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
@@ -175,6 +177,7 @@ class TextureVideoSimulator final : public VideoSimulator {
       frame_.texture = texture.name();
       const eventcamera::gl::Picture out{
           drawn.name(), eventcamera::pixels_by_kind(palette, pixel_layout_of(drawn_))};
+      simulator_->set_flow(flow);
       run([&] { simulator_->draw(frame_, time, settings, out); });
     }
     // Makes readers of the picture in another context wait until it is drawn.
@@ -196,6 +199,13 @@ class TextureVideoSimulator final : public VideoSimulator {
   void drop() override {
     queued_.reset();
     simulator_->drop();
+  }
+
+  const eventcamera::EventBuckets* hold_until(Nanoseconds time,
+                                              const eventcamera::Settings& settings) override {
+    const eventcamera::EventBuckets* events = nullptr;
+    run([&] { events = simulator_->hold_until(time, settings); });
+    return events;
   }
 
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }

@@ -36,12 +36,6 @@ class EveryFormat : public testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats()),
                          [](const auto& format) { return format.param; });
 
-/// A simulator on the GPU that takes frames in system memory.
-Harness without_upload(const std::string& launch) {
-  gst_init(nullptr, nullptr);
-  return {gst_harness_new_parse(launch.c_str()), launch};
-}
-
 /// A video whose frames differ, pushed one by one.
 class Flashes {
  public:

@@ -172,9 +172,13 @@ std::vector<std::uint8_t> drawn(const EventBuckets* events, const Palette& palet
   return pixels;
 }
 
+std::unique_ptr<gl::Simulator> make_dvs(const gl::Context& gl, const LumaFormat& format) {
+  return gl::make_dvs_simulator(gl, format);
+}
+
 TEST_P(EveryApi, DrawsItsEventsAsTheCpuDoes) {
   for (const auto make :
-       {gl::make_frame_simulator, gl::make_sparse_simulator, gl::make_diff_simulator}) {
+       {gl::make_frame_simulator, gl::make_sparse_simulator, gl::make_diff_simulator, make_dvs}) {
     for (const auto& [width, height] : {std::pair{1, 1}, {33, 21}, {67, 45}, {2100, 3}}) {
       const LumaFormat format{width, height, 8};
       const auto drawing = make(context, format);
