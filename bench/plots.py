@@ -4,7 +4,8 @@
 
   plots.py BENCHMARKS.json DIRECTORY
 
-DIRECTORY/runtimes.png: the runtimes of the paper, beside the naive implementation and ours here.
+DIRECTORY/runtimes.png: the runtimes of the paper, beside the naive implementation and ours here, and
+ours on a GPU, from the table of DIRECTORY/benchmarks.md.
 DIRECTORY/growth.png: how the methods' cost grows."""
 import json
 import os
@@ -22,6 +23,7 @@ INK = "#262b36"
 PAPER = "#b9bec9"
 NAIVE = "#e0a458"
 OURS = "#2f6fb5"
+OURS_ON_GPU = "#3a9a68"
 EVENTCV = "#dfe2e8"
 # Rows of the growth plots: label and colour of each method.
 GROWTH = [
@@ -54,9 +56,9 @@ PAPER_RUNTIMES = [
     ("dense, Farneback", "dense-farneback", 72.81, 186.06),
     ("sparse, LK", "sparse", 144.99, 4.88),
     ("difference, LK", "diff", 67.64, 3.02),
-    ("dense, Farneback (GPU)", None, 20.22, 49.30),
-    ("sparse, LK (GPU)", None, 22.45, 4.66),
-    ("difference, LK (GPU)", None, 10.07, 2.87),
+    ("dense, Farneback (GPU)", "gl-dense-farneback", 20.22, 49.30),
+    ("sparse, LK (GPU)", "gl-sparse", 22.45, 4.66),
+    ("difference, LK (GPU)", "gl-diff", 10.07, 2.87),
     ("v2e (GPU)\nand eventsim-dvs, v2e-noisy", "dvs-v2e-noisy", 71741.58, 49934.16),
     ("vid2e (GPU)\nand eventsim-dvs, upsampling=motion", "dvs-motion", 1420506.78, 43040.42),
 ]
@@ -90,7 +92,7 @@ plt.rcParams.update(
 
 
 def short(value):
-    """Three digits, and no more zeros than that."""
+    """Rounds to three digits."""
     if value >= 1e6:
         return f"{value / 1e6:.3g} M"
     if value >= 1e4:
@@ -99,7 +101,7 @@ def short(value):
 
 
 def runs_of(benchmarks):
-    """The benchmarks by name; of one that ran repeatedly the median."""
+    """Benchmarks by name; the median time of those that ran repeatedly."""
     runs = {}
     for benchmark in benchmarks:
         if benchmark["run_type"] == "iteration":
@@ -111,27 +113,51 @@ def runs_of(benchmarks):
     }
 
 
-def draw_runtimes(runs, path):
+def gpu_times(page):
+    """Milliseconds per frame from memory to events, by scene and method, from the table of ./bench/run gl in a page."""
+    with open(page, encoding="utf-8") as file:
+        text = file.read()
+    table = text[text.index("| scene | method | events |") :].split("\n\n", 1)[0]
+    header, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
+    times = {}
+    scene = ""
+    for row in (dict(zip(header, row)) for row in rows):
+        if row["scene"]:
+            scene = "-".join(row["scene"].split(", ")[:2])
+        method = re.sub("[`,]", "", row["method"]).replace(" ", "-")
+        times[f"{scene}/gl-{method}"] = float(row["element"])
+    return times
+
+
+def draw_runtimes(runs, on_gpu, path):
     panels = [
         ("Many events: from a moving car, 640x480", "driving-640x480", 2),
         ("Few events: a ball, 1280x720", "ball-1280x720", 3),
     ]
+
+    def bars_of(row, scene, column):
+        bars = [(row[column], EVENTCV if row is EVENTCV_RUNTIMES else PAPER)] if row[column] else []
+        for formulation, colour in (("naive", NAIVE), ("ours", OURS)):
+            run = runs.get(f"{scene}/{row[1]}/{formulation}/threads:2")
+            if run:
+                bars.append((run["real_time"], colour))
+        if f"{scene}/{row[1]}" in on_gpu:
+            bars.append((on_gpu[f"{scene}/{row[1]}"], OURS_ON_GPU))
+        return bars
+
+    # Both panels have the same rows, as high as the one with more bars.
+    rows = [[bars_of(row, scene, column) for _, scene, column in panels] for row in ROWS]
     figure, all_axes = plt.subplots(1, 2, figsize=(13, 10), sharey=True)
-    for axes, (title, scene, column) in zip(all_axes, panels):
+    for panel, (axes, (title, _, _)) in enumerate(zip(all_axes, panels)):
         top = 0.0
         ticks = []
-        for row in ROWS:
-            bars = [(row[column], EVENTCV if row is EVENTCV_RUNTIMES else PAPER)] if row[column] else []
-            for formulation, colour in (("naive", NAIVE), ("ours", OURS)):
-                run = runs.get(f"{scene}/{row[1]}/{formulation}/threads:2")
-                if run:
-                    bars.append((run["real_time"], colour))
-            ticks.append(top + (len(bars) - 1) / 2)
-            for value, colour in bars:
-                axes.barh(top, value, height=0.86, color=colour)
-                axes.text(value * 1.12, top, short(value), va="center", fontsize=8.5, bbox=ON_WHITE)
-                top += 1
-            top += 0.7
+        for row in rows:
+            height = max(map(len, row))
+            ticks.append(top + (height - 1) / 2)
+            for i, (value, colour) in enumerate(row[panel]):
+                axes.barh(top + i, value, height=0.86, color=colour)
+                axes.text(value * 1.12, top + i, short(value), va="center", fontsize=8.5, bbox=ON_WHITE)
+            top += height + 0.7
         axes.axvline(REAL_TIME, color="#5a62d8", linewidth=1, linestyle=(0, (4, 3)), zorder=0)
         axes.text(
             REAL_TIME,
@@ -153,9 +179,9 @@ def draw_runtimes(runs, path):
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.grid(axis="x", color="#e8eaee", linewidth=0.8)
         axes.set_axisbelow(True)
-        axes.set_xlabel("milliseconds a frame")
+        axes.set_xlabel("milliseconds per frame")
         axes.set_title(title, pad=14)
-    handles = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in (PAPER, NAIVE, EVENTCV, OURS)]
+    handles = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in (PAPER, NAIVE, EVENTCV, OURS, OURS_ON_GPU)]
     figure.legend(
         handles,
         [
@@ -163,6 +189,7 @@ def draw_runtimes(runs, path):
             "naive implementation: our footage, our machine, two threads",
             "EventCV's figures: a moving edge, on its machine (12 cores)",
             "ours: the same footage, machine and threads",
+            "ours on an NVIDIA H200: the same footage, with uploading and reading back",
         ],
         loc="lower center",
         ncol=2,
@@ -236,7 +263,7 @@ def draw_growth(runs, path):
             axes.set_xlabel(label)
             if row == 0:
                 axes.set_title(title, pad=8)
-        row_axes[0].set_ylabel("milliseconds a frame")
+        row_axes[0].set_ylabel("milliseconds per frame")
         lines = [plt.Line2D([], [], color=colour, linewidth=2) for _, colour in methods.values()]
         row_axes[0].legend(lines, [label for label, _ in methods.values()], frameon=False, fontsize=9)
     lines = [
@@ -251,7 +278,7 @@ def draw_growth(runs, path):
 def main():
     with open(sys.argv[1], encoding="utf-8") as file:
         runs = runs_of(json.load(file)["benchmarks"])
-    draw_runtimes(runs, os.path.join(sys.argv[2], "runtimes.png"))
+    draw_runtimes(runs, gpu_times(os.path.join(sys.argv[2], "benchmarks.md")), os.path.join(sys.argv[2], "runtimes.png"))
     draw_growth(runs, os.path.join(sys.argv[2], "growth.png"))
 
 

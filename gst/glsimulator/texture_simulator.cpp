@@ -113,8 +113,9 @@ void describe_channels(const GstVideoInfo& video, eventcamera::gl::TextureFrame&
 
 /// A simulator on the GPU. The events of an interval are read once the next frame has been queued,
 /// so that the GPU has work while they are read and pushed; finish() reads them before. Both wait
-/// at a fence, in the thread of the context. Every frame, including first and drawn ones, is held
-/// until its fence has been reached.
+/// for a fence in the streaming thread: the thread of the context works for other elements, too.
+/// Only without EGL do they wait in that thread. Every frame, including first and drawn ones, is
+/// held until its fence has been reached.
 class TextureVideoSimulator final : public VideoSimulator {
  public:
   /// `context` belongs to `shared`, which must outlive this object.
@@ -152,19 +153,21 @@ class TextureVideoSimulator final : public VideoSimulator {
   void set_drawn_video(const GstVideoInfo& drawn) override { drawn_ = drawn; }
 
   std::optional<Interval> push(Interval interval, const eventcamera::Settings& settings,
-                               const KnownFlow&) override {
+                               const KnownFlow& flow) override {
     {
       const OwnedBuffer uploaded = in_texture(interval.frame.get());
       const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
       if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
       frame_.texture = texture.name();
+      simulator_->set_flow(flow);
       run([&] { simulator_->queue(frame_, interval.end, settings); });
     }
     return finish_before({std::move(interval), false});
   }
 
   void draw(OwnedBuffer frame, Nanoseconds time, const eventcamera::Settings& settings,
-            const KnownFlow&, const eventcamera::Palette& palette, GstBuffer* picture) override {
+            const KnownFlow& flow, const eventcamera::Palette& palette,
+            GstBuffer* picture) override {
     {
       const OwnedBuffer uploaded = in_texture(frame.get());
       const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
@@ -174,6 +177,7 @@ class TextureVideoSimulator final : public VideoSimulator {
       frame_.texture = texture.name();
       const eventcamera::gl::Picture out{
           drawn.name(), eventcamera::pixels_by_kind(palette, pixel_layout_of(drawn_))};
+      simulator_->set_flow(flow);
       run([&] { simulator_->draw(frame_, time, settings, out); });
     }
     // Makes readers of the picture in another context wait until it is drawn.
@@ -186,6 +190,7 @@ class TextureVideoSimulator final : public VideoSimulator {
   std::optional<Interval> finish() override {
     if (!queued_) return std::nullopt;
     Queued done = *std::exchange(queued_, std::nullopt);
+    simulator_->wait();
     run([&] { done.interval.events = simulator_->read(); });
     if (done.is_drawn || done.interval.events == nullptr) return std::nullopt;
     return std::move(done.interval);
@@ -194,6 +199,13 @@ class TextureVideoSimulator final : public VideoSimulator {
   void drop() override {
     queued_.reset();
     simulator_->drop();
+  }
+
+  const eventcamera::EventBuckets* hold_until(Nanoseconds time,
+                                              const eventcamera::Settings& settings) override {
+    const eventcamera::EventBuckets* events = nullptr;
+    run([&] { events = simulator_->hold_until(time, settings); });
+    return events;
   }
 
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
@@ -212,8 +224,8 @@ class TextureVideoSimulator final : public VideoSimulator {
     return finished;
   }
 
-  /// A frame that GstGLUpload can upload: it trusts that frames can be mapped, and takes textures
-  /// as they are.
+  /// Returns a frame that GstGLUpload can upload: it does not check that frames can be mapped, and
+  /// passes textures on unchanged.
   OwnedBuffer in_system_memory(GstBuffer* buffer) const {
     const VideoFrame mapped(video_, buffer, GST_MAP_READ);
     if (!mapped) throw cannot_read(mapped.fault());

@@ -593,7 +593,7 @@ void Simulation::hold_until(Nanoseconds end, guint32 seqnum) {
     if (GST_PAD_IS_FLUSHING(GST_BASE_TRANSFORM_SRC_PAD(element_))) flow = GST_FLOW_FLUSHING;
     const Nanoseconds part_end = std::min(start + max_part, noise_end);
     sync_controlled_properties(static_cast<GstClockTime>(part_end));
-    const EventBuckets* events = simulator.hold_until(part_end, begin_interval().simulation);
+    const EventBuckets* events = state_->frames->hold_until(part_end, begin_interval().simulation);
     stream_.pushed_until = part_end;
     has_noise |= events != nullptr && events->size() > 0;
     if (events != nullptr && events->size() > 0) {

@@ -54,6 +54,12 @@ class VideoSimulator {
   /// Forgets the last interval.
   virtual void drop() {}
 
+  /// Calls hold_until() of the simulator.
+  virtual const eventcamera::EventBuckets* hold_until(eventcamera::Nanoseconds time,
+                                                      const eventcamera::Settings& settings) {
+    return simulator().hold_until(time, settings);
+  }
+
   virtual eventcamera::IntervalSimulator& simulator() = 0;
 };
 

@@ -9,17 +9,14 @@
 
 #include "src/core/luma.hpp"
 #include "src/core/thread_pool.hpp"
-#include "src/dvs/exposure_gain.hpp"
+#include "src/dvs/frame_pair.hpp"
 #include "src/dvs/interval_events.hpp"
 #include "src/dvs/light_response.hpp"
-#include "src/dvs/motion_deblur.hpp"
 #include "src/dvs/moving_light.hpp"
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/row_filter.hpp"
 #include "src/dvs/sub_intervals.hpp"
-#include "src/simulate/difference.hpp"
-#include "src/simulate/frame_flow.hpp"
 
 namespace eventcamera {
 namespace {
@@ -48,50 +45,35 @@ class PixelSimulator final : public DvsSimulator {
   bool needs_flow() const override { return settings_.upsampling == Upsampling::motion; }
 
   void start(const LumaView& frame) override {
-    see(frame, last_);
-    blurred_last_.reset();
-    frame_flow_.forget();
-    is_first_ = true;
+    response_.set_range(frame.is_narrow);
+    frames_.start(frame.as<Pixel>());
     timeline_.restart();
     fired_.restart();
     response_.restart();
     response_.set(settings_);
     set_labels();
     pixels_.start(settings_, threads());
-    pixels_.settle(last_, response_, threads());
+    settle();
   }
 
   void simulate(const LumaView& frame, const StepTimes& interval, const Settings& settings,
                 StepBuckets& events) override {
-    see(frame, now_);
+    response_.set_range(frame.is_narrow);
+    frames_.now.assign(frame.as<Pixel>());
     change_settings();
-    const double gain = response_.compensate(last_.view(), now_.view(), threads());
-    const bool moves = settings_.upsampling == Upsampling::motion;
-    if (gain != 1 && moves) {
-      expose(last_, format().bits, settings_.linear_light, gain, threads());
-      if (blurred_last_)
-        expose(*blurred_last_, format().bits, settings_.linear_light, gain, threads());
-      frame_flow_.forget();  // its copy has the old exposure
-    }
-    if (moves) find_flow();
-    if (moves && settings_.exposure_time > 0)
-      sharpen(interval.duration());
-    else
-      blurred_last_.reset();
+    frames_.prepare(settings_, response_, interval.duration(), flow_, threads(), [&] { settle(); });
     begin(interval, true, settings);
-    if (moves)
+    if (needs_flow())
       advance_along_motion();
     else
       advance_straight();
-    is_first_ = false;
     end(events);
-    std::swap(last_, now_);
+    frames_.advance();
   }
 
   bool hold(const StepTimes& interval, const Settings& settings, StepBuckets& events) override {
-    now_.assign(last_.view());
     change_settings();
-    is_first_ = false;
+    frames_.hold();
     begin(interval, false, settings);
     advance_straight();
     end(events);
@@ -114,10 +96,7 @@ class PixelSimulator final : public DvsSimulator {
 
   void label(const LabelledEvents& events) override { separate_causes(events); }
 
-  void see(const LumaView& frame, Image<Pixel>& out) {
-    response_.set_range(frame.is_narrow);
-    out.assign(frame.as<Pixel>());
-  }
+  void settle() { pixels_.settle(frames_.last, response_, threads()); }
 
   void set_labels() {
     if (has_labels() == pixels_.has_labels()) return;
@@ -134,7 +113,7 @@ class PixelSimulator final : public DvsSimulator {
     pixels_.change(settings_, threads());
     if (keeps_units) return;
     timeline_.end_pulse();
-    pixels_.settle(last_, response_, threads());
+    settle();
   }
 
   void begin(const StepTimes& interval, bool is_exposed, const Settings& settings) {
@@ -150,10 +129,9 @@ class PixelSimulator final : public DvsSimulator {
 
   /// Advances all pixels with linear interpolation.
   void advance_straight() {
-    frame_flow_.forget();  // does not see this frame
     for_each_row([&](int y, Scratch& scratch) {
-      const void* luma =
-          response_.is_widened() ? widened(y, scratch) : static_cast<const void*>(now_.row(y));
+      const void* luma = response_.is_widened() ? widened(y, scratch)
+                                                : static_cast<const void*>(frames_.now.row(y));
       for (const auto& sub_interval : timeline_.plan(1))
         advance({y, 0, format().width}, sub_interval, {luma, luma}, scratch.row);
     });
@@ -191,8 +169,8 @@ class PixelSimulator final : public DvsSimulator {
 
   void advance_moving(const Run& run, int steps, const ImageView<Flow>& flow, Scratch& scratch) {
     if (steps > 1)
-      move_light(Warp<Pixel>{last_.view(), now_.view(), steps}, flow, run, scratch.moving.data(),
-                 moving_stride);
+      move_light(Warp<Pixel>{frames_.last.view(), frames_.now.view(), steps}, flow, run,
+                 scratch.moving.data(), moving_stride);
     const std::uint16_t* now = scratch.luma.data() + run.first;
     const bool has_bandwidth = pixels_.model().has_bandwidth();
     for (const auto& sub_interval : timeline_.plan(steps)) {
@@ -222,37 +200,8 @@ class PixelSimulator final : public DvsSimulator {
 
   /// The luma of a row of the frame, with the depth of move_light().
   const std::uint16_t* widened(int y, Scratch& scratch) const {
-    widen(now_.row(y), format().width, scratch.luma.data());
+    widen(frames_.now.row(y), format().width, scratch.luma.data());
     return scratch.luma.data();
-  }
-
-  /// Finds the flow, unless it is known, between the frames as they were recorded.
-  void find_flow() {
-    if (flow_) {
-      frame_flow_.forget();
-      return;
-    }
-    const auto& last = blurred_last_ ? *blurred_last_ : last_;
-    const Box changed = changed_box(last.view(), now_.view(), 0);
-    flow_ = frame_flow_.find(FlowMethod::dis_mq, format().bits, last, now_, changed, threads());
-  }
-
-  /// Removes the motion blur of now_ and, if it is the first frame, of last_.
-  void sharpen(Nanoseconds interval) {
-    const double share =
-        std::min(1.0, static_cast<double>(settings_.exposure_time) / static_cast<double>(interval));
-    if (!deblur_) deblur_.emplace(format().width, format().height);
-    if (is_first_) {
-      deblur_->set_motion(*flow_, share, false, threads());
-      deblur_->sharpen(last_, format().bits, threads());
-      pixels_.settle(last_, response_, threads());
-    }
-    if (blurred_last_)
-      blurred_last_->assign(now_.view());
-    else
-      blurred_last_.emplace(now_);
-    deblur_->set_motion(*flow_, share, true, threads());
-    deblur_->sharpen(now_, format().bits, threads());
   }
 
   /// Calls advance_row(y, scratch) for each row, band by band in parallel.
@@ -274,17 +223,12 @@ class PixelSimulator final : public DvsSimulator {
     });
   }
 
-  Image<Pixel> last_{format().width, format().height};
-  Image<Pixel> now_{format().width, format().height};
+  FramePair<Pixel> frames_{format()};
   LightResponse response_{format().bits};
   PixelArray pixels_{format().width, format().height};
   Timeline timeline_;
   IntervalEvents fired_{format().width, format().height};
   const EventBuckets* made_ = nullptr;  ///< by the last interval
-  FrameFlow frame_flow_;
-  bool is_first_ = true;                      ///< last_ is the first frame
-  std::optional<Image<Pixel>> blurred_last_;  ///< last_ as recorded, if it was sharpened
-  std::optional<MotionDeblur> deblur_;
   MotionTiles tiles_;
   std::vector<Scratch> scratch_;  ///< by thread
 };

@@ -10,6 +10,7 @@
 //
 //   light_response.cpp    response of the photoreceptor to luma, without the exposure that
 //                         exposure_gain.cpp finds
+//   frame_pair.hpp        exposure, optical flow and sharpness of the frames of an interval
 //   motion_deblur.cpp     sharpens frames of long exposures along their motion
 //   moving_light.cpp      number of steps between two frames for each tile, and the luma of moving
 //                         pixels at each step

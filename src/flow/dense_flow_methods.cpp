@@ -4,7 +4,7 @@
 #include "features.hpp"
 #include "src/flow/dis/dis.hpp"
 #include "src/flow/farneback/farneback.hpp"
-#ifdef HAVE_OPENCV
+#if defined(HAVE_OPENCV) && !defined(OWN_METHODS)
 #include "src/flow/opencv_dis.hpp"
 #endif
 
@@ -20,7 +20,7 @@ std::unique_ptr<DenseFlow> make_dense_flow(FlowMethod method) {
     case FlowMethod::farneback:
       return std::make_unique<FarnebackFlow>();
     case FlowMethod::opencv_dis:
-#ifdef HAVE_OPENCV
+#if defined(HAVE_OPENCV) && !defined(OWN_METHODS)
       return make_opencv_dis();
 #else
       break;

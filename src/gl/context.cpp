@@ -39,6 +39,14 @@ Context::Context(const Load& load) {
   if ((name) == nullptr) throw too_old("gl" #name " is missing");
   EVENTCAMERA_GL_FUNCTIONS(LOAD)
 #undef LOAD
+  const auto get_display =
+      reinterpret_cast<PFNEGLGETCURRENTDISPLAYPROC>(load("eglGetCurrentDisplay"));
+  CreateSync = reinterpret_cast<PFNEGLCREATESYNCKHRPROC>(load("eglCreateSyncKHR"));
+  WaitForSync = reinterpret_cast<PFNEGLCLIENTWAITSYNCKHRPROC>(load("eglClientWaitSyncKHR"));
+  DestroySync = reinterpret_cast<PFNEGLDESTROYSYNCKHRPROC>(load("eglDestroySyncKHR"));
+  if (get_display != nullptr && CreateSync != nullptr && WaitForSync != nullptr &&
+      DestroySync != nullptr)
+    egl_display = get_display();
   for (const char* name : {"glGetGraphicsResetStatus", "glGetGraphicsResetStatusKHR",
                            "glGetGraphicsResetStatusEXT", "glGetGraphicsResetStatusARB"})
     if (get_reset_status_ == nullptr)
@@ -50,6 +58,7 @@ void Context::abandon() {
   DeleteBuffers = [](GLsizei, const GLuint*) {};
   DeleteProgram = [](GLuint) {};
   DeleteSync = [](GLsync) {};
+  DestroySync = [](EGLDisplay, EGLSyncKHR) -> EGLBoolean { return EGL_TRUE; };
 }
 
 GLenum Context::next_error() const {

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
 #include <GLES3/gl31.h>
 
 #include <functional>
 #include <stdexcept>
+#include <string_view>
 
 namespace eventcamera::gl {
 
@@ -70,6 +73,16 @@ class Context {
 #define DECLARE(type, name) type name;
   EVENTCAMERA_GL_FUNCTIONS(DECLARE)
 #undef DECLARE
+
+  /// Fences of EGL, which any thread can wait for, without a context. Null, like the display, if
+  /// the context is not one of EGL.
+  PFNEGLCREATESYNCKHRPROC CreateSync = nullptr;
+  PFNEGLCLIENTWAITSYNCKHRPROC WaitForSync = nullptr;
+  PFNEGLDESTROYSYNCKHRPROC DestroySync = nullptr;
+  EGLDisplay egl_display = nullptr;
+
+  /// Called with the name of each kernel before it runs, to measure it; may be empty.
+  std::function<void(std::string_view kernel)> on_kernel;
 
   /// First lines of every shader.
   const char* shader_version() const {

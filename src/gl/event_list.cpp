@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/gl/event_list.hpp"
 
+#include <array>
 #include <bit>
 #include <span>
 
@@ -39,6 +40,22 @@ void EventList::begin(const StepTimes& steps, int first) {
   times_.clear();
   for (int j = first; j <= steps.count(); ++j) times_.push_back(steps.microseconds(j));
   marks_.reserve(times_.size() * static_cast<std::size_t>(marks_a_step()) * 8);
+}
+
+void EventList::assign(const EventBuckets& events) {
+  times_.assign(2, 0);
+  std::vector<std::array<std::uint32_t, 2>> marks(2 * static_cast<std::size_t>(marks_a_step()));
+  for (int band = 0; band < events.bands(); ++band)
+    events.visit_band(band, [&](std::span<const Event> span) {
+      for (const Event& event : span) {
+        const bool is_on = event.polarity() == Polarity::on;
+        const int mark = event.y() * marks_across_ + event.x / 32 + (is_on ? marks_a_step() : 0);
+        const std::uint32_t bit = std::uint32_t{1} << event.x % 32;
+        marks[static_cast<std::size_t>(mark)][0] |= bit;
+        if (is_on) marks[static_cast<std::size_t>(mark)][1] |= bit;
+      }
+    });
+  marks_.assign(std::as_bytes(std::span(marks)));
 }
 
 void EventList::write() const {

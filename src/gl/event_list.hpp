@@ -35,6 +35,9 @@ class EventList {
   /// Begins an interval: all marks of its steps, from step `first` on, must be written.
   void begin(const StepTimes& steps, int first = 1);
 
+  /// Marks events regardless of their times: OFF in one step, ON in another.
+  void assign(const EventBuckets& events);
+
   int steps() const { return static_cast<int>(times_.size()); }
   const Buffer& marks() const { return marks_; }
   int marks_across() const { return marks_across_; }

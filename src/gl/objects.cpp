@@ -61,7 +61,7 @@ static std::string log_of(GLuint object, GetParameter get_parameter, GetLog get_
 }
 
 Kernel::Kernel(const Context& gl, std::string_view name, std::string_view source)
-    : gl_(gl), program_(gl.CreateProgram()) {
+    : gl_(gl), name_(name), program_(gl.CreateProgram()) {
   const GLuint shader = gl.CreateShader(GL_COMPUTE_SHADER);
   const std::string_view version = gl.shader_version();
   const GLchar* const parts[] = {version.data(), shaders::prelude.data(), source.data()};
@@ -89,6 +89,7 @@ Kernel::Kernel(const Context& gl, std::string_view name, std::string_view source
 
 void Kernel::run(Groups groups, std::initializer_list<const Buffer*> buffers,
                  std::initializer_list<int> values) const {
+  if (gl_.on_kernel) gl_.on_kernel(name_);
   gl_.UseProgram(program_);
   GLuint binding = 0;
   for (const auto* buffer : buffers)
@@ -100,19 +101,42 @@ void Kernel::run(Groups groups, std::initializer_list<const Buffer*> buffers,
 }
 
 /// Maximum time in which a driver must complete an interval, nanoseconds.
-static constexpr GLuint64 patience = 60'000'000'000;
+static constexpr GLuint64 patience = 30'000'000'000;
+
+void Fence::clear() {
+  if (egl_sync_ != EGL_NO_SYNC_KHR) gl_.DestroySync(gl_.egl_display, egl_sync_);
+  if (sync_ != nullptr) gl_.DeleteSync(sync_);
+  egl_sync_ = EGL_NO_SYNC_KHR;
+  sync_ = nullptr;
+}
 
 void Fence::set() {
-  gl_.DeleteSync(sync_);
-  sync_ = gl_.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+  clear();
+  if (gl_.egl_display != EGL_NO_DISPLAY)
+    egl_sync_ = gl_.CreateSync(gl_.egl_display, EGL_SYNC_FENCE_KHR, nullptr);
+  if (egl_sync_ == EGL_NO_SYNC_KHR) sync_ = gl_.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl_.Flush();
 }
 
 void Fence::wait() const {
-  const GLenum state = gl_.ClientWaitSync(sync_, 0, patience);
+  bool has_expired = false;
+  bool has_failed = false;
+  if (egl_sync_ != EGL_NO_SYNC_KHR) {
+    const EGLint state = gl_.WaitForSync(gl_.egl_display, egl_sync_, 0, patience);
+    has_expired = state == EGL_TIMEOUT_EXPIRED_KHR;
+    has_failed = state == EGL_FALSE;
+  } else {
+    const GLenum state = gl_.ClientWaitSync(sync_, 0, patience);
+    has_expired = state == GL_TIMEOUT_EXPIRED;
+    has_failed = state == GL_WAIT_FAILED;
+  }
   gl_.check();
-  if (state == GL_TIMEOUT_EXPIRED) throw Error("OpenGL has not answered for a minute");
-  if (state == GL_WAIT_FAILED) throw Error("OpenGL cannot wait for the GPU");
+  if (has_expired) throw Error("OpenGL has not answered for half a minute");
+  if (has_failed) throw Error("OpenGL cannot wait for the GPU");
+}
+
+void Fence::wait_without_context() const {
+  if (egl_sync_ != EGL_NO_SYNC_KHR) gl_.WaitForSync(gl_.egl_display, egl_sync_, 0, patience);
 }
 
 }  // namespace eventcamera::gl

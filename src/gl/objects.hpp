@@ -56,8 +56,8 @@ constexpr int groups_of(int size, int count) {
 /// A compute shader.
 class Kernel {
  public:
-  /// `name` is for error messages. The source has no #version, and may use
-  /// shaders/prelude.comp. Throws Error if it does not compile.
+  /// `name` is for error messages and measurements, and must outlive this object. The source has no
+  /// #version, and may use shaders/prelude.comp. Throws Error if it does not compile.
   Kernel(const Context& gl, std::string_view name, std::string_view source);
   ~Kernel() { gl_.DeleteProgram(program_); }
   Kernel(const Kernel&) = delete;
@@ -70,6 +70,7 @@ class Kernel {
 
  private:
   const Context& gl_;
+  std::string_view name_;
   GLuint program_;
 };
 
@@ -77,7 +78,7 @@ class Kernel {
 class Fence {
  public:
   explicit Fence(const Context& gl) : gl_(gl) {}
-  ~Fence() { gl_.DeleteSync(sync_); }
+  ~Fence() { clear(); }
   Fence(const Fence&) = delete;
   Fence& operator=(const Fence&) = delete;
 
@@ -87,9 +88,16 @@ class Fence {
   /// Waits until the GPU has reached it. Throws Error.
   void wait() const;
 
+  /// Like wait(), but needs no context: call it in a thread whose waiting delays nobody else.
+  /// Returns at once if the context is not one of EGL, and reports no errors: wait() does.
+  void wait_without_context() const;
+
  private:
+  void clear();
+
   const Context& gl_;
   GLsync sync_ = nullptr;
+  EGLSyncKHR egl_sync_ = EGL_NO_SYNC_KHR;  ///< instead of sync_, with EGL
 };
 
 }  // namespace eventcamera::gl

@@ -24,7 +24,7 @@ void Simulator::queue(const TextureFrame& frame, Nanoseconds time, const Setting
   if (steps) {
     queued.duration = steps->duration();
     queued.settings = settings;
-    queued.list.sort();
+    if (queued.list.steps() > 0) queued.list.sort();
   }
   queued.done.set();
   gl_.check();
@@ -35,7 +35,8 @@ void Simulator::draw(const TextureFrame& frame, Nanoseconds time, const Settings
   auto& queued = next();
   queued.is_sorted = false;
   queued.list.clear();
-  process(frame, time, settings, queued.list);
+  const auto steps = process(frame, time, settings, queued.list);
+  if (steps) mark_events(*steps, settings, queued.list);
   draw_.run(queued.list, picture);
   queued.done.set();
   gl_.check();
@@ -53,7 +54,7 @@ const EventBuckets* Simulator::read() {
   --queued_;
   queued.done.wait();
   if (!queued.is_sorted) return nullptr;
-  queued.list.read(events_);
+  if (queued.list.steps() > 0) queued.list.read(events_);
   return &events(queued.duration, queued.settings);
 }
 

@@ -4,6 +4,8 @@
 #include <memory>
 #include <optional>
 
+#include "src/dvs/dvs_settings.hpp"
+#include "src/flow/dense_flow.hpp"
 #include "src/gl/event_list.hpp"
 #include "src/gl/grey_frame.hpp"
 #include "src/gl/mark_kernels.hpp"
@@ -14,20 +16,25 @@
 namespace eventcamera::gl {
 
 /// Simulator of 8-bit frames in textures. Must be made, used and destroyed while its context is
-/// current, except hold_until() and reset(). All other functions throw Error and std::bad_alloc;
-/// after that the simulator may only be destroyed.
+/// current, except hold_until(), reset(), wait() and drop(). All other functions throw Error and
+/// std::bad_alloc; after that the simulator may only be destroyed.
 ///
 /// Processing of a frame: a LumaKernel turns its texture into a GreyFrame; a method (frame_,
 /// dense_, sparse_ or diff_simulator) compares it with the last one and marks the pixels that fire
 /// in each step; an EventList counts, sorts and reads back the marked pixels, or a DrawKernel draws
-/// them. Each kernel is a compute shader (shaders/). Dense flow is computed in farneback, tracks in
-/// point_tracker, with the formulas and bounds of their namesakes in src/flow.
+/// them. dvs_simulator has its own list, whose events have their own times. Each kernel is a
+/// compute shader (shaders/). Dense flow is computed in farneback, tracks in point_tracker, with
+/// the formulas and bounds of their namesakes in src/flow.
 ///
 /// To keep both the caller and the GPU busy, queue() the next frame before read() of the previous
 /// interval's events.
 class Simulator : public IntervalSimulator {
  public:
   static constexpr int max_queued = 2;  ///< maximum number of queued frames
+
+  /// Sets the motion from the last frame to the next one, if it is known; a view of an Image that
+  /// must last until that frame is queued. Most simulators ignore it.
+  virtual void set_flow(const std::optional<ImageView<Flow>>&) {}
 
   /// Queues the work on the next frame, whose `format` must be the simulator's. The texture must
   /// not change until the events have been read(). `time` must be later than the last
@@ -38,6 +45,10 @@ class Simulator : public IntervalSimulator {
   /// none.
   void draw(const TextureFrame& frame, Nanoseconds time, const Settings& settings,
             const Picture& picture);
+
+  /// Waits until the GPU has finished the first queued frame, if that is possible without a context
+  /// (EGL). Any thread may call it, so that read() need not wait in the context's.
+  void wait() const { queue_[first_].done.wait_without_context(); }
 
   /// Waits until the GPU has finished the first queued frame. Returns the sorted events of the
   /// interval that it ends, valid until the next call; nullptr if it ends none.
@@ -57,9 +68,11 @@ class Simulator : public IntervalSimulator {
   /// Stores the first frame.
   virtual void start(const TextureFrame& frame) = 0;
   /// Queues the marks of the pixels that fire between the last frame and this one, in `list`, and
-  /// stores this one.
+  /// stores this one. If `list` has no steps, events() reads the events.
   virtual void mark(const TextureFrame& frame, const StepTimes& steps, const Settings& settings,
                     EventList& list) = 0;
+  /// Marks the events of an interval in `list`, to be drawn, unless mark() did.
+  virtual void mark_events(const StepTimes&, const Settings&, EventList&) {}
 
  private:
   struct Queued {
@@ -110,5 +123,22 @@ std::unique_ptr<Simulator> make_sparse_simulator(const Context& gl, const LumaFo
 /// Like eventcamera::make_diff_simulator(). The same tracks give the same events; tracks may differ
 /// in the last bits of floating-point numbers.
 std::unique_ptr<Simulator> make_diff_simulator(const Context& gl, const LumaFormat& format);
+
+/// Like eventcamera::DvsSimulator, without labels. Solved in single precision: a pixel in 10,000
+/// may fire another time, and an event in 1,000 differ by more than a microsecond. The CPU removes
+/// noise, finds gain and flow, and collects the events. hold_until() needs the context.
+class DvsSimulator : public Simulator {
+ public:
+  /// Applies to the next frames.
+  void set(const DvsSettings& settings) { settings_ = settings; }
+  void set_flow(const std::optional<ImageView<Flow>>& flow) override { known_flow_ = flow; }
+
+ protected:
+  using Simulator::Simulator;
+  DvsSettings settings_;
+  std::optional<ImageView<Flow>> known_flow_;  ///< of the next interval
+};
+
+std::unique_ptr<DvsSimulator> make_dvs_simulator(const Context& gl, const LumaFormat& format);
 
 }  // namespace eventcamera::gl

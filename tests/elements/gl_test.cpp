@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The simulators on the GPU: against those on the CPU, and how they find OpenGL.
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
 #include <GLES3/gl31.h>
 #include <gst/gl/gl.h>
 #include <gst/gl/gstglfuncs.h>
@@ -33,12 +35,6 @@ std::vector<std::string> formats() {
 class EveryFormat : public testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats()),
                          [](const auto& format) { return format.param; });
-
-/// A simulator on the GPU that takes frames in system memory.
-Harness without_upload(const std::string& launch) {
-  gst_init(nullptr, nullptr);
-  return {gst_harness_new_parse(launch.c_str()), launch};
-}
 
 /// A video whose frames differ, pushed one by one.
 class Flashes {
@@ -95,7 +91,7 @@ TEST_P(EveryFormat, GivesTheEventsOfTheCpuBitForBit) {
   EXPECT_EQ(output_of_noise(without_upload("gleventsim-frame"), GetParam()), expected);
 }
 
-TEST(Pictures, AreThoseOfTheCpuBitForBit) {
+TEST(Pictures, EqualTheCpuBitForBit) {
   for (const char* palette : {"dark", "light", "viridis"}) {
     const std::string options =
         std::string("eventsim-frame positive-threshold=60 palette=") + palette;
@@ -107,7 +103,7 @@ TEST(Pictures, AreThoseOfTheCpuBitForBit) {
   }
 }
 
-TEST(Pictures, TellTheirReadersWhenTheyAreDrawn) {
+TEST(Pictures, HaveASyncPoint) {
   Harness h("gleventsim-frame");
   h.caps(video, pictures_of("gleventsim-frame"));
   h.push(h.flat(0, 100));
@@ -151,6 +147,21 @@ TEST(OpenGl, IsSharedWithThePipeline) {
     gst_context_unref(context);
   }
   EXPECT_TRUE(pipeline.play()) << pipeline.error;
+}
+
+TEST(OpenGl, KeepsFramesAndPicturesInTextures) {
+  Pipeline pipeline(
+      "videotestsrc num-buffers=3 ! video/x-raw,format=NV12 ! glupload ! gleventsim-frame name=it "
+      "! "
+      "video/x-raw(memory:GLMemory) ! fakesink");
+  EXPECT_TRUE(pipeline.reaches(GST_STATE_PAUSED)) << pipeline.error;
+  for (const char* name : {"sink", "src"}) {
+    const Owned<GstPad> pad(gst_element_get_static_pad(pipeline["it"], name));
+    const Owned<GstCaps> caps(gst_pad_get_current_caps(pad.get()));
+    EXPECT_TRUE(gst_caps_features_contains(gst_caps_get_features(caps.get(), 0),
+                                           GST_CAPS_FEATURE_MEMORY_GL_MEMORY))
+        << name;
+  }
 }
 
 TEST(OpenGl, SharesWhatItDrawsWithTheApplication) {
@@ -202,6 +213,68 @@ TEST(OpenGl, SharesWhatItDrawsWithTheApplication) {
   gst_context_unref(display);
 }
 
+std::atomic<int> activations = 0;  ///< how often a thread made a context current
+
+void count_activations() {
+  { Harness("gleventsim-frame").caps(video); }  // GStreamer registers the type of contexts
+  static gboolean (*activate)(GstGLContext*, gboolean) = nullptr;
+  auto* contexts =
+      static_cast<GstGLContextClass*>(g_type_class_ref(g_type_from_name("GstGLContextEGL")));
+  if (activate != nullptr) return;
+  activate = contexts->activate;
+  contexts->activate = [](GstGLContext* context, gboolean current) -> gboolean {
+    ++activations;
+    return activate(context, current);
+  };
+}
+
+/// Plays cameras `first` to `last` - 1 in one pipeline, in one context that stays current. Returns
+/// the events of each.
+std::vector<std::string> events_of_cameras(int first, int last) {
+  std::string launch;
+  for (int i = first; i < last; ++i)
+    launch += " videotestsrc num-buffers=5 pattern=zone-plate kx2=" + std::to_string(10 + i) +
+              " ky2=20 kt=9 ! video/x-raw,format=GRAY8,width=64,height=48 ! gleventsim-frame ! "
+              "fakesink sync=false signal-handoffs=true name=events" +
+              std::to_string(i);
+  Pipeline pipeline(launch);
+  std::vector<std::string> events(static_cast<std::size_t>(last - first));
+  std::vector<GstElement*> sinks;
+  for (auto& bytes : events) {
+    sinks.push_back(pipeline[("events" + std::to_string(first + std::ssize(sinks))).c_str()]);
+    g_signal_connect(sinks.back(), "handoff",
+                     G_CALLBACK(+[](GstElement*, GstBuffer* buffer, GstPad*, std::string* out) {
+                       *out += bytes_of(buffer);
+                     }),
+                     &bytes);
+  }
+  EXPECT_TRUE(pipeline.reaches(GST_STATE_PAUSED)) << pipeline.error;
+  activations = 0;
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  EXPECT_EQ(activations, 0);
+  std::vector<GstGLContext*> contexts;
+  for (GstElement* sink : sinks) {
+    GstGLContext*& used = contexts.emplace_back();
+    gst_gl_query_local_gl_context(sink, GST_PAD_SINK, &used);
+    EXPECT_NE(used, nullptr);
+    EXPECT_EQ(used, contexts.front());
+  }
+  for (GstGLContext* context : contexts) gst_clear_object(&context);
+  return events;
+}
+
+TEST(OpenGl, IsOneContextForAllCamerasOfAPipeline) {
+  count_activations();
+  constexpr int cameras = 16;
+  const auto together = events_of_cameras(0, cameras);
+  EXPECT_GT(activations, 0);  // at the end of the context
+  for (int i = 0; i < cameras; ++i) {
+    const auto& events = together[static_cast<std::size_t>(i)];
+    EXPECT_GT(events.size(), 8U * 100);
+    EXPECT_EQ(events_of_cameras(i, i + 1).front() == events, true) << i;
+  }
+}
+
 TEST(OpenGl, IsNamedInAnErrorWhereItIsMissing) {
   // Neither a screen nor a device, in a process of its own.
   const auto run = [] {
@@ -229,7 +302,7 @@ std::atomic<GstGLContext*> lost = nullptr;     ///< or only this one
 std::atomic<GstGLContext*> current = nullptr;  ///< at the last look for errors
 std::atomic<bool> has_ended = false;
 std::atomic<bool> is_busy = false;
-std::atomic<int> waits = 0;
+std::atomic<int> waits = 0;  ///< for the GPU, not in the thread of a context
 
 /// Makes all contexts of the process report that they are lost where `is_lost`, and that the GPU is
 /// not done where `is_busy`, unless they wait for it.
@@ -237,7 +310,7 @@ void take_over_contexts() {
   { Harness("gleventsim-frame").caps(video); }  // GStreamer registers the type of contexts
   static gpointer (*get_proc_address)(GstGLAPI, const gchar*) = nullptr;
   static GLenum (*get_error)();
-  static PFNGLCLIENTWAITSYNCPROC wait_for;
+  static PFNEGLCLIENTWAITSYNCKHRPROC wait_for;
   auto* contexts =
       static_cast<GstGLContextClass*>(g_type_class_ref(g_type_from_name("GstGLContextEGL")));
   if (get_proc_address != nullptr) return;
@@ -252,12 +325,13 @@ void take_over_contexts() {
         return is_lost || current == lost ? context_lost : get_error();
       });
     }
-    if (std::string_view(name) == "glClientWaitSync") {
-      wait_for = reinterpret_cast<PFNGLCLIENTWAITSYNCPROC>(function);
+    if (std::string_view(name) == "eglClientWaitSyncKHR") {
+      wait_for = reinterpret_cast<PFNEGLCLIENTWAITSYNCKHRPROC>(function);
       return reinterpret_cast<gpointer>(
-          +[](GLsync sync, GLbitfield flags, GLuint64 timeout) -> GLenum {
-            waits += timeout > 0;
-            return is_busy && timeout == 0 ? GL_TIMEOUT_EXPIRED : wait_for(sync, flags, timeout);
+          +[](EGLDisplay display, EGLSyncKHR sync, EGLint flags, EGLTimeKHR timeout) -> EGLint {
+            if (is_busy && timeout == 0) return EGL_TIMEOUT_EXPIRED_KHR;
+            waits += timeout > 0 && gst_gl_context_get_current() == nullptr;
+            return wait_for(display, sync, flags, timeout);
           });
     }
     return function;
@@ -369,7 +443,7 @@ TEST_P(Busy, IntervalsAreDroppedAtStop) {
   EXPECT_EQ(waits, 0);
 }
 
-TEST_P(Busy, DownstreamsRefusalIsToldToUpstreamAtTheNextFrame) {
+TEST_P(Busy, DownstreamErrorsReachUpstreamAtTheNextFrame) {
   gst_pad_add_probe(
       h->sinkpad, GST_PAD_PROBE_TYPE_BUFFER,
       [](GstPad*, GstPadProbeInfo* info, gpointer) {
@@ -509,7 +583,7 @@ GstGLDisplay* give_display(GstElement* pipeline) {
   return display;
 }
 
-TEST(OpenGl, IsThatOfAnotherDisplayOnceTheApplicationSetsOne) {
+TEST(OpenGl, SwitchesToTheDisplayOfTheApplication) {
   Pipeline pipeline(
       "videotestsrc num-buffers=5 ! glupload ! gleventsim-frame ! fakesink name=sink sync=false");
   for (int times = 0; times < 2; ++times) {

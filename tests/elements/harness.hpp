@@ -51,8 +51,9 @@ using Owned = std::unique_ptr<Type, Unref>;
 using Buffer = Owned<GstBuffer>;
 
 inline const char* const simulators[] = {
-    "eventsim-frame",   "eventsim-dense",   "eventsim-sparse",   "eventsim-diff",  "eventsim-dvs",
-    "gleventsim-frame", "gleventsim-dense", "gleventsim-sparse", "gleventsim-diff"};
+    "eventsim-frame",  "eventsim-dense",   "eventsim-sparse",  "eventsim-diff",
+    "eventsim-dvs",    "gleventsim-frame", "gleventsim-dense", "gleventsim-sparse",
+    "gleventsim-diff", "gleventsim-dvs"};
 
 inline bool is_on_gpu(const std::string& element) {
   return element.starts_with("gl");
@@ -434,6 +435,12 @@ inline Owned<GstEvent> next_event(GstHarness* h, GstEventType type) {
   while (Owned<GstEvent> event{gst_harness_pull_event(h)})
     if (GST_EVENT_TYPE(event.get()) == type) return event;
   return nullptr;
+}
+
+/// A simulator, on the GPU, too, that takes frames in system memory.
+inline Harness without_upload(const std::string& launch) {
+  gst_init(nullptr, nullptr);
+  return {gst_harness_new_parse(launch.c_str()), launch};
 }
 
 /// Pushes a segment with a negative rate.

@@ -7,6 +7,7 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <string>
 
 #include "tests/elements/harness.hpp"
@@ -202,6 +203,30 @@ TEST(Dvs, NamesItsPresetsAndTheirsAreInRange) {
   }
 }
 
+/// The properties of an element and their default values, as text.
+std::map<std::string, std::string> defaults_of(const char* name) {
+  const Owned<GstElement> element(gst_element_factory_make(name, nullptr));
+  guint count = 0;
+  GParamSpec** specs = g_object_class_list_properties(G_OBJECT_GET_CLASS(element.get()), &count);
+  std::map<std::string, std::string> defaults;
+  for (guint i = 0; i < count; ++i) {
+    const GValue* value = g_param_spec_get_default_value(specs[i]);
+    const bool is_null = G_VALUE_HOLDS_STRING(value) || G_VALUE_HOLDS_BOXED(value);
+    gchar* text = is_null ? g_strdup("") : g_strdup_value_contents(value);
+    defaults[specs[i]->name] = text;
+    g_free(text);
+  }
+  g_free(specs);
+  return defaults;
+}
+
+TEST(Dvs, HasTheSamePropertiesOnTheGpuExceptLabels) {
+  gst_init(nullptr, nullptr);
+  auto on_cpu_defaults = defaults_of("eventsim-dvs");
+  EXPECT_EQ(on_cpu_defaults.erase("label"), 1U);
+  EXPECT_EQ(defaults_of("gleventsim-dvs"), on_cpu_defaults);
+}
+
 TEST(Dvs, CountsTimeInNanoseconds) {
   gst_init(nullptr, nullptr);
   Owned<GstElement> element(gst_element_factory_make("eventsim-dvs", nullptr));
@@ -237,7 +262,7 @@ void control(GstElement* element, const char* property,
 }
 
 TEST_P(EverySimulator, HasThresholdsThatChangeOverTime) {
-  const double unit = std::string(GetParam()) == "eventsim-dvs" ? 0.1 : 1;
+  const double unit = std::string(GetParam()).ends_with("eventsim-dvs") ? 0.1 : 1;
   Harness h(GetParam());
   for (const char* property : {"positive-threshold", "negative-threshold"})
     control(h.element(), property, {{0, 20 * unit}, {5 * GST_SECOND, 100 * unit}});

@@ -33,7 +33,7 @@ std::vector<std::string> intervals(Harness& h, int frames, int padding = 0) {
 
 /// True for elements with per-pixel thresholds and individual event times.
 bool is_physical(const std::string& element) {
-  return element == "eventsim-dvs";
+  return element.ends_with("eventsim-dvs");
 }
 
 class EverySimulator : public testing::TestWithParam<const char*> {};

@@ -659,20 +659,22 @@ TEST_P(EverySimulator, LearnsItsLatencyWhereTheFramerateVaries) {
 }
 
 TEST(Dvs, SendsTheNoiseOfAGap) {
-  Harness h("eventsim-dvs leak-rate=100");
-  h.caps(video);
-  h.push(h.flat(0, 90));
-  gst_harness_push_event(h.get(), gst_event_new_gap(40 * GST_MSECOND, 100 * GST_MSECOND));
-  h.push(h.flat(140 * GST_MSECOND, 90));
-  const auto held = h.pull();  // up to a frame's length before the end of the gap
-  ASSERT_TRUE(held);
-  EXPECT_EQ(GST_BUFFER_PTS(held.get()), 0U);
-  EXPECT_EQ(GST_BUFFER_DURATION(held.get()), 100 * GST_MSECOND);
-  EXPECT_EQ(events_of(held.get()).size(), 32U * 24U * 10U);
-  const auto next = h.pull();
-  ASSERT_TRUE(next);
-  EXPECT_EQ(GST_BUFFER_PTS(next.get()), 100 * GST_MSECOND);
-  EXPECT_EQ(GST_BUFFER_DURATION(next.get()), 40 * GST_MSECOND);
+  for (const std::string element : {"eventsim-dvs", "gleventsim-dvs"}) {
+    Harness h(element + " leak-rate=100");
+    h.caps(video);
+    h.push(h.flat(0, 90));
+    gst_harness_push_event(h.get(), gst_event_new_gap(40 * GST_MSECOND, 100 * GST_MSECOND));
+    h.push(h.flat(140 * GST_MSECOND, 90));
+    const auto held = h.pull();  // up to a frame's length before the end of the gap
+    ASSERT_TRUE(held);
+    EXPECT_EQ(GST_BUFFER_PTS(held.get()), 0U);
+    EXPECT_EQ(GST_BUFFER_DURATION(held.get()), 100 * GST_MSECOND);
+    EXPECT_EQ(events_of(held.get()).size(), 32U * 24U * 10U);
+    const auto next = h.pull();
+    ASSERT_TRUE(next);
+    EXPECT_EQ(GST_BUFFER_PTS(next.get()), 100 * GST_MSECOND);
+    EXPECT_EQ(GST_BUFFER_DURATION(next.get()), 40 * GST_MSECOND);
+  }
 }
 
 TEST(Dvs, SendsTheNoiseOfAPictureThatIsRepeated) {

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "src/gl/context.hpp"
@@ -20,27 +21,18 @@ inline void* load(const char* name) {
 /// An OpenGL context without a window, current in this thread.
 class EglContext {
  public:
-  /// OpenGL ES 3.1, or OpenGL 4.3.
+  /// OpenGL ES 3.1, or OpenGL 4.3, of the first device that has it.
   explicit EglContext(bool is_es) {
     const auto query_devices =
         reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(load("eglQueryDevicesEXT"));
-    const auto get_display =
-        reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(load("eglGetPlatformDisplayEXT"));
-    EGLDeviceEXT device = nullptr;
-    EGLint devices = 0;
-    query_devices(1, &device, &devices);
-    display_ = get_display(EGL_PLATFORM_DEVICE_EXT, device, nullptr);
-    require(eglInitialize(display_, nullptr, nullptr));
-    eglBindAPI(is_es ? EGL_OPENGL_ES_API : EGL_OPENGL_API);
-    const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION, is_es ? 3 : 4,
-                                 EGL_CONTEXT_MINOR_VERSION, is_es ? 1 : 3, EGL_NONE};
-    const EGLint of_config[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE,
-                                is_es ? EGL_OPENGL_ES3_BIT : EGL_OPENGL_BIT, EGL_NONE};
-    EGLConfig config = nullptr;
-    EGLint configs = 0;
-    require(eglChooseConfig(display_, of_config, &config, 1, &configs));
-    context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, attributes);
-    require(eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_));
+    EGLDeviceEXT devices[16];
+    EGLint count = 0;
+    if (query_devices != nullptr) query_devices(16, devices, &count);
+    for (EGLint i = 0; i < count; ++i)
+      if (open(devices[i], is_es)) return;
+    throw std::runtime_error(
+        std::string("no OpenGL ") + (is_es ? "ES 3.1" : "4.3") +
+        " without a screen: EGL needs the driver of a GPU, or of Mesa (Debian: libgl1-mesa-dri)");
   }
   ~EglContext() {
     eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
@@ -50,8 +42,21 @@ class EglContext {
   EglContext& operator=(const EglContext&) = delete;
 
  private:
-  static void require(EGLBoolean succeeded) {
-    if (succeeded == EGL_FALSE) throw std::runtime_error("no OpenGL context without a screen");
+  bool open(EGLDeviceEXT device, bool is_es) {
+    const auto get_display =
+        reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(load("eglGetPlatformDisplayEXT"));
+    display_ = get_display(EGL_PLATFORM_DEVICE_EXT, device, nullptr);
+    if (eglInitialize(display_, nullptr, nullptr) == EGL_FALSE) return false;
+    eglBindAPI(is_es ? EGL_OPENGL_ES_API : EGL_OPENGL_API);
+    const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION, is_es ? 3 : 4,
+                                 EGL_CONTEXT_MINOR_VERSION, is_es ? 1 : 3, EGL_NONE};
+    const EGLint of_config[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE,
+                                is_es ? EGL_OPENGL_ES3_BIT : EGL_OPENGL_BIT, EGL_NONE};
+    EGLConfig config = nullptr;
+    EGLint configs = 0;
+    if (eglChooseConfig(display_, of_config, &config, 1, &configs) == EGL_FALSE) return false;
+    context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, attributes);
+    return eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) != EGL_FALSE;
   }
 
   EGLDisplay display_ = nullptr;

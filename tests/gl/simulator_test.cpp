@@ -172,9 +172,13 @@ std::vector<std::uint8_t> drawn(const EventBuckets* events, const Palette& palet
   return pixels;
 }
 
+std::unique_ptr<gl::Simulator> make_dvs(const gl::Context& gl, const LumaFormat& format) {
+  return gl::make_dvs_simulator(gl, format);
+}
+
 TEST_P(EveryApi, DrawsItsEventsAsTheCpuDoes) {
   for (const auto make :
-       {gl::make_frame_simulator, gl::make_sparse_simulator, gl::make_diff_simulator}) {
+       {gl::make_frame_simulator, gl::make_sparse_simulator, gl::make_diff_simulator, make_dvs}) {
     for (const auto& [width, height] : {std::pair{1, 1}, {33, 21}, {67, 45}, {2100, 3}}) {
       const LumaFormat format{width, height, 8};
       const auto drawing = make(context, format);
@@ -290,12 +294,13 @@ bool is_gpu_busy = false;
 
 void* load_counting_waits(const char* name) {
   const std::string_view function = name;
-  if (function == "glClientWaitSync")
-    return reinterpret_cast<void*>(+[](GLsync sync, GLbitfield flags, GLuint64 timeout) -> GLenum {
-      waits += timeout > 0;
-      if (timeout == 0 && is_gpu_busy) return GL_TIMEOUT_EXPIRED;
-      return driver<PFNGLCLIENTWAITSYNCPROC>("glClientWaitSync")(sync, flags, timeout);
-    });
+  if (function == "eglClientWaitSyncKHR")
+    return reinterpret_cast<void*>(
+        +[](EGLDisplay display, EGLSyncKHR sync, EGLint flags, EGLTimeKHR timeout) -> EGLint {
+          waits += timeout > 0;
+          if (timeout == 0 && is_gpu_busy) return EGL_TIMEOUT_EXPIRED_KHR;
+          return eglClientWaitSync(display, sync, flags, timeout);
+        });
   if (function == "glMapBufferRange")
     return reinterpret_cast<void*>(+[](GLenum target, GLintptr offset, GLsizeiptr length,
                                        GLbitfield access) -> void* {
@@ -365,6 +370,7 @@ TEST(Simulator, ReadsEventsBackWhileTheGpuWorksOnTheNextFrame) {
 /// What a lost context does, as drivers differ.
 enum class Loss { none, error, reset, no_mapping, no_wait, garbage };
 Loss loss = Loss::none;
+bool has_egl = true;
 
 /// The functions of a context that can be lost.
 void* load_losable(const char* name) {
@@ -378,6 +384,12 @@ void* load_losable(const char* name) {
     return reinterpret_cast<void*>(+[]() -> GLenum {
       constexpr GLenum unknown_reset = 0x8255;
       return loss == Loss::reset ? unknown_reset : GL_NO_ERROR;
+    });
+  if (function.starts_with("egl") && !has_egl) return nullptr;
+  if (function == "eglClientWaitSyncKHR")
+    return reinterpret_cast<void*>(+[](EGLDisplay display, EGLSyncKHR sync, EGLint flags,
+                                       EGLTimeKHR timeout) -> EGLint {
+      return loss == Loss::no_wait ? EGL_FALSE : eglClientWaitSync(display, sync, flags, timeout);
     });
   if (function == "glClientWaitSync")
     return reinterpret_cast<void*>(+[](GLsync sync, GLbitfield flags, GLuint64 timeout) -> GLenum {
@@ -396,7 +408,13 @@ void* load_losable(const char* name) {
   return gl_test::load(name);
 }
 
-TEST(Context, IsReportedAsLostByWhateverTellsOfIt) {
+/// Contexts with fences of EGL, and without.
+class EveryFence : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(, EveryFence, testing::Bool(),
+                         [](const auto& egl) { return egl.param ? "Egl" : "OpenGL"; });
+
+TEST_P(EveryFence, ReportsALostContext) {
+  has_egl = GetParam();
   const EglContext current(true);
   const gl::Context context(load_losable);
   const LumaFormat format{33, 21, 8};

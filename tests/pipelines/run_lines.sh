@@ -24,6 +24,8 @@ run_lines() { # PAGE...
     line=${line//rtspsrc location=rtsp:\/\/camera\/stream ! decodebin/$ball}
     line=$(sed -E 's/num-buffers=(90|100|300)/num-buffers=40/g; s/(videotestsrc pattern=ball) (!|foreground)/\1 num-buffers=40 \2/' <<<"$line")
     line=${line//autovideosink/fakesink}
+    line=${line//nvh264dec/avdec_h264 ! glupload} # no hardware decoder
+    line=${line//vah264dec ! vapostproc ! \'video\/x-raw(memory:DMABuf)\'/avdec_h264}
     line=${line//glimagesink/"'video/x-raw(memory:GLMemory)' ! fakesink"}
     line=${line// --device \/dev\/video0/ --port 0}
     line=${line//host=receiver/host=127.0.0.1}

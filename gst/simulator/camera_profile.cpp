@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "elements/eventsim/camera_profile.hpp"
+#include "gst/simulator/camera_profile.hpp"
 
 #include <glib.h>
 

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// The physical pixel on the GPU against the one on the CPU, which is tested against the plain
+// reference.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "src/dvs/dvs_settings.hpp"
+#include "src/dvs/dvs_simulator.hpp"
+#include "src/flow/dense_flow.hpp"
+#include "src/gl/simulator.hpp"
+#include "tests/gl/every_api.hpp"
+#include "tests/simulate/scene.hpp"
+
+namespace {
+
+using namespace eventcamera;
+using gl_test::bytes_of;
+using gl_test::EveryApi;
+using gl_test::one;
+using gl_test::Texture;
+
+INSTANTIATE_TEST_SUITE_P(, EveryApi, testing::Bool(), gl_test::name_of_api);
+
+constexpr int width = 97;
+constexpr int height = 61;
+constexpr Nanoseconds frame_time = 33'333'333;
+
+/// An event whose time counts from the first frame, microseconds.
+struct PixelEvent {
+  Nanoseconds t;
+  bool is_on;
+};
+using PixelEvents = std::vector<std::vector<PixelEvent>>;  ///< by pixel
+
+/// Simulates with both, and counts how many pixels and events differ.
+class Comparison {
+ public:
+  Comparison(const gl::Context& gl, const DvsSettings& settings)
+      : ours_(gl::make_dvs_simulator(gl, format_)), reference_(make_dvs_simulator(format_)) {
+    set(settings);
+  }
+
+  void set(const DvsSettings& settings) {
+    ours_->set(settings);
+    reference_->set(settings);
+  }
+
+  void push(const Image<std::uint8_t>& frame, Nanoseconds time,
+            const std::optional<ImageView<Flow>>& flow = {}) {
+    texture_.upload(bytes_of(frame));
+    const auto start = ours_->last_time().value_or(time);
+    ours_->set_flow(flow);
+    add(gl_test::events_until(*ours_, texture_.frame({one, 0, 0, 0}), time, common), start, found_);
+    add(reference_->push(scene::luma(frame), time, common, flow), start, expected_);
+  }
+
+  void hold_until(Nanoseconds time) {
+    const auto start = *ours_->last_time();
+    add(ours_->hold_until(time, common), start, found_);
+    add(reference_->hold_until(time, common), start, expected_);
+  }
+
+  void late_events() {
+    const auto start = *ours_->last_time();
+    ASSERT_EQ(ours_->late_until(), reference_->late_until());
+    const auto until = *ours_->late_until();
+    add(ours_->late_events(until), start, found_);
+    add(reference_->late_events(until), start, expected_);
+  }
+
+  /// Expects another number or polarity in at most 1 of 10,000 pixels and intervals, and another
+  /// time, by more than a microsecond, for at most 1 of 1,000 events.
+  void expect_equal(const std::string& name) const {
+    std::size_t events = 0;
+    double pixels = 0;
+    double times = 0;
+    for (std::size_t i = 0; i < expected_.size(); ++i) {
+      const auto& ours = found_[i];
+      const auto& theirs = expected_[i];
+      events += theirs.size();
+      const bool is_equal =
+          std::ranges::equal(ours, theirs, {}, &PixelEvent::is_on, &PixelEvent::is_on);
+      pixels += is_equal ? 0 : 1;
+      for (std::size_t k = 0; is_equal && k < ours.size(); ++k)
+        times += std::abs(ours[k].t - theirs[k].t) > 1 ? 1 : 0;
+    }
+    std::cout << name << ": " << events << " events, " << pixels << " pixels and " << times
+              << " times differ\n";
+    EXPECT_GT(events, expected_.size() / 100) << name;
+    EXPECT_LE(pixels, static_cast<double>(expected_.size()) * intervals_ / 1e4) << name;
+    EXPECT_LE(times, static_cast<double>(events) / 1e3) << name;
+  }
+
+  Settings common{.threads = 2};
+
+ private:
+  void add(const EventBuckets* made, Nanoseconds start, PixelEvents& out) {
+    if (made == nullptr) return;
+    intervals_ += 0.5;  // for each of both
+    const auto events = scene::copy(*made);
+    EXPECT_TRUE(scene::sorted(events));
+    for (const auto& event : events)
+      out[static_cast<std::size_t>(event.y() * width + event.x)].push_back(
+          {start / 1000 + event.t, event.polarity() == Polarity::on});
+  }
+
+  LumaFormat format_{width, height, 8};
+  Texture texture_{width, height, 1};
+  std::unique_ptr<gl::DvsSimulator> ours_;
+  std::unique_ptr<DvsSimulator> reference_;
+  double intervals_ = 0;
+  PixelEvents found_{std::size_t{width} * height};
+  PixelEvents expected_{std::size_t{width} * height};
+};
+
+/// A frame of a texture that moves and changes its speed.
+Image<std::uint8_t> moving_frame(int i) {
+  return scene::texture<std::uint8_t>(width, height, 8, 0.9 * i + 0.1 * i * i, 0.4 * i);
+}
+
+TEST_P(EveryApi, SimulatesThePixelsOfEachPreset) {
+  for (const auto& [name, preset] : {std::pair{"ideal", DvsPreset::ideal},
+                                     {"esim", DvsPreset::esim},
+                                     {"v2e-clean", DvsPreset::v2e_clean},
+                                     {"v2e-noisy", DvsPreset::v2e_noisy},
+                                     {"icns", DvsPreset::icns},
+                                     {"hs-ergb", DvsPreset::hs_ergb},
+                                     {"davis240c", DvsPreset::davis240c},
+                                     {"davis346", DvsPreset::davis346},
+                                     {"gen4", DvsPreset::gen4},
+                                     {"standard", DvsPreset::standard}}) {
+    for (const bool follows_motion : {false, true}) {
+      auto settings = settings_of(preset);
+      if (follows_motion && settings.upsampling == Upsampling::linear) continue;
+      if (!follows_motion) settings.upsampling = Upsampling::linear;
+      Comparison comparison(context, settings);
+      for (int i = 0; i < 5; ++i) comparison.push(moving_frame(i), 5 + i * frame_time);
+      comparison.expect_equal(name + std::string(follows_motion ? ", motion" : ""));
+    }
+  }
+}
+
+/// Settings with every stage on.
+DvsSettings everything() {
+  return {.denoise = 4,
+          .exposure_compensation = true,
+          .response = Response::log,
+          .overexposed_light = 2,
+          .cutoff_frequency = 60,
+          .threshold_sigma = 0.03,
+          .threshold_jitter = 0.02,
+          .leak_rate = 30,
+          .leak_spread = 0.2,
+          .shot_noise_rate = 80,
+          .hot_pixels = 0.01,
+          .dead_pixels = 0.02,
+          .adaptation = 0.1,
+          .refractory_period = 400'000,
+          .refractory_reset = RefractoryReset::signal,
+          .exposure_pulse = 0.05,
+          .exposure_lead = 9'000'000,
+          .pixel_latency = 300'000,
+          .pixel_latency_jitter = 100'000,
+          .max_rate = 2e7,
+          .seed = 11};
+}
+
+TEST_P(EveryApi, HoldsFramesAndChangesSettings) {
+  auto settings = everything();
+  Comparison comparison(context, settings);
+  Nanoseconds time = 1'234;
+  for (int i = 0; i < 3; ++i) comparison.push(moving_frame(i), time += frame_time);
+  comparison.hold_until(time += 2 * frame_time);
+  settings.upsampling = Upsampling::motion;
+  settings.threshold_jitter = 0.03;
+  settings.exposure_time = 10'000'000;
+  comparison.set(settings);
+  for (int i = 3; i < 6; ++i) comparison.push(moving_frame(i), time += frame_time);
+  comparison.hold_until(time += frame_time);
+  settings = {.threshold_sigma = 0.01, .refractory_period = 1'000'000, .seed = 5};
+  comparison.set(settings);  // another response, and no work of the CPU
+  for (int i = 6; i < 9; ++i) comparison.push(moving_frame(i), time += frame_time);
+  comparison.hold_until(time += frame_time);
+  comparison.set(everything());
+  for (int i = 9; i < 12; ++i) comparison.push(moving_frame(i), time += frame_time);
+  comparison.expect_equal("all stages");
+}
+
+TEST_P(EveryApi, FollowsKnownFlowWithARollingShutter) {
+  auto settings = settings_of(DvsPreset::standard);
+  settings.denoise = 0;
+  Comparison comparison(context, settings);
+  comparison.common.rolling_shutter = 20'000'000;
+  Image<Flow> flow(width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) flow.at(x, y) = {0.11F * static_cast<float>(x - y), -1.3F};
+  for (int i = 0; i < 4; ++i) comparison.push(moving_frame(i), i * frame_time, flow.view());
+  comparison.late_events();
+  comparison.expect_equal("known flow");
+}
+
+TEST_P(EveryApi, SimulatesMoreEventsThanFitAtFirst) {
+  Comparison comparison(context, {.positive_threshold = 0.015, .negative_threshold = 0.02});
+  for (int i = 0; i < 4; ++i)
+    comparison.push(scene::noise<std::uint8_t>(width, height, 8, static_cast<unsigned>(i)),
+                    i * frame_time);
+  comparison.expect_equal("many events");
+}
+
+/// Frames of a noisy camera whose exposure grows.
+Image<std::uint8_t> noisy_frame(int i) {
+  auto frame = moving_frame(0);
+  const auto noise = scene::noise<std::uint8_t>(width, height, 3, static_cast<unsigned>(i));
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      frame.at(x, y) = static_cast<std::uint8_t>(
+          std::clamp(20 + frame.at(x, y) * (10 + i) / 22 + noise.at(x, y) - 4, 0, 255));
+  return frame;
+}
+
+TEST_P(EveryApi, RemovesNoiseAndExposureOfTheCamera) {
+  auto settings = settings_of(DvsPreset::standard);
+  settings.positive_threshold = settings.negative_threshold = 0.05;
+  Comparison comparison(context, settings);
+  for (int i = 0; i < 5; ++i) comparison.push(noisy_frame(i), i * frame_time);
+  comparison.expect_equal("noise and exposure");
+}
+
+}  // namespace
