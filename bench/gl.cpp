@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <map>
@@ -78,8 +79,8 @@ Frame scaled(const Frame& from, int width, int height) {
       const auto row = [&](int at) {
         return from.at(left, at) * (1 - right) + from.at(left + 1, at) * right;
       };
-      to.at(x, y) =
-          static_cast<std::uint8_t>(row(top) * (1 - (v - top)) + row(top + 1) * (v - top) + 0.5);
+      to.at(x, y) = static_cast<std::uint8_t>(
+          std::lround(row(top) * (1 - (v - top)) + row(top + 1) * (v - top)));
     }
   }
   return to;
@@ -285,8 +286,10 @@ double element_cost_of(const Method& method, const Clip& clip, const Settings& s
     const Frame& frame = bench::back_and_forth(clip, i);
     GstBuffer* buffer = gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(&video), nullptr);
     for (int y = 0; y < frame.height(); ++y)
-      gst_buffer_fill(buffer, static_cast<gsize>(y * GST_VIDEO_INFO_PLANE_STRIDE(&video, 0)),
-                      frame.row(y), static_cast<gsize>(frame.width()));
+      gst_buffer_fill(
+          buffer,
+          static_cast<gsize>(y) * static_cast<gsize>(GST_VIDEO_INFO_PLANE_STRIDE(&video, 0)),
+          frame.row(y), static_cast<gsize>(frame.width()));
     GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(i) * bench::frame_time;
     gst_app_src_push_buffer(source, buffer);  // blocks until the last one is taken
   };
