@@ -43,8 +43,7 @@ double time_of(const Work& work) {
   return milliseconds_since(start);
 }
 
-/// Frames of a clip, back and forth, that come first and are not timed: drivers compile late, and
-/// diff has no difference before the third.
+/// Warm-up frames: drivers compile late, and diff tracks from the third frame on.
 constexpr std::int64_t untimed = 4;
 
 double max_duration = 1000;  ///< of a measurement, milliseconds
@@ -103,7 +102,7 @@ const Method methods[] = {
     {bench::diff_method, gl::make_diff_simulator, "gleventsim-diff"},
 };
 
-/// Time of the GPU for all runs of a kernel in a frame.
+/// GPU time of all runs of a kernel in a frame.
 struct Pass {
   int runs;
   double time;  ///< milliseconds
@@ -118,25 +117,26 @@ class GpuTimer {
   GpuTimer(const GpuTimer&) = delete;
   GpuTimer& operator=(const GpuTimer&) = delete;
 
-  /// Times each kernel, too, from its start to the start of the next one.
+  /// Also times each kernel, from its start to the start of the next one.
   void time_kernels() {
     gl_.on_kernel = [this](std::string_view kernel) { mark(std::string(kernel)); };
   }
 
-  /// Milliseconds that the GPU takes for the commands that `work` queues. Waits for it.
+  /// Returns the GPU time of the commands that `work` queues, milliseconds. Waits for the GPU.
   template <class Work>
   double time_of(const Work& work) {
     names_.clear();
     mark("");
     work();
+    end_ = names_.size();
     mark("");
-    return time_between(0, names_.size() - 1);
+    return time_between(0, end_);
   }
 
-  /// The kernels of the last commands.
+  /// Times of the kernels in the last time_of().
   Passes passes() const {
     Passes passes;
-    for (std::size_t i = 1; i + 1 < names_.size(); ++i) {
+    for (std::size_t i = 1; i < end_; ++i) {
       auto& [runs, time] = passes[names_[i]];
       ++runs;
       time += time_between(i, i + 1);
@@ -161,6 +161,7 @@ class GpuTimer {
 
   gl::Context& gl_;
   std::vector<std::string> names_;  ///< of the kernels that start at each timestamp
+  std::size_t end_ = 0;             ///< timestamp of the end; read() may run kernels later
   std::vector<GLuint> queries_;
   PFNGLGENQUERIESPROC gen_queries_ =
       reinterpret_cast<PFNGLGENQUERIESPROC>(gl_test::load("glGenQueries"));
@@ -170,12 +171,12 @@ class GpuTimer {
   GetResult get_result_ = reinterpret_cast<GetResult>(gl_test::load("glGetQueryObjectui64v"));
 };
 
-/// Milliseconds of a frame, and its events.
+/// Milliseconds per frame, and number of events.
 struct Costs {
   double upload;
-  double call;     ///< that queues the kernels; llvmpipe works in it
-  double kernels;  ///< work of the GPU
-  double read;     ///< of the events, when the GPU is done
+  double call;     ///< to queue the kernels; llvmpipe runs them in it
+  double kernels;  ///< on the GPU
+  double read;     ///< to copy the events, once the GPU has finished
   double events;
   Passes passes;
 };
@@ -233,7 +234,7 @@ Costs costs_of(gl::Context& context, const Method& method, const Clip& clip,
   return costs;
 }
 
-/// Milliseconds of a frame on the CPU.
+/// Milliseconds per frame on the CPU.
 double cpu_cost_of(const Method& method, const Clip& clip, const Settings& settings) {
   const auto simulator = method.cpu.ours({clip[0].width(), clip[0].height(), 8});
   const auto play = [&](std::int64_t i) {
@@ -247,7 +248,7 @@ double cpu_cost_of(const Method& method, const Clip& clip, const Settings& setti
   return median(times);
 }
 
-/// Milliseconds of a frame in a pipeline, from memory to events.
+/// Milliseconds per frame in a pipeline, from memory to events.
 double element_cost_of(const Method& method, const Clip& clip, const Settings& settings) {
   std::string launch = "appsrc name=source format=time block=true max-buffers=1 ! glupload ! ";
   launch += std::string(method.element) +
@@ -275,13 +276,15 @@ double element_cost_of(const Method& method, const Clip& clip, const Settings& s
       gst_buffer_fill(buffer, static_cast<gsize>(y * GST_VIDEO_INFO_PLANE_STRIDE(&video, 0)),
                       frame.row(y), static_cast<gsize>(frame.width()));
     GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(i) * bench::frame_time;
-    gst_app_src_push_buffer(source, buffer);  // waits until the last one has been taken
+    gst_app_src_push_buffer(source, buffer);  // blocks until the last one is taken
   };
-  for (std::int64_t i = 0; i < untimed; ++i) push(i);
+  // When a frame has been pushed, the last but one has passed the simulator.
+  constexpr std::int64_t in_flight = 2;
+  for (std::int64_t i = 0; i < untimed + in_flight; ++i) push(i);
   const auto start = Clock::now();
-  std::int64_t frames = 0;
+  std::int64_t frames = in_flight;
   for_each_timed([&](std::int64_t i) {
-    push(i);
+    push(i + in_flight);
     ++frames;
   });
   gst_app_src_end_of_stream(source);

@@ -92,7 +92,7 @@ plt.rcParams.update(
 
 
 def short(value):
-    """Three digits, and no more zeros than that."""
+    """Rounds to three digits."""
     if value >= 1e6:
         return f"{value / 1e6:.3g} M"
     if value >= 1e4:
@@ -101,7 +101,7 @@ def short(value):
 
 
 def runs_of(benchmarks):
-    """The benchmarks by name; of one that ran repeatedly the median."""
+    """Benchmarks by name; the median time of those that ran repeatedly."""
     runs = {}
     for benchmark in benchmarks:
         if benchmark["run_type"] == "iteration":
@@ -179,7 +179,7 @@ def draw_runtimes(runs, on_gpu, path):
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.grid(axis="x", color="#e8eaee", linewidth=0.8)
         axes.set_axisbelow(True)
-        axes.set_xlabel("milliseconds a frame")
+        axes.set_xlabel("milliseconds per frame")
         axes.set_title(title, pad=14)
     handles = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in (PAPER, NAIVE, EVENTCV, OURS, OURS_ON_GPU)]
     figure.legend(
@@ -263,7 +263,7 @@ def draw_growth(runs, path):
             axes.set_xlabel(label)
             if row == 0:
                 axes.set_title(title, pad=8)
-        row_axes[0].set_ylabel("milliseconds a frame")
+        row_axes[0].set_ylabel("milliseconds per frame")
         lines = [plt.Line2D([], [], color=colour, linewidth=2) for _, colour in methods.values()]
         row_axes[0].legend(lines, [label for label, _ in methods.values()], frameon=False, fontsize=9)
     lines = [

@@ -49,7 +49,7 @@ static gboolean query(GstBaseTransform* self, GstPadDirection direction, GstQuer
 
 /* allocation */
 
-/// Proposes no pool, because upstream's textures may be of another context.
+/// Proposes no pool, because upstream's textures may belong to another context.
 static gboolean propose_allocation(GstBaseTransform* self, GstQuery* decide, GstQuery* query) {
   gst_query_add_allocation_meta(query, GST_GL_SYNC_META_API_TYPE, nullptr);
   return PARENT_TRANSFORM_CLASS->propose_allocation(self, decide, query);

@@ -22,7 +22,8 @@ static GstGLContext* gl_context_of(GstGLDisplay* display, GstGLContext* other, G
   return context;
 }
 
-static GstGLDisplay* that_works(GstGLDisplay* display) {
+/// Passes a display on if it can create a context; otherwise frees it and returns nullptr.
+static GstGLDisplay* if_working(GstGLDisplay* display) {
   if (display == nullptr) return nullptr;
   GstGLContext* context = gl_context_of(display, nullptr, nullptr);
   if (context == nullptr) gst_clear_object(&display);
@@ -35,7 +36,7 @@ static GstGLDisplay* display_of_screen() {
   // Without a screen, gst_gl_display_new() makes a dummy display, whose context crashes when it
   // opens a window.
   if (G_OBJECT_TYPE(display) == GST_TYPE_GL_DISPLAY) gst_clear_object(&display);
-  return that_works(display);
+  return if_working(display);
 }
 
 /// Finds a display of a device without a screen, which GstGL does not do itself.
@@ -43,7 +44,7 @@ static GstGLDisplay* find_device() {
   for (guint device = 0;; ++device) {
     auto* found = gst_gl_display_egl_device_new(device);
     if (found == nullptr) return nullptr;
-    if (auto* display = that_works(GST_GL_DISPLAY(found))) return display;
+    if (auto* display = if_working(GST_GL_DISPLAY(found))) return display;
   }
 }
 
@@ -140,7 +141,7 @@ void SharedContext::set_context(GstContext* context) {
   const std::lock_guard lock(mutex_);
   const auto* const last = display_;
   gst_gl_handle_set_context(element_, context, &display_, &other_);
-  if (display_ != last) gst_clear_object(&context_);  // it is of the last one
+  if (display_ != last) gst_clear_object(&context_);  // it belongs to the last one
 }
 
 bool SharedContext::answer(GstQuery* query) {

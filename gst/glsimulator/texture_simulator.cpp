@@ -224,8 +224,8 @@ class TextureVideoSimulator final : public VideoSimulator {
     return finished;
   }
 
-  /// A frame that GstGLUpload can upload: it trusts that frames can be mapped, and takes textures
-  /// as they are.
+  /// Returns a frame that GstGLUpload can upload: it does not check that frames can be mapped, and
+  /// passes textures on unchanged.
   OwnedBuffer in_system_memory(GstBuffer* buffer) const {
     const VideoFrame mapped(video_, buffer, GST_MAP_READ);
     if (!mapped) throw cannot_read(mapped.fault());

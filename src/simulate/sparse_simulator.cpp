@@ -2,6 +2,8 @@
 #include "src/simulate/sparse_simulator.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <cstdlib>
 #include <span>
 #include <utility>
 #include <vector>
@@ -13,16 +15,33 @@
 namespace eventcamera {
 namespace {
 
+/// Background that is uncovered where a pixel in motion starts.
+template <class Pixel>
+struct Uncovered {
+  std::uint16_t x;
+  std::uint16_t y;
+  Pixel brightness;
+};
+
 /// Tracked pixels in motion that start in one band of rows, in raster order. On its own cache
 /// lines, because threads fill neighbouring bands concurrently.
 template <class Pixel>
 struct alignas(64) MovingBand {
   MovingPoints points;
   std::vector<Pixel> brightness;
-  std::vector<Pixel> background;  ///< uncovered where each pixel starts
-  int top;                        ///< the pixels start in and cross rows [top, bottom)
+  std::vector<std::vector<Uncovered<Pixel>>> uncovered;  ///< by each step
+  int top;  ///< the pixels start in and cross rows [top, bottom)
   int bottom;
 };
+
+/// First step at which a pixel has left its start, at most `steps`.
+int departure_of(const MovingPoint& point, int steps) {
+  const auto along = [&](Motion motion) {
+    constexpr int half = 1 << 15;
+    return motion == 0 ? steps : 1 + (half - (motion > 0 ? 1 : 0)) / std::abs(motion);
+  };
+  return std::min({along(point.dx), along(point.dy), steps});
+}
 
 /// Two frames and the pixels that move between them.
 template <class Pixel>
@@ -37,53 +56,81 @@ struct Interval {
 template <class Pixel>
 class Painter {
  public:
-  Painter(int width, int height) : between_(width, height), before_(width, height) {}
+  Painter(int width, int height) : still_(width, height) {
+    for (int i = 0; i <= steps_at_once; ++i) frames_.emplace_back(width, height);
+  }
 
   /// Appends the events of steps first ... last to their buckets.
   void fire(const Interval<Pixel>& interval, int first, int last, const StepTimes& steps,
             const Thresholds& thresholds, StepBuckets& events) {
-    paint(interval, first - 1);
-    for (int j = first; j <= last; ++j) {
-      std::swap(before_, between_);
-      const bool ends = j == steps.count();
-      if (!ends) paint(interval, j);
-      auto& out = events.pixels(j, 0);
-      out.begin(steps.microseconds(j));
-      for (int y = 0; y < interval.now.height; ++y) {
-        const bool touched = interval.touched[static_cast<std::size_t>(y)] != 0;
-        if (!touched && !ends) continue;
-        fire_differences(touched ? before_.row(y) : interval.last.row(y),
-                         ends ? interval.now.row(y) : between_.row(y), interval.now.width, y,
-                         thresholds, out);
+    for_each_touched(interval, [&](int y) { still_.assign_row(y, interval.last.row(y)); });
+    for (int j = 1; j < first - 1; ++j) uncover(interval, j);
+    paint(interval, first - 1, 0, 1);
+    for (int begin = first; begin <= last; begin += steps_at_once) {
+      const int count = std::min(steps_at_once, last + 1 - begin);
+      paint(interval, begin, 1, std::min(count, steps.count() - begin));
+      for (int i = 0; i < count; ++i) {
+        const int j = begin + i;
+        const bool ends = j == steps.count();
+        const auto at = static_cast<std::size_t>(i);
+        auto& out = events.pixels(j, 0);
+        out.begin(steps.microseconds(j));
+        for (int y = 0; y < interval.now.height; ++y) {
+          const bool touched = interval.touched[static_cast<std::size_t>(y)] != 0;
+          if (!touched && !ends) continue;
+          fire_differences(touched ? frames_[at].row(y) : interval.last.row(y),
+                           ends ? interval.now.row(y) : frames_[at + 1].row(y), interval.now.width,
+                           y, thresholds, out);
+        }
       }
+      std::swap(frames_.front(), frames_[static_cast<std::size_t>(count)]);
     }
   }
 
  private:
-  /// Draws the touched rows of the frame of step j into between_.
-  void paint(const Interval<Pixel>& interval, int j) {
-    for (int y = 0; y < between_.height(); ++y)
-      if (interval.touched[static_cast<std::size_t>(y)] != 0)
-        between_.assign_row(y, interval.last.row(y));
-    if (j == 0) return;  // nothing has moved yet
-    Pixel* const frame = between_.row(0);
-    const int stride = static_cast<int>(between_.stride() / std::ptrdiff_t{sizeof(Pixel)});
-    for (const auto& band : interval.bands) {
-      const auto starts = band.points.at(0, stride, starts_);
-      const auto places = band.points.at(j, stride, places_);
-      for (std::size_t i = 0; i < places.size(); ++i)
-        frame[starts[i]] = places[i] != starts[i] ? band.background[i] : band.brightness[i];
+  template <class Body>
+  static void for_each_touched(const Interval<Pixel>& interval, const Body& body) {
+    for (int y = 0; y < interval.now.height; ++y)
+      if (interval.touched[static_cast<std::size_t>(y)] != 0) body(y);
+  }
+
+  /// Draws the background that the pixels uncover in step j into still_.
+  void uncover(const Interval<Pixel>& interval, int j) {
+    for (const auto& band : interval.bands)
+      for (const auto& [x, y, brightness] : band.uncovered[static_cast<std::size_t>(j)])
+        still_.at(x, y) = brightness;
+  }
+
+  /// Draws the touched rows of `count` frames, those of step `begin` and later, into frames_[to]
+  /// and later.
+  void paint(const Interval<Pixel>& interval, int begin, std::size_t to, int count) {
+    const auto frames = std::span(frames_).subspan(to, static_cast<std::size_t>(count));
+    int j = begin;
+    for (auto& frame : frames) {
+      uncover(interval, j++);
+      for_each_touched(interval, [&](int y) { frame.assign_row(y, still_.row(y)); });
     }
+    if (begin == 0) return;  // nothing has moved yet
+    const int stride = static_cast<int>(still_.stride() / std::ptrdiff_t{sizeof(Pixel)});
     for (const auto& band : interval.bands) {
-      const auto places = band.points.at(j, stride, places_);
-      for (std::size_t i = 0; i < places.size(); ++i) frame[places[i]] = band.brightness[i];
+      for (std::size_t chunk = 0; chunk < band.points.chunks(); ++chunk) {
+        const Pixel* const brightness = band.brightness.data() + chunk * MovingPoints::chunk_size;
+        j = begin;
+        for (auto& frame : frames) {
+          Pixel* const pixels = frame.row(0);
+          const auto places = band.points.at(j++, stride, chunk, places_);
+          for (std::size_t i = 0; i < places.size(); ++i) pixels[places[i]] = brightness[i];
+        }
+      }
     }
   }
 
-  Image<Pixel> between_;
-  Image<Pixel> before_;
-  std::vector<std::int32_t> starts_;  ///< indices in between_ where the pixels of a band start
-  std::vector<std::int32_t> places_;  ///< their indices in the current step
+  /// Frames drawn at once, because a chunk of the moving pixels stays in the cache meanwhile.
+  static constexpr int steps_at_once = 4;
+
+  Image<Pixel> still_;  ///< the touched rows without the pixels that have left their start
+  std::vector<Image<Pixel>> frames_;  ///< the last one drawn before, and those drawn at once
+  std::vector<std::int32_t> places_;  ///< indices in a frame of the pixels of a chunk
 };
 
 template <class Pixel>
@@ -148,7 +195,8 @@ class SparseSimulator final : public Simulator {
       auto& band = bands_[index];
       band.points.clear();
       band.brightness.clear();
-      band.background.clear();
+      band.uncovered.resize(static_cast<std::size_t>(steps) + 1);
+      for (auto& step : band.uncovered) step.clear();
       band.top = format().height;
       band.bottom = 0;
       for (std::size_t k = first_[index]; k < first_[index + 1]; ++k) {
@@ -158,7 +206,8 @@ class SparseSimulator final : public Simulator {
         const auto [x, y] = point->start;
         band.points.push_back(*point);
         band.brightness.push_back(last_.at(x, y));
-        band.background.push_back(now.row(y)[x]);
+        band.uncovered[static_cast<std::size_t>(departure_of(*point, steps))].push_back(
+            {static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), now.row(y)[x]});
         const int end = point->at(steps).y;
         band.top = std::min({band.top, y, end});
         band.bottom = std::max({band.bottom, y + 1, end + 1});

@@ -91,7 +91,7 @@ TEST_P(EveryFormat, GivesTheEventsOfTheCpuBitForBit) {
   EXPECT_EQ(output_of_noise(without_upload("gleventsim-frame"), GetParam()), expected);
 }
 
-TEST(Pictures, AreThoseOfTheCpuBitForBit) {
+TEST(Pictures, EqualTheCpuBitForBit) {
   for (const char* palette : {"dark", "light", "viridis"}) {
     const std::string options =
         std::string("eventsim-frame positive-threshold=60 palette=") + palette;
@@ -103,7 +103,7 @@ TEST(Pictures, AreThoseOfTheCpuBitForBit) {
   }
 }
 
-TEST(Pictures, TellTheirReadersWhenTheyAreDrawn) {
+TEST(Pictures, HaveASyncPoint) {
   Harness h("gleventsim-frame");
   h.caps(video, pictures_of("gleventsim-frame"));
   h.push(h.flat(0, 100));
@@ -443,7 +443,7 @@ TEST_P(Busy, IntervalsAreDroppedAtStop) {
   EXPECT_EQ(waits, 0);
 }
 
-TEST_P(Busy, DownstreamsRefusalIsToldToUpstreamAtTheNextFrame) {
+TEST_P(Busy, DownstreamErrorsReachUpstreamAtTheNextFrame) {
   gst_pad_add_probe(
       h->sinkpad, GST_PAD_PROBE_TYPE_BUFFER,
       [](GstPad*, GstPadProbeInfo* info, gpointer) {
@@ -583,7 +583,7 @@ GstGLDisplay* give_display(GstElement* pipeline) {
   return display;
 }
 
-TEST(OpenGl, IsThatOfAnotherDisplayOnceTheApplicationSetsOne) {
+TEST(OpenGl, SwitchesToTheDisplayOfTheApplication) {
   Pipeline pipeline(
       "videotestsrc num-buffers=5 ! glupload ! gleventsim-frame ! fakesink name=sink sync=false");
   for (int times = 0; times < 2; ++times) {
