@@ -105,6 +105,7 @@ class PixelSimulator final : public DvsSimulator {
 
   void start(const TextureFrame& frame) override {
     count_ = 0;
+    is_complete_ = true;
     response_.set_range(frame.black != 0);
     luma_.run(frame, grey_[now_]);
     denoiser_.restart();

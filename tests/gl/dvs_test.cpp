@@ -64,6 +64,15 @@ class Comparison {
     add(reference_->push(scene::luma(frame), time, common, flow), start, expected_);
   }
 
+  /// Drops an interval before its events are read, and starts over.
+  void restart_after(const Image<std::uint8_t>& frame, Nanoseconds time) {
+    texture_.upload(bytes_of(frame));
+    ours_->queue(texture_.frame({one, 0, 0, 0}), time, common);
+    ours_->drop();
+    ours_->reset();
+    reference_->reset();
+  }
+
   void hold_until(Nanoseconds time) {
     const auto start = *ours_->last_time();
     add(ours_->hold_until(time, common), start, found_);
@@ -211,9 +220,12 @@ TEST_P(EveryApi, FollowsKnownFlowWithARollingShutter) {
 
 TEST_P(EveryApi, SimulatesMoreEventsThanFitAtFirst) {
   Comparison comparison(context, {.positive_threshold = 0.015, .negative_threshold = 0.02});
-  for (int i = 0; i < 4; ++i)
-    comparison.push(scene::noise<std::uint8_t>(width, height, 8, static_cast<unsigned>(i)),
-                    i * frame_time);
+  const auto frame = [](unsigned seed) {
+    return scene::noise<std::uint8_t>(width, height, 8, seed);
+  };
+  comparison.push(frame(0), 0);
+  comparison.restart_after(frame(1), frame_time);
+  for (unsigned i = 2; i < 6; ++i) comparison.push(frame(i), i * frame_time);
   comparison.expect_equal("many events");
 }
 
