@@ -100,13 +100,15 @@ class DifferenceFrame {
 
   /// Adds the pixels of a band at their positions after j steps. The strongest on a pixel wins.
   void add(const MovingBand<Strength>& band, int j) {
-    const auto places = band.points.at(j, 64 * words_, places_);
     auto* const strengths = strengths_.data();
     auto* const touched = touched_.data();
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      auto& strongest = strengths[places[i]];
-      strongest = std::max(strongest, band.strengths[i]);
-      touched[places[i] / 64] = 1;
+    const Strength* strength = band.strengths.data();
+    for (std::size_t chunk = 0; chunk < band.points.chunks(); ++chunk) {
+      for (const auto place : band.points.at(j, 64 * words_, chunk, places_)) {
+        auto& strongest = strengths[place];
+        strongest = std::max(strongest, *strength++);
+        touched[place / 64] = 1;
+      }
     }
   }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/simulate/moving_points.hpp"
 
+#include <algorithm>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/moving_points.cpp"
 #include <hwy/foreach_target.h>
@@ -48,12 +50,15 @@ namespace eventcamera {
 
 HWY_EXPORT(indices_of);
 
-std::span<const std::int32_t> MovingPoints::at(int j, int stride,
+std::span<const std::int32_t> MovingPoints::at(int j, int stride, std::size_t chunk,
                                                std::vector<std::int32_t>& memory) const {
-  const std::size_t blocks = (size_ + block_size - 1) / block_size;
-  memory.resize(blocks * block_size);
-  HWY_DYNAMIC_DISPATCH(indices_of)(std::span(blocks_).first(blocks), j, stride, memory.data());
-  return std::span<const std::int32_t>(memory).first(size_);
+  const std::size_t first = chunk * chunk_size;
+  const std::size_t count = std::min(chunk_size, size_ - first);
+  const std::size_t blocks = (count + block_size - 1) / block_size;
+  memory.resize(chunk_size);
+  HWY_DYNAMIC_DISPATCH(indices_of)
+  (std::span(blocks_).subspan(first / block_size, blocks), j, stride, memory.data());
+  return std::span<const std::int32_t>(memory).first(count);
 }
 
 }  // namespace eventcamera

@@ -27,10 +27,15 @@ class MovingPoints {
     block.dy[lane] = point.dy;
   }
 
-  /// Computes the positions after j steps as indices of the pixels of an image whose rows are
-  /// `stride` pixels apart. Valid as long as `memory` is not changed.
-  std::span<const std::int32_t> at(int j, int stride, std::vector<std::int32_t>& memory) const;
+  /// Number of chunks of chunk_size points; the last one may have fewer.
+  std::size_t chunks() const { return (size_ + chunk_size - 1) / chunk_size; }
 
+  /// Computes the positions of a chunk after j steps as indices of the pixels of an image whose
+  /// rows are `stride` pixels apart. Valid as long as `memory` is not changed.
+  std::span<const std::int32_t> at(int j, int stride, std::size_t chunk,
+                                   std::vector<std::int32_t>& memory) const;
+
+  static constexpr std::size_t chunk_size = 1024;
   static constexpr std::size_t block_size = 16;
   struct alignas(64) Block {
     std::int32_t x[block_size];

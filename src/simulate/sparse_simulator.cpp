@@ -56,31 +56,34 @@ struct Interval {
 template <class Pixel>
 class Painter {
  public:
-  Painter(int width, int height)
-      : still_(width, height), between_(width, height), before_(width, height) {}
+  Painter(int width, int height) : still_(width, height) {
+    for (int i = 0; i <= steps_at_once; ++i) frames_.emplace_back(width, height);
+  }
 
   /// Appends the events of steps first ... last to their buckets.
   void fire(const Interval<Pixel>& interval, int first, int last, const StepTimes& steps,
             const Thresholds& thresholds, StepBuckets& events) {
     for_each_touched(interval, [&](int y) { still_.assign_row(y, interval.last.row(y)); });
-    for (int j = 1; j < first; ++j) uncover(interval, j);
-    paint(interval, first - 1);
-    for (int j = first; j <= last; ++j) {
-      std::swap(before_, between_);
-      const bool ends = j == steps.count();
-      if (!ends) {
-        uncover(interval, j);
-        paint(interval, j);
+    for (int j = 1; j < first - 1; ++j) uncover(interval, j);
+    paint(interval, first - 1, 0, 1);
+    for (int begin = first; begin <= last; begin += steps_at_once) {
+      const int count = std::min(steps_at_once, last + 1 - begin);
+      paint(interval, begin, 1, std::min(count, steps.count() - begin));
+      for (int i = 0; i < count; ++i) {
+        const int j = begin + i;
+        const bool ends = j == steps.count();
+        const auto at = static_cast<std::size_t>(i);
+        auto& out = events.pixels(j, 0);
+        out.begin(steps.microseconds(j));
+        for (int y = 0; y < interval.now.height; ++y) {
+          const bool touched = interval.touched[static_cast<std::size_t>(y)] != 0;
+          if (!touched && !ends) continue;
+          fire_differences(touched ? frames_[at].row(y) : interval.last.row(y),
+                           ends ? interval.now.row(y) : frames_[at + 1].row(y), interval.now.width,
+                           y, thresholds, out);
+        }
       }
-      auto& out = events.pixels(j, 0);
-      out.begin(steps.microseconds(j));
-      for (int y = 0; y < interval.now.height; ++y) {
-        const bool touched = interval.touched[static_cast<std::size_t>(y)] != 0;
-        if (!touched && !ends) continue;
-        fire_differences(touched ? before_.row(y) : interval.last.row(y),
-                         ends ? interval.now.row(y) : between_.row(y), interval.now.width, y,
-                         thresholds, out);
-      }
+      std::swap(frames_.front(), frames_[static_cast<std::size_t>(count)]);
     }
   }
 
@@ -98,22 +101,36 @@ class Painter {
         still_.at(x, y) = brightness;
   }
 
-  /// Draws the touched rows of the frame of step j into between_.
-  void paint(const Interval<Pixel>& interval, int j) {
-    for_each_touched(interval, [&](int y) { between_.assign_row(y, still_.row(y)); });
-    if (j == 0) return;  // nothing has moved yet
-    Pixel* const frame = between_.row(0);
-    const int stride = static_cast<int>(between_.stride() / std::ptrdiff_t{sizeof(Pixel)});
+  /// Draws the touched rows of `count` frames, those of step `begin` and later, into frames_[to]
+  /// and later.
+  void paint(const Interval<Pixel>& interval, int begin, std::size_t to, int count) {
+    const auto frames = std::span(frames_).subspan(to, static_cast<std::size_t>(count));
+    int j = begin;
+    for (auto& frame : frames) {
+      uncover(interval, j++);
+      for_each_touched(interval, [&](int y) { frame.assign_row(y, still_.row(y)); });
+    }
+    if (begin == 0) return;  // nothing has moved yet
+    const int stride = static_cast<int>(still_.stride() / std::ptrdiff_t{sizeof(Pixel)});
     for (const auto& band : interval.bands) {
-      const auto places = band.points.at(j, stride, places_);
-      for (std::size_t i = 0; i < places.size(); ++i) frame[places[i]] = band.brightness[i];
+      for (std::size_t chunk = 0; chunk < band.points.chunks(); ++chunk) {
+        const Pixel* const brightness = band.brightness.data() + chunk * MovingPoints::chunk_size;
+        j = begin;
+        for (auto& frame : frames) {
+          Pixel* const pixels = frame.row(0);
+          const auto places = band.points.at(j++, stride, chunk, places_);
+          for (std::size_t i = 0; i < places.size(); ++i) pixels[places[i]] = brightness[i];
+        }
+      }
     }
   }
 
+  /// Frames drawn at once, because a chunk of the moving pixels stays in the cache meanwhile.
+  static constexpr int steps_at_once = 4;
+
   Image<Pixel> still_;  ///< the touched rows without the pixels that have left their start
-  Image<Pixel> between_;
-  Image<Pixel> before_;
-  std::vector<std::int32_t> places_;  ///< indices in between_ of the pixels of a band
+  std::vector<Image<Pixel>> frames_;  ///< the last one drawn before, and those drawn at once
+  std::vector<std::int32_t> places_;  ///< indices in a frame of the pixels of a chunk
 };
 
 template <class Pixel>

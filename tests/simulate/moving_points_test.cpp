@@ -38,10 +38,14 @@ TEST(MovingPoints, AreWhereEachOfThemIs) {
   std::vector<std::int32_t> memory;
   std::mt19937 random(1);
   std::uniform_int_distribution<int> position(0, side - 1);
-  while (each.size() < 40) {
+  const auto check = [&] {
     targets::for_each([&](const char* target) {
       for (int j = 0; j <= steps; ++j) {
-        const auto indices = points.at(j, stride, memory);
+        std::vector<std::int32_t> indices;
+        for (std::size_t chunk = 0; chunk < points.chunks(); ++chunk) {
+          const auto part = points.at(j, stride, chunk, memory);
+          indices.insert(indices.end(), part.begin(), part.end());
+        }
         ASSERT_EQ(indices.size(), each.size());
         for (std::size_t i = 0; i < each.size(); ++i) {
           const auto [x, y] = each[i].at(j);
@@ -49,6 +53,9 @@ TEST(MovingPoints, AreWhereEachOfThemIs) {
         }
       }
     });
+  };
+  while (each.size() < MovingPoints::chunk_size + 20) {
+    if (each.size() < 40 || each.size() % MovingPoints::chunk_size < 2) check();
     const Point start{position(random), position(random)};
     const Flow flow{static_cast<float>(position(random) - start.x),
                     static_cast<float>(position(random) - start.y)};
@@ -57,6 +64,7 @@ TEST(MovingPoints, AreWhereEachOfThemIs) {
     points.push_back(*point);
     each.push_back(*point);
   }
+  check();
 }
 
 }  // namespace

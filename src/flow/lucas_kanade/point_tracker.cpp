@@ -36,12 +36,12 @@ Track PointTracker::Blocks::between(int x, int y) const {
   const auto& own = track(column, row);
   Flow flow = own.flow;
   const auto approach = [&](int beside, int below) {
-    if (beside < 0 || beside >= region_side || below < 0 || below >= region_side) return;
-    const auto& other = track(beside, below);
-    if (!other.found) return;
-    const auto part = [](float from, float to) {
+    // Without branches: a block past the border is the own one.
+    const auto& other =
+        track(std::clamp(beside, 0, region_side - 1), std::clamp(below, 0, region_side - 1));
+    const auto part = [&](float from, float to) {
       constexpr float max_difference = 0.5F;
-      return std::clamp(to - from, -max_difference, max_difference) / 4;
+      return other.found ? std::clamp(to - from, -max_difference, max_difference) / 4 : 0.0F;
     };
     flow = {flow.x + part(own.flow.x, other.flow.x), flow.y + part(own.flow.y, other.flow.y)};
   };
