@@ -118,9 +118,11 @@ class Comparison {
     intervals_ += 0.5;  // for each of both
     const auto events = scene::copy(*made);
     EXPECT_TRUE(scene::sorted(events));
-    for (const auto& event : events)
-      out[static_cast<std::size_t>(event.y() * width + event.x)].push_back(
+    for (const auto& event : events) {
+      const int pixel = event.y() * width + event.x;
+      out[static_cast<std::size_t>(pixel)].push_back(
           {start / 1000 + event.t, event.polarity() == Polarity::on});
+    }
   }
 
   LumaFormat format_{width, height, 8};
