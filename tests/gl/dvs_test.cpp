@@ -225,9 +225,9 @@ TEST_P(EveryApi, SimulatesMoreEventsThanFitAtFirst) {
   const auto frame = [](unsigned seed) {
     return scene::noise<std::uint8_t>(width, height, 8, seed);
   };
-  comparison.push(frame(0), 0);
-  comparison.restart_after(frame(1), frame_time);
-  for (unsigned i = 2; i < 6; ++i) comparison.push(frame(i), i * frame_time);
+  comparison.push(frame(1), 0);
+  comparison.restart_after(frame(2), frame_time);
+  for (unsigned i = 3; i < 7; ++i) comparison.push(frame(i), i * frame_time);
   comparison.expect_equal("many events");
 }
 
