@@ -15,6 +15,7 @@
 #include "bench/codec_timing.hpp"
 #include "src/filter/crop_filter.hpp"
 #include "src/filter/denoise_filter.hpp"
+#include "src/filter/filter.hpp"
 #include "src/filter/flicker_filter.hpp"
 #include "src/filter/flip_filter.hpp"
 #include "src/filter/hot_pixel_filter.hpp"
@@ -25,7 +26,6 @@
 #include "src/filter/scale_filter.hpp"
 #include "src/filter/trail_filter.hpp"
 #include "src/filter/undistort_filter.hpp"
-#include "src/filter/valid_events.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "tests/formats/recordings.hpp"
 

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <map>
@@ -78,15 +79,15 @@ Frame scaled(const Frame& from, int width, int height) {
       const auto row = [&](int at) {
         return from.at(left, at) * (1 - right) + from.at(left + 1, at) * right;
       };
-      to.at(x, y) =
-          static_cast<std::uint8_t>(row(top) * (1 - (v - top)) + row(top + 1) * (v - top) + 0.5);
+      to.at(x, y) = static_cast<std::uint8_t>(
+          std::lround(row(top) * (1 - (v - top)) + row(top + 1) * (v - top)));
     }
   }
   return to;
 }
 
 struct Method {
-  const bench::Method& cpu;
+  bench::Method cpu;
   std::unique_ptr<gl::Simulator> (*make)(const gl::Context&, const LumaFormat&);
   const char* element;
 };
@@ -95,11 +96,22 @@ std::unique_ptr<gl::Simulator> make_dense(const gl::Context& gl, const LumaForma
   return gl::make_dense_simulator(gl, format);
 }
 
+template <DvsPreset preset>
+std::unique_ptr<gl::Simulator> make_dvs(const gl::Context& gl, const LumaFormat& format) {
+  auto simulator = gl::make_dvs_simulator(gl, format);
+  simulator->set(settings_of(preset));
+  return simulator;
+}
+
 const Method methods[] = {
     {bench::frame_method, gl::make_frame_simulator, "gleventsim-frame"},
     {bench::farneback_method, make_dense, "gleventsim-dense"},
     {bench::sparse_method, gl::make_sparse_simulator, "gleventsim-sparse"},
     {bench::diff_method, gl::make_diff_simulator, "gleventsim-diff"},
+    {bench::dvs_method("dvs-esim", settings_of(DvsPreset::esim)), make_dvs<DvsPreset::esim>,
+     "gleventsim-dvs preset=esim"},
+    {bench::dvs_method("dvs", settings_of(DvsPreset::standard)), make_dvs<DvsPreset::standard>,
+     "gleventsim-dvs"},
 };
 
 /// GPU time of all runs of a kernel in a frame.
@@ -251,10 +263,11 @@ double cpu_cost_of(const Method& method, const Clip& clip, const Settings& setti
 /// Milliseconds per frame in a pipeline, from memory to events.
 double element_cost_of(const Method& method, const Clip& clip, const Settings& settings) {
   std::string launch = "appsrc name=source format=time block=true max-buffers=1 ! glupload ! ";
-  launch += std::string(method.element) +
-            " positive-threshold=" + std::to_string(settings.positive_threshold) +
-            " negative-threshold=" + std::to_string(settings.negative_threshold);
-  if (method.cpu.name != "frame")
+  launch += method.element;
+  if (method.cpu.threshold > 0)  // else they are those of the preset
+    launch += " positive-threshold=" + std::to_string(settings.positive_threshold) +
+              " negative-threshold=" + std::to_string(settings.negative_threshold);
+  if (method.cpu.threshold > 0 && method.cpu.name != "frame")
     launch += " interpolated-frames=" + std::to_string(settings.interpolated_frames);
   launch += " ! application/x-event-camera ! fakesink sync=false";
   GError* error = nullptr;
@@ -273,8 +286,10 @@ double element_cost_of(const Method& method, const Clip& clip, const Settings& s
     const Frame& frame = bench::back_and_forth(clip, i);
     GstBuffer* buffer = gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(&video), nullptr);
     for (int y = 0; y < frame.height(); ++y)
-      gst_buffer_fill(buffer, static_cast<gsize>(y * GST_VIDEO_INFO_PLANE_STRIDE(&video, 0)),
-                      frame.row(y), static_cast<gsize>(frame.width()));
+      gst_buffer_fill(
+          buffer,
+          static_cast<gsize>(y) * static_cast<gsize>(GST_VIDEO_INFO_PLANE_STRIDE(&video, 0)),
+          frame.row(y), static_cast<gsize>(frame.width()));
     GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(i) * bench::frame_time;
     gst_app_src_push_buffer(source, buffer);  // blocks until the last one is taken
   };

@@ -151,7 +151,7 @@ def measure(scene, data, progress):
         visible = video.visible(recorded)
         if fit:
             element = fit(until(video, training.end), visible, training, element, progress)
-        progress.tell(f"measured: {element}")
+        progress.update(f"measured: {element}")
         return {"element": element} | compare(video, visible, simulate(video, element), test)
 
     on_time = delayed(video, lag)

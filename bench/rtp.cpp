@@ -19,7 +19,6 @@
 
 #include "bench/codec_timing.hpp"
 #include "bench/loopback.hpp"
-#include "src/wire/pending_interval.hpp"
 #include "src/wire/rtp_packer.hpp"
 #include "src/wire/rtp_unpacker.hpp"
 

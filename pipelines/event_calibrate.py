@@ -87,21 +87,21 @@ class Progress:
 
     def __init__(self):
         self.on_terminal = sys.stderr.isatty()
-        self.told = time.monotonic()
+        self.printed = time.monotonic()
         self.left = ""  # time left, before each text
 
-    def tell(self, text):
+    def update(self, text):
         if self.on_terminal:
             width = (os.get_terminal_size(sys.stderr.fileno()).columns or 80) - 1
             print(f"\r{(self.left + text)[:width]:<{width}}", end="", file=sys.stderr, flush=True)
-        elif time.monotonic() > self.told + PROGRESS_INTERVAL:
-            self.say(self.left + text)
+        elif time.monotonic() > self.printed + PROGRESS_INTERVAL:
+            self.print(self.left + text)
 
-    def say(self, text):
+    def print(self, text):
         """Prints a result, which stays."""
         self.end()
         print(text, file=sys.stderr, flush=True)
-        self.told = time.monotonic()
+        self.printed = time.monotonic()
 
     def end(self):
         """Removes the line of progress."""
@@ -215,7 +215,7 @@ def calibrate(search, element):
     gain on the others, too."""
     progress = search.progress
     fitted = search.fit(Setting(element))
-    progress.say(describe(f"calibrated thresholds: {fitted}", search.figures(fitted, search.span)))
+    progress.print(describe(f"calibrated thresholds: {fitted}", search.figures(fitted, search.span)))
     windows, held_out = search.windows[::2], search.windows[1::2]
     changes = changes_of(search.video, search.recorded, search.span, element) if held_out else []
     kept = {}
@@ -227,14 +227,14 @@ def calibrate(search, element):
         text = " ".join(f"{name}={value}" for name, value in change.items())
         left = (time.monotonic() - began) / tried * (len(changes) - tried)
         progress.left = f"{tried} of {len(changes)} changes tried, about {left // 60:.0f}:{left % 60:02.0f} left; "
-        progress.tell(f"{text}: likeness {gain:+.4f}")
+        progress.update(f"{text}: likeness {gain:+.4f}")
         if is_better(other - ratings):
             kept, ratings = kept | change, other
-            progress.say(f"kept {text}: likeness {gain:+.4f}, now {ratings[:, 0].mean():.4f}")
+            progress.print(f"kept {text}: likeness {gain:+.4f}, now {ratings[:, 0].mean():.4f}")
     progress.left = ""
     found = search.balanced(changed(element, kept))
     if kept and not is_better(search.ratings(found, held_out) - search.ratings(fitted, held_out)):
-        progress.say("dropped all changes: they do not gain on the windows that they were not chosen on")
+        progress.print("dropped all changes: they do not gain on the windows that they were not chosen on")
         return search.balanced(Setting(element))
     return found
 
@@ -248,7 +248,7 @@ def fit_thresholds(video, recorded, span, element, progress):
 
 
 def exposure_of(video):
-    """The median exposure of the frames, in nanoseconds, which AEDAT 4 files tell; otherwise most of the median
+    """The median exposure of the frames, in nanoseconds, which AEDAT 4 files contain; otherwise most of the median
     interval, a long exposure."""
     exposures = []
     for frame in video.frames:
@@ -325,7 +325,7 @@ def find_lag(video, recorded, span, element, progress):
     def likeness_at(lag):
         shown, over = late(lag)
         rating = ratings_of(compare(shown, shown.visible(recorded), simulate(shown, fitted), over))[0]
-        progress.tell(f"frames {1000 * lag:.1f} ms late: likeness {rating:.4f}")
+        progress.update(f"frames {1000 * lag:.1f} ms late: likeness {rating:.4f}")
         return rating
 
     spacing = np.median(np.diff([frame.time for frame in video.frames])) / 1e9
@@ -463,11 +463,11 @@ def main():
     progress = Progress()
     start = getattr(args, "from")
     ends = [end for end in (args.to, args.measure_to) if end is not None]
-    progress.say(f"reading {args.video}")
+    progress.print(f"reading {args.video}")
     video = read_video(args.video, start or 0, max(ends) if len(ends) else float("inf"))
     if len(video.frames) < 2:
         raise RuntimeError(f"{args.video}: fewer than two frames")
-    progress.say(f"reading {args.recording}")
+    progress.print(f"reading {args.recording}")
     if args.mask:
         video.mask = read_mask(args.mask, video)
     recorded = video.of_camera(read_recording(args.recording, video))

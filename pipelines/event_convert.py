@@ -110,8 +110,8 @@ def buffers_of(pictures, speed):
         yield buffer
 
 
-def retime(pad, speed, tell=lambda count: None):
-    """Makes the frames that leave a pad `speed` times as fast, from time 0 on. tell(count) gets their number so far."""
+def retime(pad, speed, report=lambda count: None):
+    """Makes the frames that leave a pad `speed` times as fast, from time 0 on. report(count) gets their number so far."""
     start, count = None, 0
 
     def push(pad, info):
@@ -123,7 +123,7 @@ def retime(pad, speed, tell=lambda count: None):
             if frame.duration != Gst.CLOCK_TIME_NONE:
                 timed.duration = round(frame.duration / speed)
             count += 1
-            tell(count)
+            report(count)
             pad.get_peer().chain(timed)
             return Gst.PadProbeReturn.DROP
         event = info.get_event()
@@ -432,7 +432,7 @@ class Conversion:
         if is_part and not (is_file or options.join or options.reverse):
             raise Misuse(f"{self._inputs[0]} cannot be sought, so --from and --to do not apply")
         try:
-            play(pipeline, self._show, self._tell, self._interrupt,
+            play(pipeline, self._show, self._print_message, self._interrupt,
                  self._seek if is_file and (is_part or self._is_still) else None)
             if self._pictures:
                 self._pictures.save(path)
@@ -483,7 +483,7 @@ class Conversion:
             share = (place[0] - start) / (end - start)
         self._progress.show(share, f"{self._count} pictures" if self._film else f"{self._events()} events")
 
-    def _tell(self, text):
+    def _print_message(self, text):
         self._progress.clear()
         print(f"{', '.join(self._inputs)}: {text}", file=sys.stderr)
 
@@ -498,7 +498,7 @@ class Conversion:
         events = self._events()
         if events == 0 and (is_part or options.crop) and not self._interrupt:
             place = self._position()
-            self._tell("warning: no events in this part" + (f"; the recording lasts {place[1]:.6g} s" if place else ""))
+            self._print_message("warning: no events in this part" + (f"; the recording lasts {place[1]:.6g} s" if place else ""))
         written = self._pipeline.get_by_name("writer").get_property("stats")
         skipped = []
         for i in range(len(self._readers)):
@@ -510,7 +510,7 @@ class Conversion:
         if self._labelled and written.get_uint64("labels")[1] == 0:
             skipped.append("labels")
         if skipped:
-            self._tell(f"left out: {', '.join(skipped)}")
+            self._print_message(f"dropped: {', '.join(skipped)}")
         return f"{events} events"
 
 

@@ -196,11 +196,11 @@ class Progress:
             print("\r\033[K", end="", file=sys.stderr, flush=True)
 
 
-def play(pipeline, show, tell, interrupt=False, prepare=None):
+def play(pipeline, show, report, interrupt=False, prepare=None):
     """Plays a pipeline to its end, or until `interrupt` is true, which completes the output.
 
     show(): prints the progress; called about five times a second.
-    tell(message): prints a warning or a note.
+    report(message): prints a warning or a note.
     prepare(): called in PAUSED, before the pipeline plays.
     Raises Failure with the text of an error."""
     bus = pipeline.get_bus()
@@ -220,7 +220,7 @@ def play(pipeline, show, tell, interrupt=False, prepare=None):
         elif message.type == Gst.MessageType.ERROR:
             raise Failure(described(message))
         elif message.type != Gst.MessageType.ASYNC_DONE:
-            tell(described(message))
+            report(described(message))
         elif prepare:
             prepare()
             prepare = None

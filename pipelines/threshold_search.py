@@ -125,7 +125,7 @@ def find_thresholds(simulated_by, recorded, span, setting, progress, first=None,
         thresholds = search.pair()
         simulated = simulated_by(setting.with_thresholds(thresholds))
         made = counts(span.of(simulated))
-        progress.tell(f"{setting}: trial {trial + 1}, thresholds {thresholds[0]:.4g} and"
+        progress.update(f"{setting}: trial {trial + 1}, thresholds {thresholds[0]:.4g} and"
                       f" {thresholds[1]:.4g}, {made[0] / goal[0]:.3f} of the ON and"
                       f" {made[1] / goal[1]:.3f} of the OFF events")
         if search.add(made):

@@ -209,7 +209,7 @@ class Server:
         source = Source(device, source)
         self._name = source.name if source.has_events else f"{source.name}, {simulator.split()[0]}"
         drawn = DRAW_AND_ENCODE.format(simulator="identity" if source.has_events else simulator)
-        self._capture = Capture(device, source, drawn, self._tell_rate)
+        self._capture = Capture(device, source, drawn, self._send_rate)
         self._renderer = self._capture.pipeline.get_by_name("renderer")
         self._encoder = self._capture.pipeline.get_by_name("encoder").get_static_pad("src")
         self._viewers = []
@@ -284,7 +284,7 @@ class Server:
         self._encoder.send_event(
             GstVideo.video_event_new_upstream_force_key_unit(Gst.CLOCK_TIME_NONE, True, 0))
 
-    def _tell_rate(self, message):
+    def _send_rate(self, message):
         figures = message.get_structure()
         if figures.get_name() == "eventstats" and not figures.get_value("cumulative"):
             for viewer in self._viewers:

@@ -82,12 +82,12 @@ GstClockTime EventAggregator::next_main_time() const {
 
 /// Sends an event upstream from all sink pads. Returns true if all accept it.
 static gboolean forward(GstAggregator* element, GstEvent* event) {
-  bool taken = true;
+  bool handled = true;
   for_each_sink_pad(element, [&](GstAggregatorPad* pad) {
-    taken &= gst_pad_push_event(GST_PAD(pad), gst_event_ref(event)) != FALSE;
+    handled &= gst_pad_push_event(GST_PAD(pad), gst_event_ref(event)) != FALSE;
   });
   gst_event_unref(event);
-  return taken ? TRUE : FALSE;
+  return handled ? TRUE : FALSE;
 }
 
 /// Answers a caps query on a pad whose buffers pass through with the caps that downstream accepts.
@@ -96,9 +96,9 @@ static void answer_caps_of_passed(EventAggregator& self, GstAggregator* aggregat
   GstCaps* filter = nullptr;
   gst_query_parse_caps(query, &filter);
   const OwnedCaps ours(gst_pad_get_pad_template_caps(GST_PAD(pad)));
-  const OwnedCaps taken(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(aggregator), ours.get()));
+  const OwnedCaps accepted(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(aggregator), ours.get()));
   OwnedCaps result = self.input_caps(
-      OwnedCaps(gst_caps_intersect_full(taken.get(), ours.get(), GST_CAPS_INTERSECT_FIRST)));
+      OwnedCaps(gst_caps_intersect_full(accepted.get(), ours.get(), GST_CAPS_INTERSECT_FIRST)));
   if (filter != nullptr)
     result.reset(gst_caps_intersect_full(result.get(), filter, GST_CAPS_INTERSECT_FIRST));
   gst_query_set_caps_result(query, result.get());
@@ -257,9 +257,9 @@ struct EventAggregatorFunctions {
   static gboolean sink_event(GstAggregator* element, GstAggregatorPad* pad, GstEvent* event) {
     auto& self = of(element);
     if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
-      const bool taken = guard(self, [&] { return handle_caps(self, pad, event); });
+      const bool handled = guard(self, [&] { return handle_caps(self, pad, event); });
       gst_event_unref(event);
-      return taken ? TRUE : FALSE;
+      return handled ? TRUE : FALSE;
     }
     if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT) {
       if (!plays_events(element, event, self.role_.verb)) return FALSE;

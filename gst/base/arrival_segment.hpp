@@ -47,7 +47,7 @@ class ArrivalSegment {
   bool has_begun() const { return segment_.has_value(); }
 
   /// Extends the end of the received data to `end`.
-  void reach(GstClockTime end) { segment_->position = std::max(segment_->position, end); }
+  void extend_to(GstClockTime end) { segment_->position = std::max(segment_->position, end); }
 
   /// Ends the segment; the next data start a new one.
   void reset() { segment_.reset(); }

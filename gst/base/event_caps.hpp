@@ -3,7 +3,7 @@
 
 #include "gst/base/owned.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 
 /// Caps fields of a frame or sensor of any size.
 #define SIZE_CAPS \

@@ -4,9 +4,10 @@
 #include <gst/gst.h>
 
 #include <array>
+#include <string>
 
 #include "gst/base/errors.hpp"
-#include "src/core/invalid_events.hpp"
+#include "src/core/event_validator.hpp"
 
 /// Reason for skipping events of a buffer.
 enum class EventFault { no_pts, pts_too_large, partial_event, beyond_sensor, unsorted };
@@ -37,3 +38,23 @@ class EventFaults {
   const char* verb_;
   std::array<WarnOnce, 5> warnings_;  ///< one per EventFault
 };
+
+inline void EventFaults::warn(gpointer element, EventFault fault, GstBuffer* buffer) {
+  static constexpr std::array reasons = {
+      "a buffer has no PTS", "a buffer's PTS is more than 292 years",
+      "a buffer's size is not a multiple of 8 bytes", "some are outside the sensor",
+      "some are earlier than the previous one, or later than the end of their buffer"};
+  const auto index = static_cast<std::size_t>(fault);
+  gchar* cause = gst_info_strdup_printf("%" GST_PTR_FORMAT, buffer);
+  warnings_[index](element,
+                   {GST_STREAM_ERROR_FORMAT, std::string("Cannot ") + verb_ + " all events: " +
+                                                 reasons[index] + "; skipping them."},
+                   cause);
+  g_free(cause);
+}
+
+inline void EventFaults::warn(gpointer element, const eventcamera::InvalidEvents& invalid,
+                              GstBuffer* buffer) {
+  if (invalid.outside > 0) warn(element, EventFault::beyond_sensor, buffer);
+  if (invalid.unsorted > 0) warn(element, EventFault::unsorted, buffer);
+}

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 
 /// For transform_caps: copies those structures of `caps` for which change(GstStructure*) is true
 /// after it has changed them, and intersects them with `filter`, unless it is null.

@@ -13,7 +13,7 @@
 #include "gst/base/event_faults.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
-#include "src/filter/valid_events.hpp"
+#include "src/filter/filter.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_filter_debug);
 #define GST_CAT_DEFAULT event_filter_debug

@@ -87,7 +87,7 @@ Impl& filter_impl(gpointer element) {
 }
 
 /// Defines and registers the type of an element with an EventFilter of class `Impl`, which must
-/// have a member `settings`. The type's class_init must follow.
+/// have a member `settings`, which type_settings() returns. The type's class_init must follow.
 #define DEFINE_EVENT_FILTER(Type, type, OBJECT, Impl, element)                     \
   G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventFilter)                    \
   struct _##Type {                                                                 \
@@ -99,6 +99,6 @@ Impl& filter_impl(gpointer element) {
   static void type##_init(Type* self) {                                            \
     gst_event_filter_set_impl(GST_EVENT_FILTER(self), std::make_unique<Impl>());   \
   }                                                                                \
-  static auto& settings_of(GObject* object) {                                      \
+  static auto& type##_settings(GObject* object) {                                  \
     return filter_impl<Impl>(object).settings;                                     \
   }

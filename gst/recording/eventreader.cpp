@@ -11,7 +11,7 @@
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/reader/event_reader.hpp"
-#include "src/formats/unsupported_format.hpp"
+#include "src/formats/corruption.hpp"
 
 using namespace eventcamera;
 

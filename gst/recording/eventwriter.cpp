@@ -265,8 +265,8 @@ class WrittenFile {
     const auto seconds = std::to_string(removed / 1'000'000) + " s";
     post_message(element(), GST_MESSAGE_WARNING,
                  {GST_STREAM_ERROR_ENCODE,
-                  (reported == 0 ? "Left out a pause of " + seconds + ", which is"
-                                 : "Left out pauses of " + seconds + " in total, which are") +
+                  (reported == 0 ? "Removed a pause of " + seconds + ", which is"
+                                 : "Removed pauses of " + seconds + " in total, which are") +
                       " too long for this format: later timestamps are shifted back by that much. "
                       "Write AEDAT4, HDF5, NumPy or text to keep them."},
                  "the clock of the format cannot represent " + std::to_string(removed) + " us");
@@ -370,12 +370,12 @@ static GstFlowReturn negotiate(GstEventWriter* self, const GstEventCameraInfo& i
   auto& priv = priv_of(self);
   OwnedCaps allowed = allowed_caps(priv.src, info);
   if (gst_caps_is_empty(allowed.get())) {
-    const OwnedCaps taken(gst_pad_peer_query_caps(priv.src, nullptr));
+    const OwnedCaps accepted(gst_pad_peer_query_caps(priv.src, nullptr));
     GST_ELEMENT_ERROR(self, STREAM, FORMAT,
                       ("Downstream does not take this format, or not from a sensor of %s. Correct "
                        "the caps after this element.",
                        in_pixels({info.width, info.height}).c_str()),
-                      ("downstream takes %" GST_PTR_FORMAT, taken.get()));
+                      ("downstream accepts %" GST_PTR_FORMAT, accepted.get()));
     return GST_FLOW_NOT_NEGOTIATED;
   }
   GstCaps* caps = gst_caps_truncate(allowed.release());
@@ -421,12 +421,12 @@ static gboolean sink_query(GstPad* pad, GstObject* parent, GstQuery* query) {
 
 /* data */
 
-static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
+static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   auto* self = GST_EVENT_WRITER(parent);
   auto& priv = priv_of(self);
-  const OwnedBuffer buffer(taken);
+  const OwnedBuffer buffer(received);
   if (!priv.file) return GST_FLOW_NOT_NEGOTIATED;
-  return reported(self, [&] { return priv.file->write(taken, priv.settings.copy().mtu); });
+  return reported(self, [&] { return priv.file->write(received, priv.settings.copy().mtu); });
 }
 
 static void end_file(GstEventWriter* self) {
@@ -475,9 +475,9 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   auto* self = GST_EVENT_WRITER(parent);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CAPS: {
-      const gboolean taken = handle_caps(self, event);
+      const gboolean handled = handle_caps(self, event);
       gst_event_unref(event);
-      return taken;
+      return handled;
     }
     case GST_EVENT_SEGMENT:
       if (!plays_forwards(self, event, "write")) return FALSE;

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <new>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 
 using namespace eventcamera;
 

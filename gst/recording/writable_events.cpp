@@ -111,7 +111,7 @@ void WritableEvents::warn_of_outside() {
 
 void WritableEvents::warn(Dropped& dropped, const std::string& what, const std::string& cause) {
   if (dropped.count == dropped.reported) return;
-  const Report report{code_, "Left out " + std::to_string(dropped.count) + " event" +
+  const Report report{code_, "Dropped " + std::to_string(dropped.count) + " event" +
                                  (dropped.count == 1 ? "" : "s") +
                                  (dropped.reported == 0 ? " " : " in total ") + what};
   GST_CAT_WARNING_OBJECT(category_, element_, "%s (%s)", report.text.c_str(), cause.c_str());

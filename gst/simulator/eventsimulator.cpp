@@ -9,7 +9,6 @@
 #include "gst/base/element_type.hpp"
 #include "gst/base/event_pool.hpp"
 #include "gst/base/guarded.hpp"
-#include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"

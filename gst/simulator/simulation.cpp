@@ -19,7 +19,7 @@
 #include "gst/drawing/drawn_video.hpp"
 #include "gst/simulator/caps.hpp"
 #include "gst/simulator/frame_luma.hpp"
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 
 #define GST_CAT_DEFAULT event_simulator_debug
 

@@ -265,7 +265,7 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
     events: an array with the fields t (microseconds, from 0 to 2**52, sorted), x, y and p (ON if above 0); shape
         (events,).
         Labels of Events are written, too, if the format has them: .npz, .h5 and .csv.
-    width, height: of the sensor, in pixels, 1 to 16384; may be left out for Events of a known sensor.
+    width, height: of the sensor, in pixels, 1 to 16384; may be omitted for Events of a known sensor.
 
     Only a complete file replaces an existing one. Raises ValueError for events that are not sorted, too late or
     outside the sensor, or an unknown extension, and PipelineError if the file cannot be written."""

@@ -26,7 +26,7 @@ def voxel_grid(events: np.ndarray, bins: int = 5, width: int = 0, height: int = 
 
     events: an array with the fields t, x, y and p, sorted by t; shape (events,).
     bins: 1 to 256.
-    width, height: of the sensor, in pixels, 1 to 16384; may be left out for Events of a known sensor.
+    width, height: of the sensor, in pixels, 1 to 16384; may be omitted for Events of a known sensor.
 
     Returns float32 of shape (bins, height, width), equal to the tensor of eventtensor for a window of these
     events. Raises ValueError for events that are not sorted or outside the sensor, and for fields that are not whole

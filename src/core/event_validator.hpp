@@ -2,25 +2,35 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <limits>
 #include <span>
 
-#include "src/core/invalid_events.hpp"
 #include "src/core/label.hpp"
 
 namespace eventcamera {
+
+/// Numbers of events of a buffer that cannot be used.
+struct InvalidEvents {
+  std::size_t outside = 0;   ///< x or y past the sensor
+  std::size_t unsorted = 0;  ///< earlier than the previous event, or past the end of the buffer
+
+  friend bool operator==(const InvalidEvents&, const InvalidEvents&) = default;
+};
 
 /// Ensures that events lie inside the sensor and are sorted by time.
 class EventValidator {
  public:
   EventValidator(int width, int height) : width_(width), height_(height) {}
 
-  /// Calls take() for each event; times are relative to `start`. A late event, before the previous
-  /// one or before passed(), gets that time; events outside the sensor or after `max_t` are
-  /// dropped. `labels` is empty or has one label per event. Returns the numbers of dropped events.
-  template <class Take>
-  InvalidEvents take(std::span<const Event> events, Microseconds start, Microseconds max_t,
-                     const Take& take, std::span<const Label> labels = {}) {
+  /// Calls `use` for each valid event; times are relative to `start`. A late event, before the
+  /// previous one or before passed(), gets that time; events outside the sensor or after `max_t`
+  /// are dropped. `labels` is empty or has one label per event. Returns the numbers of dropped
+  /// events.
+  template <class Use>
+  InvalidEvents for_each_valid(std::span<const Event> events, Microseconds start,
+                               Microseconds max_t, const Use& use,
+                               std::span<const Label> labels = {}) {
     InvalidEvents dropped;
     for (std::size_t i = 0; i < events.size(); ++i) {
       const Event& event = events[i];
@@ -30,9 +40,9 @@ class EventValidator {
         continue;
       }
       earliest_ = std::max(earliest_, start + event.t);
-      AbsoluteEvent taken{earliest_, event.x, event.y_p};
-      if (!labels.empty()) set_label(taken, labels[i]);
-      take(taken);
+      AbsoluteEvent valid{earliest_, event.x, event.y_p};
+      if (!labels.empty()) set_label(valid, labels[i]);
+      use(valid);
     }
     return dropped;
   }

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "src/core/event.hpp"
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 
 namespace eventcamera {
 

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdlib>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/flow/flow_range.hpp"
 
 #undef HWY_TARGET_INCLUDE

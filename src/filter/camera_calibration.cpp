@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 
 namespace eventcamera {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/filter/double_window.hpp"
+#include "src/filter/denoise_filter.hpp"
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/filter/double_window.cpp"

@@ -9,7 +9,7 @@
 #include "src/core/event.hpp"
 #include "src/core/label.hpp"
 #include "src/core/sensor_size.hpp"
-#include "src/filter/valid_events.hpp"
+#include "src/filter/filter.hpp"
 
 namespace eventcamera {
 

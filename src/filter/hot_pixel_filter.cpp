@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "src/filter/prefetched.hpp"
+#include "src/filter/filter.hpp"
 
 namespace eventcamera {
 
@@ -38,7 +38,7 @@ LabelledEvents HotPixelFilter::filter(LabelledEvents events, Microseconds start,
     const Microseconds time = start + event.t;
     if (time >= end) [[unlikely]] {
       learn(settings.ratio);
-      // Periods without any event tell nothing about hot pixels.
+      // Periods without any event say nothing about hot pixels.
       learning_end_ += (1 + (time - learning_end_) / period_) * period_;
       end = learning_end_;
     }

@@ -59,7 +59,7 @@ class Neighbours {
 };
 
 /// Decides on a batch: an event is kept if the sum of value(left) is at least `needed`. `left` is
-/// the rest of the correlation time, negative once it has passed.
+/// the remaining correlation time, negative once it has passed.
 template <int radius, class Value>
 HWY_INLINE void find_support(const StampedBatch<Stamp>& batch, Stamp correlation_time,
                              std::uint32_t needed, const Value& value) {

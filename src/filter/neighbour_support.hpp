@@ -17,7 +17,7 @@ void find_neighbour_support(const StampedBatch<Stamp>& batch, Stamp correlation_
 
 inline constexpr int kernel_radius = 2;
 
-/// Keeps an event if the rests of the correlation time of 24 neighbours sum to at least `needed`;
+/// Keeps an event if the remaining correlation times of 24 neighbours add up to at least `needed`;
 /// the sum must fit into 31 bits. Cells need a margin of kernel_radius.
 void find_kernel_support(const StampedBatch<Stamp>& batch, Stamp correlation_time,
                          std::uint32_t needed);

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 
 namespace eventcamera {
 

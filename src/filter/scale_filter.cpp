@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "src/filter/prefetched.hpp"
+#include "src/filter/filter.hpp"
 
 namespace eventcamera {
 

@@ -12,7 +12,7 @@
 #include "src/core/image.hpp"
 #include "src/core/label.hpp"
 #include "src/core/sensor_size.hpp"
-#include "src/filter/prefetched.hpp"
+#include "src/filter/filter.hpp"
 
 namespace eventcamera {
 

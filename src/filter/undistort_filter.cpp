@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "src/filter/prefetched.hpp"
+#include "src/filter/filter.hpp"
 
 namespace eventcamera {
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "src/formats/unsupported_format.hpp"
+#include "src/formats/corruption.hpp"
 
 namespace eventcamera {
 
@@ -80,7 +80,7 @@ class CollectedBytes {
   }
 
   /// Returns the whole file, and starts another.
-  std::unique_ptr<ByteSource> take() {
+  std::unique_ptr<ByteSource> finish() {
     return std::make_unique<MemoryBytes>(std::exchange(bytes_, {}));
   }
 

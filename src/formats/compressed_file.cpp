@@ -10,7 +10,7 @@
 #include <new>
 #include <utility>
 
-#include "src/formats/unsupported_format.hpp"
+#include "src/formats/corruption.hpp"
 
 namespace eventcamera {
 

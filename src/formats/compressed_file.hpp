@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "src/formats/byte_source.hpp"
-#include "src/formats/expansion_limit.hpp"
+#include "src/formats/compression/compressed_frames.hpp"
 #include "src/formats/temporary_file.hpp"
 
 namespace eventcamera {

@@ -2,9 +2,17 @@
 #pragma once
 
 #include <cstdint>
+#include <stdexcept>
 #include <string>
 
 namespace eventcamera {
+
+/// Thrown if the bytes are not of this format, or of an unsupported version or codec. what() is a
+/// message for users.
+class UnsupportedFormat : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 /// Corruption found so far. A decoder skips it and continues at the next valid place.
 struct Corruption {

@@ -15,7 +15,6 @@
 #include "src/core/sensor_size.hpp"
 #include "src/formats/byte_source.hpp"
 #include "src/formats/corruption.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 // Guide to this folder: from the bytes of a file to intervals of events, and back.
 //

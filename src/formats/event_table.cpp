@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "src/formats/unsupported_format.hpp"
+#include "src/formats/corruption.hpp"
 
 namespace eventcamera {
 

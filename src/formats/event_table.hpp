@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "src/core/label.hpp"
-#include "src/core/max_side.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/formats/corruption.hpp"
 
@@ -137,13 +136,13 @@ class RowValidator {
         size.height > 0 ? static_cast<std::uint64_t>(std::min(size.height, max_side)) : max_side;
   }
 
-  void take(Microseconds t, std::int64_t x, std::int64_t y, bool on,
-            std::vector<AbsoluteEvent>& out, Corruption& corruption) {
-    take(t, x, y, on, {}, out, corruption);
+  void append(Microseconds t, std::int64_t x, std::int64_t y, bool on,
+              std::vector<AbsoluteEvent>& out, Corruption& corruption) {
+    append(t, x, y, on, {}, out, corruption);
   }
 
-  void take(Microseconds t, std::int64_t x, std::int64_t y, bool on, const Label& label,
-            std::vector<AbsoluteEvent>& out, Corruption& corruption) {
+  void append(Microseconds t, std::int64_t x, std::int64_t y, bool on, const Label& label,
+              std::vector<AbsoluteEvent>& out, Corruption& corruption) {
     if (static_cast<std::uint64_t>(x) >= x_end_ || static_cast<std::uint64_t>(y) >= y_end_) {
       ++corruption.outside;
       return;

@@ -6,11 +6,11 @@
 
 #include "src/core/byte_order.hpp"
 #include "src/formats/atis/atis_bin.hpp"
+#include "src/formats/corruption.hpp"
 #include "src/formats/magic.hpp"
 #include "src/formats/prophesee_header.hpp"
 #include "src/formats/text/csv_decoder.hpp"
 #include "src/formats/text/utf8_text.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 namespace {
@@ -119,7 +119,7 @@ Likelihood match_csv(Bytes bytes) {
     decoder.decode({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, decoded);
     decoder.finish(decoded);
   } catch (const UnsupportedFormat&) {
-    // The reader says what is wrong.
+    // The reader reports the error.
     return decoder.has_names() ? Likelihood::certain : Likelihood::none;
   }
   const auto events = decoded.events.size() + decoder.corruption().outside;

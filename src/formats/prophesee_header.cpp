@@ -5,7 +5,7 @@
 #include <charconv>
 #include <string_view>
 
-#include "src/formats/unsupported_format.hpp"
+#include "src/formats/corruption.hpp"
 
 namespace eventcamera {
 namespace {

@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "src/formats/unsupported_format.hpp"
+#include "src/formats/corruption.hpp"
 
 namespace eventcamera {
 

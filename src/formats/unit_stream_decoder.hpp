@@ -14,7 +14,6 @@
 #include "src/core/sensor_size.hpp"
 #include "src/formats/corruption.hpp"
 #include "src/formats/decoder.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 

@@ -36,7 +36,7 @@ class CauseCounts {
   std::array<std::uint64_t, causes.size()> counts_{};
 };
 
-/// How well a filter tells light from noise: light that it keeps is a true positive.
+/// How well a filter separates light from noise: light that it keeps is a true positive.
 struct Classification {
   std::uint64_t true_positives = 0;
   std::uint64_t false_positives = 0;

@@ -24,10 +24,10 @@ EventMatcher::EventMatcher(int width, int height) {
 void EventMatcher::Stream::count(Microseconds distance) {
   ++events;
   distances += static_cast<std::uint64_t>(max_distance);
-  approach(distance, no_match);
+  reduce_distance(distance, no_match);
 }
 
-void EventMatcher::Stream::approach(Microseconds distance, Microseconds known_distance) {
+void EventMatcher::Stream::reduce_distance(Microseconds distance, Microseconds known_distance) {
   for (std::size_t i = 0; i < match_distances.size(); ++i)
     if (distance <= match_distances[i] && known_distance > match_distances[i]) ++matched[i];
   distances -= static_cast<std::uint64_t>(std::min(known_distance, max_distance) -
@@ -38,7 +38,7 @@ void EventMatcher::match_waiting(Stream& stream, Pixel& pixel, Microseconds time
   for (Number number = pixel.waiting; number >= stream.first;) {
     const auto& waiting = stream.waiting[number - stream.first];
     const auto distance = time - waiting.time;
-    if (distance < waiting.nearest) stream.approach(distance, waiting.nearest);
+    if (distance < waiting.nearest) stream.reduce_distance(distance, waiting.nearest);
     number = waiting.before;
   }
   pixel.waiting = 0;

@@ -8,7 +8,7 @@
 
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
-#include "src/measure/last_time.hpp"
+#include "src/measure/event_statistics.hpp"
 #include "src/measure/stream_role.hpp"
 
 namespace eventcamera {
@@ -66,7 +66,7 @@ class EventMatcher {
     std::uint64_t distances = 0;  ///< sum over all events, microseconds
 
     void count(Microseconds distance);
-    void approach(Microseconds distance, Microseconds known_distance);
+    void reduce_distance(Microseconds distance, Microseconds known_distance);
   };
 
   static void match_waiting(Stream& stream, Pixel& pixel, Microseconds time);

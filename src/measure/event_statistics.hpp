@@ -10,9 +10,27 @@
 
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
-#include "src/measure/last_time.hpp"
 
 namespace eventcamera {
+
+/// Time of the last event of a pixel, or none, which is before all others. None is all zeros, so
+/// that memory for pixels without events need not be written.
+class LastTime {
+ public:
+  constexpr LastTime() = default;
+  constexpr LastTime(Microseconds t) : bits_(static_cast<std::uint64_t>(t) ^ sign) {}
+
+  constexpr bool is_known() const { return bits_ != 0; }
+  constexpr Microseconds value() const { return static_cast<Microseconds>(bits_ ^ sign); }
+
+  friend constexpr bool operator==(LastTime a, LastTime b) { return a.bits_ == b.bits_; }
+  friend constexpr bool operator<(LastTime a, LastTime b) { return a.bits_ < b.bits_; }
+
+ private:
+  static constexpr std::uint64_t sign = std::uint64_t{1} << 63;
+
+  std::uint64_t bits_ = 0;
+};
 
 /// Number of events per pixel.
 using EventMap = Image<std::uint32_t>;
@@ -81,9 +99,9 @@ class LastTimes {
   /// Throws std::bad_alloc.
   LastTimes(int width, int height) : last_(width, height) {}
 
-  /// Takes an event, which must lie inside the sensor and not be earlier than the last one. Returns
-  /// the time since the last event of its pixel, if any.
-  std::optional<Microseconds> take(const AbsoluteEvent& event) {
+  /// Records an event, which must lie inside the sensor and not be earlier than the last one.
+  /// Returns the time since the last event of its pixel, if any.
+  std::optional<Microseconds> update(const AbsoluteEvent& event) {
     const auto last = std::exchange(last_.at(event.x, event.y()), event.t);
     return last.is_known() ? std::optional(event.t - last.value()) : std::nullopt;
   }

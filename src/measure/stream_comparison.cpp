@@ -22,7 +22,7 @@ StreamSimilarity::StreamSimilarity(int width, int height)
       matcher_(width, height) {}
 
 void StreamSimilarity::add(StreamRole role, const AbsoluteEvent& event) {
-  statistics_[role].add(event, last_times_[role].take(event));
+  statistics_[role].add(event, last_times_[role].update(event));
   rates_.add(role, event.t);
   matcher_.add(role, event);
 }
@@ -90,7 +90,7 @@ InvalidEvents StreamComparison::add(StreamRole role, std::span<const Event> even
     arriving.end = start;
   }
   arriving.is_labelled |= !labels.empty();
-  const auto skipped = arriving.validator.take(
+  const auto skipped = arriving.validator.for_each_valid(
       events, base, end / 1000 - base,
       [&](const AbsoluteEvent& event) { arriving.waiting.push_back(event); }, labels);
   arriving.end = std::max(arriving.end, end);

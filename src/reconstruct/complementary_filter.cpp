@@ -44,7 +44,7 @@ ComplementaryFilter::ComplementaryFilter(const ImageView<std::uint8_t>& frame, M
       differences_(frame.width, frame.height) {
   configure(settings);
   set_frame(frame, t);
-  differences_ = Image<float>(frame.width, frame.height);
+  for (int y = 0; y < frame.height; ++y) std::fill_n(differences_.row(y), frame.width, 0.0F);
 }
 
 void ComplementaryFilter::configure(const Settings& settings) {
@@ -70,7 +70,7 @@ void ComplementaryFilter::decay_to(Microseconds t) {
 
 InvalidEvents ComplementaryFilter::add(std::span<const Event> events, Microseconds start,
                                        Microseconds max_t) {
-  return validator_.take(events, start, max_t, [this](const AbsoluteEvent& event) {
+  return validator_.for_each_valid(events, start, max_t, [this](const AbsoluteEvent& event) {
     if (event.t != last_) {
       if (exponent(event.t) > max_exponent) decay_to(event.t);
       last_ = event.t;

@@ -41,12 +41,12 @@ class Reconstruction {
   /// processor the result has the same bits.
   void finish_picture();
 
-  /// Passes the brightness of the pixels of a row to `take`: 0 for the mean, and from -1 to 1 for
+  /// Passes the brightness of the pixels of a row to `use`: 0 for the mean, and from -1 to 1 for
   /// `range` times the contrast.
-  template <class Take>
-  void read_row(int y, const Take& take) const {
+  template <class Use>
+  void read_row(int y, const Use& use) const {
     const float* const row = picture_.row(y);
-    for (int x = 0; x < picture_.width(); ++x) take(x, row[x] * scale_);
+    for (int x = 0; x < picture_.width(); ++x) use(x, row[x] * scale_);
   }
 
  private:

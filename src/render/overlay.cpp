@@ -27,8 +27,8 @@ Overlay::Overlay(SensorSize sensor, SensorSize picture)
       kinds_(picture.width, picture.height) {}
 
 InvalidEvents Overlay::add(std::span<const Event> events, Microseconds start, Microseconds max_t) {
-  return validator_.take(events, start, max_t,
-                         [this](const AbsoluteEvent& event) { window_.add(event); });
+  return validator_.for_each_valid(events, start, max_t,
+                                   [this](const AbsoluteEvent& event) { window_.add(event); });
 }
 
 void Overlay::mark(int x, int y, std::uint8_t kind) {

@@ -83,7 +83,7 @@ void Renderer::reset() {
 InvalidEvents Renderer::add(std::span<const Event> events, Microseconds start, Microseconds max_t) {
   return std::visit(
       [&](auto& memory) {
-        return validator_.take(events, start, max_t, [&](const AbsoluteEvent& event) {
+        return validator_.for_each_valid(events, start, max_t, [&](const AbsoluteEvent& event) {
           memory.add(reduction_ == 1
                          ? event
                          : AbsoluteEvent::at(event.x / reduction_, event.y() / reduction_, event.t,
@@ -94,15 +94,13 @@ InvalidEvents Renderer::add(std::span<const Event> events, Microseconds start, M
 }
 
 void Renderer::shade_row(int y, Microseconds time) {
-  const auto take = [this](int x, float value) {
-    row_[static_cast<std::size_t>(x)] = shade(value);
-  };
+  const auto use = [this](int x, float value) { row_[static_cast<std::size_t>(x)] = shade(value); };
   if (const auto* sums = std::get_if<DecayingSums>(&memory_)) {
-    sums->read_row(y, time, take);
+    sums->read_row(y, time, use);
   } else if (const auto* surface = std::get_if<TimeSurface>(&memory_)) {
-    surface->read_row(y, time, take);
+    surface->read_row(y, time, use);
   } else if (const auto* reconstruction = std::get_if<Reconstruction>(&memory_)) {
-    reconstruction->read_row(y, take);
+    reconstruction->read_row(y, use);
   } else {
     const auto* counts = std::get<EventWindow>(memory_).row(y);
     if (settings_.mode == RenderMode::accumulate) {
@@ -111,7 +109,7 @@ void Renderer::shade_row(int y, Microseconds time) {
     }
     const float scale = 1 / settings_.full_scale;
     for (int x = 0; x < width_; ++x)
-      take(x, (static_cast<float>(counts[x].on) - static_cast<float>(counts[x].off)) * scale);
+      use(x, (static_cast<float>(counts[x].on) - static_cast<float>(counts[x].off)) * scale);
   }
 }
 

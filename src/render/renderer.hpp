@@ -62,13 +62,13 @@ class DecayingSums {
     sum.time = event.t;
   }
 
-  /// Passes the sums of a row to `take`, as fractions of the maximum. `time` must not be before any
+  /// Passes the sums of a row to `use`, as fractions of the maximum. `time` must not be before any
   /// event.
-  template <class Take>
-  void read_row(int y, Microseconds time, const Take& take) const {
+  template <class Use>
+  void read_row(int y, Microseconds time, const Use& use) const {
     const auto* row = sums_.row(y);
     for (int x = 0; x < sums_.width(); ++x)
-      take(x, row[x].value == 0 ? 0 : row[x].value * exponential_.after(time - row[x].time) / max_);
+      use(x, row[x].value == 0 ? 0 : row[x].value * exponential_.after(time - row[x].time) / max_);
   }
 
  private:
@@ -94,15 +94,15 @@ class TimeSurface {
     last_.at(event.x, event.y()) = {event.t, event.polarity() == Polarity::on ? 1.0F : -1.0F};
   }
 
-  /// Passes a value per pixel of a row to `take`: from 1 for an event at `time` down to 0 at
+  /// Passes a value per pixel of a row to `use`: from 1 for an event at `time` down to 0 at
   /// `max_age`; negative if the last event is OFF. `time` must not be before any event.
-  template <class Take>
-  void read_row(int y, Microseconds time, const Take& take) const {
+  template <class Use>
+  void read_row(int y, Microseconds time, const Use& use) const {
     const auto* row = last_.row(y);
     const float scale = 1 / static_cast<float>(max_age_);
     for (int x = 0; x < last_.width(); ++x) {
       const Microseconds left = max_age_ - (time - row[x].time);
-      take(x, left > 0 ? row[x].sign * static_cast<float>(left) * scale : 0);
+      use(x, left > 0 ? row[x].sign * static_cast<float>(left) * scale : 0);
     }
   }
 

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "src/core/image.hpp"
+
 namespace eventcamera {
 
 /// 24-bit RGB image, initially black.
@@ -36,5 +38,13 @@ class RgbPicture {
   int height_;
   std::vector<std::uint8_t> pixels_;
 };
+
+/// Draws the event count per pixel, from black (none) to light yellow (99.5 % quantile of the
+/// pixels with events), and below it a bar of these colours with that count. Throws std::bad_alloc.
+RgbPicture draw_map(const Image<std::uint32_t>& map);
+
+/// Draws the reference, the candidate and their difference side by side, on the same scale, with
+/// bars: blue if the candidate has more events, red if it has fewer. Throws std::bad_alloc.
+RgbPicture draw_maps(const Image<std::uint32_t>& reference, const Image<std::uint32_t>& candidate);
 
 }  // namespace eventcamera

@@ -11,18 +11,18 @@ namespace {
 /// Share of the pixels that shows a scene: outlines of what moves.
 constexpr double enough_pixels = 0.08;
 
-/// Side of a picture of the sensor whose longer side is scaled down to `max_side`.
-int scaled(int side, SensorSize sensor, int max_side) {
+/// Side of a picture of the sensor whose longer side is scaled down to `max_size`.
+int scaled(int side, SensorSize sensor, int max_size) {
   const int longer = std::max(sensor.width, sensor.height);
-  if (longer <= max_side) return side;
-  return std::max(1, static_cast<int>((std::int64_t{side} * max_side + longer / 2) / longer));
+  if (longer <= max_size) return side;
+  return std::max(1, static_cast<int>((std::int64_t{side} * max_size + longer / 2) / longer));
 }
 
 }  // namespace
 
-Thumbnail::Thumbnail(SensorSize sensor, int max_side)
+Thumbnail::Thumbnail(SensorSize sensor, int max_size)
     : sensor_(sensor),
-      kinds_(scaled(sensor.width, sensor, max_side), scaled(sensor.height, sensor, max_side)),
+      kinds_(scaled(sensor.width, sensor, max_size), scaled(sensor.height, sensor, max_size)),
       enough_(static_cast<std::size_t>(enough_pixels * kinds_.width() * kinds_.height()) + 1) {}
 
 void Thumbnail::add(std::span<const Event> events, Microseconds start) {

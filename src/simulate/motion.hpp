@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 
 namespace eventcamera {

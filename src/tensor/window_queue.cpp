@@ -44,8 +44,8 @@ WindowQueue::Added WindowQueue::add(std::span<const Event> events, Microseconds 
   // In a local, because the events written might alias members.
   auto validator = validator_;
   const Microseconds max_t = end / microsecond - base;
-  added.invalid =
-      validator.take(fitting, base, max_t, [&](const AbsoluteEvent& event) { *out++ = event; });
+  added.invalid = validator.for_each_valid(fitting, base, max_t,
+                                           [&](const AbsoluteEvent& event) { *out++ = event; });
   validator_ = validator;
   events_.erase(out, events_.end());
 

@@ -20,7 +20,7 @@ class SequenceTracker {
     std::uint32_t lost = 0;  ///< numbers missing before this one
   };
 
-  Result take(std::uint32_t number) {
+  Result update(std::uint32_t number) {
     number &= mask;
     const auto ahead = (number - next_.value_or(number)) & mask;
     if (ahead <= max_lost) return accept(number, Verdict::next, ahead);
@@ -73,7 +73,7 @@ class UnpackerOf final : public DatagramUnpacker {
 
     Reception reception;
     if (reading.sequence_number) {
-      const auto [verdict, lost] = sequence_.take(*reading.sequence_number);
+      const auto [verdict, lost] = sequence_.update(*reading.sequence_number);
       if (verdict == SequenceTracker::Verdict::stray)
         return {.fault = "its sequence number does not continue the stream"};
       if (verdict == SequenceTracker::Verdict::late) return {.late = true};

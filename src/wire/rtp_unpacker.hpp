@@ -120,10 +120,10 @@ class RtpUnpacker {
   /// Changes the sensor or format; call flush() first.
   void change(SensorSize sensor, RtpEventFormat format);
 
-  /// Appends a packet, unless it is invalid or late. Calls take(RtpInterval) for each interval that
-  /// ends with this packet or ended before it. The events are valid during the call only.
-  template <class Take>
-  void push(const RtpPacket& packet, const Take& take) {
+  /// Appends a packet, unless it is invalid or late. Calls receive(RtpInterval) for each interval
+  /// that ends with this packet or ended before it. The events are valid during the call only.
+  template <class Receive>
+  void push(const RtpPacket& packet, const Receive& receive) {
     const auto header = decode(packet);
     if (!header) {
       ++statistics_.rejected_packets;
@@ -131,18 +131,18 @@ class RtpUnpacker {
       sender_.drop_late(packet);
       ++statistics_.late_packets;
     } else {
-      if (!is_of_interval(packet, *header)) flush(take);
+      if (!is_of_interval(packet, *header)) flush(receive);
       add(packet, *header);
-      if (packet.marker) flush(take);
+      if (packet.marker) flush(receive);
     }
   }
 
   /// Ends the current interval, if any.
-  template <class Take>
-  void flush(const Take& take) {
+  template <class Receive>
+  void flush(const Receive& receive) {
     if (!interval_) return;
-    take(RtpInterval{interval_->start, interval_->duration, std::span(events_).first(event_count_),
-                     arrival_, is_discontinuous_});
+    receive(RtpInterval{interval_->start, interval_->duration,
+                        std::span(events_).first(event_count_), arrival_, is_discontinuous_});
     close_interval();
   }
 

@@ -160,10 +160,10 @@ TEST(AedatMux, LeavesOutWhatDoesNotFit) {
   EXPECT_EQ(mux.push(2 * GST_SECOND, {{0, 1, 1}}), GST_FLOW_OK);
   EXPECT_EQ(mux.end().events, (Events{AbsoluteEvent::at(6, 7, 1'000'005, Polarity::off),
                                       AbsoluteEvent::at(1, 1, 2'000'000, Polarity::off)}));
-  for (const char* left_out :
+  for (const char* dropped :
        {"a buffer without a timestamp", "2 events earlier than", "2 events outside"}) {
     const auto warning = mux.warning();
-    EXPECT_TRUE(warning.starts_with(std::string("Left out ") + left_out)) << warning;
+    EXPECT_TRUE(warning.starts_with(std::string("Dropped ") + dropped)) << warning;
   }
   EXPECT_EQ(mux.warning(), "");
 }

@@ -101,10 +101,10 @@ struct Writer : Harness {
     while (const auto buffer = pull()) bytes += harness::bytes_of(buffer.get());
     return bytes;
   }
-  /// The next warning of what is left out, or empty.
-  std::string left_out() {
+  /// The next warning of dropped events, or empty.
+  std::string dropped() {
     auto text = warning();
-    while (!text.empty() && !text.starts_with("Left out ")) text = warning();
+    while (!text.empty() && !text.starts_with("Dropped ")) text = warning();
     return text;
   }
 

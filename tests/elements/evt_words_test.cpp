@@ -266,7 +266,7 @@ TEST(EvtEnc, DoesNotCollectTriggersWithoutEvents) {
   writer.write(AbsoluteEvent::at(1, 2, 1'000'000, Polarity::on), 1'000'000);  // too late
   const auto event = AbsoluteEvent::at(1, 2, 3'000'000, Polarity::on);
   writer.write(event, 3'000'000);
-  EXPECT_TRUE(writer.left_out().starts_with("Left out 1 event earlier "));
+  EXPECT_TRUE(writer.dropped().starts_with("Dropped 1 event earlier "));
   bytes += writer.end();
   const auto decoder = eventcamera::make_prophesee_raw_decoder();
   eventcamera::Decoded decoded;

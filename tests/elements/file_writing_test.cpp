@@ -23,10 +23,10 @@ TEST_P(EveryFormat, IsWrittenWithoutWhatLiesOutsideTheSensor) {
   gst_harness_push_event(h.get(), gst_event_new_gap(10 * GST_MSECOND, 10 * GST_MSECOND));
   EXPECT_TRUE(h.pull_event(GST_EVENT_GAP));
   EXPECT_TRUE(
-      h.warning().starts_with("Left out 2 events outside the sensor. Correct the size in the "
+      h.warning().starts_with("Dropped 2 events outside the sensor. Correct the size in the "
                               "caps, 320 x 240 pixels"));
   EXPECT_EQ(events_in(format(), h.end()), (std::vector{events[0], events[3]}));
-  EXPECT_EQ(h.left_out(), "");
+  EXPECT_EQ(h.dropped(), "");
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
 }
 
@@ -66,14 +66,14 @@ TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
   for (int times = 0; times < 3; ++times) push({1000, 2000});
   EXPECT_EQ(h.warning(), "");
   push({2000, 4000, 5000});
-  EXPECT_TRUE(h.warning().starts_with("Left out 7 events earlier than"));
+  EXPECT_TRUE(h.warning().starts_with("Dropped 7 events earlier than"));
   // Further dropped events are reported once, at the end.
   push({1000, 2000, 4999});
   push({6000});
   EXPECT_EQ(h.warning(), "");
   std::vector<Microseconds> written;
   for (const auto& event : events_in(format(), h.end())) written.push_back(event.t);
-  EXPECT_TRUE(h.warning().starts_with("Left out 10 events in total earlier"));
+  EXPECT_TRUE(h.warning().starts_with("Dropped 10 events in total earlier"));
   EXPECT_EQ(written, (std::vector<Microseconds>{3000, 4000, 5000, 6000}));
 }
 
@@ -115,7 +115,7 @@ TEST_P(EveryFormat, TellsOfEventsLeftOutWhereItIsStopped) {
   h.write(AbsoluteEvent::at(5, 5, 10, Polarity::on), 0);
   EXPECT_EQ(h.warning(), "");
   gst_element_set_state(h.element(), GST_STATE_READY);
-  EXPECT_TRUE(h.warning().starts_with("Left out 1 event earlier"));
+  EXPECT_TRUE(h.warning().starts_with("Dropped 1 event earlier"));
 }
 
 TEST(EventNpzEnc, TellsOfEventsThatAreLostWithoutTheEnd) {
@@ -144,7 +144,7 @@ TEST_P(EveryFormat, IsWrittenAnewAfterAFlush) {
   }
   h.write(early, 0);
   EXPECT_EQ(events_in(format(), h.end()), std::vector{early});
-  EXPECT_EQ(h.left_out(), "");
+  EXPECT_EQ(h.dropped(), "");
 }
 
 TEST_P(EveryFormat, IsOfOneSize) {
@@ -172,10 +172,10 @@ TEST_P(EveryFormat, HoldsALongPauseOrTellsThatItIsLeftOut) {
   const auto read = events_in(format(), h.end());
   if (format().name != "dat") {
     EXPECT_EQ(read, events);
-    EXPECT_EQ(h.left_out(), "");
+    EXPECT_EQ(h.dropped(), "");
     return;
   }
-  EXPECT_TRUE(h.warning().starts_with("Left out a pause of 4319 s"));
+  EXPECT_TRUE(h.warning().starts_with("Removed a pause of 4319 s"));
   ASSERT_EQ(read.size(), 3U);
   EXPECT_EQ(read[2].t, 1001);
 }
@@ -187,8 +187,8 @@ TEST(EventDatEnc, TellsOfAllPausesThatAreLeftOut) {
     h.write(AbsoluteEvent::at(5, 5, t, Polarity::on), t);
   }
   h.end();
-  EXPECT_TRUE(h.warning().starts_with("Left out a pause of 7200 s"));
-  EXPECT_TRUE(h.warning().starts_with("Left out pauses of 25200 s in total"));
+  EXPECT_TRUE(h.warning().starts_with("Removed a pause of 7200 s"));
+  EXPECT_TRUE(h.warning().starts_with("Removed pauses of 25200 s in total"));
   EXPECT_EQ(h.warning(), "");
 }
 

@@ -201,12 +201,12 @@ TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
                          AbsoluteEvent::at(5, height, 1002, Polarity::on),
                          AbsoluteEvent::at(6, 6, 1003, Polarity::off)};
   EXPECT_EQ(sink.push(events, 0), GST_FLOW_OK);
-  EXPECT_TRUE(sink.warning().starts_with("Left out 2 events outside"));
+  EXPECT_TRUE(sink.warning().starts_with("Dropped 2 events outside"));
   // Time goes backwards.
   EXPECT_EQ(sink.push({events[0]}, 0), GST_FLOW_OK);
   EXPECT_EQ(sink.warning(), "");
   sink.end();
-  EXPECT_TRUE(sink.warning().starts_with("Left out 1 event earlier"));
+  EXPECT_TRUE(sink.warning().starts_with("Dropped 1 event earlier"));
   EXPECT_EQ(sink.warning(), "");
   EXPECT_EQ(sink.error(), "");
   EXPECT_TRUE(read(path) == (Events{events[0], events[3]}));

@@ -5,12 +5,12 @@
 #include <stdexcept>
 
 #include "src/filter/denoise_filter.hpp"
+#include "src/filter/filter.hpp"
 #include "src/filter/flicker_filter.hpp"
 #include "src/filter/hot_pixel_filter.hpp"
 #include "src/filter/rate_filter.hpp"
 #include "src/filter/refractory_filter.hpp"
 #include "src/filter/trail_filter.hpp"
-#include "src/filter/valid_events.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/filter/streams.hpp"
 #include "tests/reference/filters.hpp"

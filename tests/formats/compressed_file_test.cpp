@@ -8,7 +8,7 @@
 #include <random>
 #include <utility>
 
-#include "src/formats/unsupported_format.hpp"
+#include "src/formats/corruption.hpp"
 #include "tests/formats/compressed.hpp"
 #include "tests/formats/pieces.hpp"
 

@@ -6,7 +6,6 @@
 
 #include "src/formats/text/csv_decoder.hpp"
 #include "src/formats/text/csv_encoder.hpp"
-#include "src/formats/text/decimal.hpp"
 #include "tests/formats/table_events.hpp"
 
 namespace {

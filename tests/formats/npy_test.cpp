@@ -3,7 +3,7 @@
 #include <cstring>
 #include <memory>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/numpy/npy_header.hpp"

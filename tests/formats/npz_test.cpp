@@ -7,10 +7,8 @@
 #include <filesystem>
 #include <map>
 
-#include "src/formats/numpy/npz_decoder.hpp"
-#include "src/formats/numpy/npz_encoder.hpp"
+#include "src/formats/numpy/npz.hpp"
 #include "src/formats/numpy/zip_archive.hpp"
-#include "src/formats/numpy/zip_writer.hpp"
 #include "src/formats/temporary_file.hpp"
 #include "tests/formats/npz_file.hpp"
 #include "tests/formats/table_events.hpp"

@@ -11,7 +11,6 @@
 #include <string>
 #include <tuple>
 
-#include "src/formats/aedat/aedat4_compression.hpp"
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
 #include "src/formats/aedat/aedat4_table.hpp"

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "src/core/sensor_size.hpp"
+#include "src/formats/corruption.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 namespace recordings {
 

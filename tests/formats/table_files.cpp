@@ -12,8 +12,7 @@
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
-#include "src/formats/numpy/npz_decoder.hpp"
-#include "src/formats/numpy/npz_encoder.hpp"
+#include "src/formats/numpy/npz.hpp"
 #include "src/formats/text/csv_decoder.hpp"
 #include "src/formats/text/csv_encoder.hpp"
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "src/core/sensor_size.hpp"
+#include "src/formats/corruption.hpp"
 #include "src/formats/decoder.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 /// Invariants of every decoder for arbitrary bytes.
 namespace fuzz {

@@ -9,7 +9,7 @@
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_handle.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
-#include "src/formats/numpy/npz_encoder.hpp"
+#include "src/formats/numpy/npz.hpp"
 #include "src/formats/text/csv_encoder.hpp"
 #include "tests/formats/npz_file.hpp"
 #include "tests/fuzz/seed.hpp"

@@ -13,7 +13,7 @@
 
 #include "src/measure/event_statistics.hpp"
 #include "src/measure/stream_comparison.hpp"
-#include "src/render/map_picture.hpp"
+#include "src/render/rgb_picture.hpp"
 
 namespace {
 
@@ -224,13 +224,13 @@ TEST(IntervalHistogram, IsExactBelow64AndToAThirtySecondBeyond) {
 TEST(LastTimes, AreForgotten) {
   LastTimes times(3, 2);
   const auto interval_at = [&times](Microseconds t) {
-    return times.take(AbsoluteEvent::at(2, 1, t, Polarity::on));
+    return times.update(AbsoluteEvent::at(2, 1, t, Polarity::on));
   };
   EXPECT_EQ(interval_at(-5), std::nullopt);
   EXPECT_EQ(interval_at(0), 5);
   EXPECT_EQ(interval_at(0), 0);
   EXPECT_EQ(interval_at(30), 30);
-  EXPECT_EQ(times.take(AbsoluteEvent::at(1, 1, 40, Polarity::on)), std::nullopt);
+  EXPECT_EQ(times.update(AbsoluteEvent::at(1, 1, 40, Polarity::on)), std::nullopt);
   times.forget();
   EXPECT_EQ(interval_at(20), std::nullopt);
 }

@@ -202,7 +202,7 @@ for bag in evt3.mcap:x-mcap evt3.bag:x-rosbag evt3.db3:x-rosbag2-db3; do
   file=${bag%:*}
   gst-typefind-1.0 "$file" | grep -q " - application/${bag#*:}" || fail "$file is not recognised"
   convert "$file" "$file.aedat4" 2>left-out
-  if grep "left out" left-out; then fail "frames of $file are left out"; fi
+  if grep "dropped" left-out; then fail "frames of $file are dropped"; fi
   grep -q "$file: note: The file also has topics /second/events" left-out || fail "nobody tells of /second/events in $file"
   convert "$file.aedat4" "$file.csv"
   cmp evt3.mcap.csv "$file.csv" || fail "$file has other events"
@@ -222,7 +222,7 @@ for bag in late-*.bag late-*.mcap late-*.db3; do
   convert "$bag" apart.aedat4 2>left-out
   if grep . left-out; then fail "$bag is not converted whole"; fi
   convert apart.aedat4 apart.csv 2>left-out
-  grep -q ": left out: 24 frames$" left-out || fail "frames of $bag: $(cat left-out)"
+  grep -q ": dropped: 24 frames$" left-out || fail "frames of $bag: $(cat left-out)"
   name=${bag%%.*}
   cmp "${name%-no-index}.lines" apart.csv || fail "$bag has other events"
   convert --from=0.9 --to=1.1 "$bag" apart.csv
@@ -230,15 +230,15 @@ for bag in late-*.bag late-*.mcap late-*.db3; do
   rm "$bag"
 done
 
-# Frames come along where they can; what is left out is said.
+# Frames come along where they can; what is dropped is said.
 timeout 600 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=framed.aedat4
 convert framed.aedat4 framed.csv 2>left-out
-grep -q ": left out: 40 frames$" left-out || fail "frames are left out: $(cat left-out)"
+grep -q ": dropped: 40 frames$" left-out || fail "frames are dropped: $(cat left-out)"
 timeout 600 "$GST_LAUNCH" -m filesrc location=framed.aedat4 ! decodebin caps="application/x-event-camera,format=XYTP" expose-all-streams=false ! eventstats ! fakesink >messages
 grep -q "cumulative=(boolean)true" messages || fail "the events of framed.aedat4 were not counted"
 if grep missing-plugin messages; then fail "decoders for frames are missing"; fi
 convert framed.aedat4 again.aedat4 2>left-out
-if grep "left out" left-out; then fail "frames are left out of an AEDAT 4 file"; fi
+if grep "dropped" left-out; then fail "frames are dropped of an AEDAT 4 file"; fi
 for file in framed.aedat4 again.aedat4; do
   timeout 600 "$GST_LAUNCH" -q filesrc location=$file ! aedatdemux name=d  d.video_0 ! queue ! filesink location=$file.frames
 done
@@ -278,16 +278,16 @@ for ending in npz h5 csv; do
   format=()
   [ $ending = csv ] && format=(--format=labels)
   convert "${format[@]}" labelled.npz "labels.$ending" 2>left-out
-  if grep "left out" left-out; then fail "labels are left out of labels.$ending"; fi
+  if grep "dropped" left-out; then fail "labels are dropped of labels.$ending"; fi
 done
 timeout 60 "$GST_LAUNCH" -q filesrc location=labelled.npz ! eventnpzdec ! eventcrop left=50 right=170 top=60 bottom=100 ! eventcsvenc format=labels ! filesink location=region-labels.csv
 convert --format=labels --crop=100x80+50+60 labelled.npz cropped-labels.csv
 cmp region-labels.csv cropped-labels.csv || fail "labels of a region are lost"
 for ending in csv raw hdf5 aedat4; do
   convert --crop=100x80+50+60 labelled.npz "unlabelled.$ending" 2>left-out
-  grep -q "labelled.npz: left out: labels$" left-out || fail "nobody tells of labels of a region that unlabelled.$ending lacks"
+  grep -q "labelled.npz: dropped: labels$" left-out || fail "nobody tells of labels of a region that unlabelled.$ending lacks"
   convert labelled.npz "unlabelled.$ending" 2>left-out
-  grep -q "labelled.npz: left out: labels$" left-out || fail "nobody tells of labels that unlabelled.$ending lacks"
+  grep -q "labelled.npz: dropped: labels$" left-out || fail "nobody tells of labels that unlabelled.$ending lacks"
 done
 
 # Parts of a recording: from 0.5 s after its first event to before 1 s.
@@ -295,12 +295,12 @@ awk -F, 'NR == 2 { start = $1 } NR == 1 || ($1 >= start + 500000 && $1 < start +
 [ "$(wc -l <expected.csv)" -gt 10000 ] || fail "the part has $(wc -l <expected.csv) lines"
 for ending in "${written[@]}"; do
   convert --from=0.5 --to=1 "ball.$ending" "part.$ending" 2>left-out
-  if grep "left out" left-out; then fail "something of a part is left out"; fi
+  if grep "dropped" left-out; then fail "something of a part is dropped"; fi
   convert "part.$ending" part-back.csv
   cmp expected.csv part-back.csv || fail "a part of ball.$ending has other events"
 done
 convert --from=0.5 --to=1 framed.aedat4 part-framed.aedat4 2>left-out
-if grep "left out" left-out; then fail "frames of a part are left out"; fi
+if grep "dropped" left-out; then fail "frames of a part are dropped"; fi
 timeout 600 "$GST_LAUNCH" -q filesrc location=part-framed.aedat4 ! aedatdemux name=d  d.video_0 ! queue ! filesink location=part.frames
 [ "$(stat -c %s part.frames)" -eq $((12 * 320 * 240)) ] || fail "$(stat -c %s part.frames) bytes of 12 frames"
 
@@ -312,7 +312,7 @@ grep -aq "geometry 100x80" region.raw || fail "the size is not that of the regio
 convert region.raw region.csv
 cmp expected.csv region.csv || fail "region.raw has other events"
 convert --crop=100x80+50+60 framed.aedat4 region.aedat4 2>left-out
-grep -q ": left out: 40 frames$" left-out || fail "frames are cropped: $(cat left-out)"
+grep -q ": dropped: 40 frames$" left-out || fail "frames are cropped: $(cat left-out)"
 
 # A part without events is empty, with a warning.
 for part in --from=100 --crop=1x1+0+0; do
@@ -611,12 +611,12 @@ for ending in aedat4 h5 hdf5; do
 done
 davis=$recordings/davis346-frames-events-imu.aedat4
 counted 117667 "$davis" 2>left-out
-grep -q ": left out: 3 frames, 15 triggers, 130 IMU samples$" left-out || fail "the user is told: $(cat left-out)"
+grep -q ": dropped: 3 frames, 15 triggers, 130 IMU samples$" left-out || fail "the user is told: $(cat left-out)"
 
 # Triggers, frames and IMU samples come along where both formats have them.
 complete() { # IN OUT
   convert "$1" "$2" 2>left-out
-  if grep "left out" left-out; then fail "something of $1 is left out of $2"; fi
+  if grep "dropped" left-out; then fail "something of $1 is dropped of $2"; fi
 }
 complete "$recordings/evt3-640x480-triggers.raw" triggers.hdf5
 complete triggers.hdf5 triggers.raw
@@ -625,11 +625,11 @@ complete "$davis" davis.aedat4
 complete davis.aedat4 davis-again.aedat4
 cmp davis.aedat4 davis-again.aedat4 || fail "the copy of a copy is another file"
 convert "$davis" davis.raw 2>left-out
-grep -q ": left out: 3 frames, 130 IMU samples$" left-out || fail "the user is told: $(cat left-out)"
+grep -q ": dropped: 3 frames, 130 IMU samples$" left-out || fail "the user is told: $(cat left-out)"
 complete davis.raw davis-events.aedat4
 convert "$recordings/evt3-640x480-triggers.raw" triggers.h5 2>left-out
-grep -q ": left out: [0-9]* triggers$" left-out || fail "the user is told: $(cat left-out)"
-/usr/bin/python3 - triggers.hdf5 triggers-again.hdf5 "$(sed "s/.*left out: \\([0-9]*\\).*/\\1/" left-out)" <<'PYTHON'
+grep -q ": dropped: [0-9]* triggers$" left-out || fail "the user is told: $(cat left-out)"
+/usr/bin/python3 - triggers.hdf5 triggers-again.hdf5 "$(sed "s/.*dropped: \\([0-9]*\\).*/\\1/" left-out)" <<'PYTHON'
 import sys
 
 import h5py

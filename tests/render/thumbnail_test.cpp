@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/render/palette.hpp"
 #include "src/render/thumbnail.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <set>
 
-#include "src/wire/pending_interval.hpp"
+#include "src/wire/rtp_packer.hpp"
 #include "tests/wire/is_part.hpp"
 #include "tests/wire/rtp_packets.hpp"
 

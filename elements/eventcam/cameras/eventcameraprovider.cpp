@@ -42,7 +42,7 @@ class Device {
   Device& operator=(const Device&) = delete;
 
   template <class Argument>
-  bool ask(unsigned long request, Argument& argument) const {
+  bool query(unsigned long request, Argument& argument) const {
     return descriptor_ >= 0 && ioctl(descriptor_, request, &argument) >= 0;
   }
 
@@ -94,10 +94,10 @@ std::string value_of(const Device& device, const v4l2_query_ext_ctrl& control) {
   if (control.type == V4L2_CTRL_TYPE_MENU) {
     v4l2_control item{.id = control.id, .value = 0};
     v4l2_querymenu menu{};
-    if (!device.ask(VIDIOC_G_CTRL, item)) return {};
+    if (!device.query(VIDIOC_G_CTRL, item)) return {};
     menu.id = control.id;
     menu.index = static_cast<std::uint32_t>(item.value);
-    return device.ask(VIDIOC_QUERYMENU, menu) ? text_of(menu.name) : std::string();
+    return device.query(VIDIOC_QUERYMENU, menu) ? text_of(menu.name) : std::string();
   }
   if (control.type != V4L2_CTRL_TYPE_STRING || control.elem_size > max_text) return {};
   std::string text(max_text, '\0');
@@ -109,7 +109,7 @@ std::string value_of(const Device& device, const v4l2_query_ext_ctrl& control) {
   all.which = V4L2_CTRL_WHICH_CUR_VAL;
   all.count = 1;
   all.controls = &one;
-  if (!device.ask(VIDIOC_G_EXT_CTRLS, all)) return {};
+  if (!device.query(VIDIOC_G_EXT_CTRLS, all)) return {};
   return text.c_str();  // up to its zero
 }
 
@@ -117,7 +117,7 @@ std::string value_of(const Device& device, const v4l2_query_ext_ctrl& control) {
 std::string value_of(const Device& device, const char* name) {
   constexpr std::uint32_t next = V4L2_CTRL_FLAG_NEXT_CTRL;
   v4l2_query_ext_ctrl control{};
-  for (control.id = next; device.ask(VIDIOC_QUERY_EXT_CTRL, control); control.id |= next)
+  for (control.id = next; device.query(VIDIOC_QUERY_EXT_CTRL, control); control.id |= next)
     if (control_name(text_of(control.name)) == name) return value_of(device, control);
   return {};
 }
@@ -128,7 +128,7 @@ void find_sensor(const Device& media, dev_t video, VideoDevice& found) {
   bool is_of_video = false;
   std::optional<media_entity_desc> sensor;
   media_entity_desc entity{};
-  for (entity.id = MEDIA_ENT_ID_FLAG_NEXT; media.ask(MEDIA_IOC_ENUM_ENTITIES, entity);
+  for (entity.id = MEDIA_ENT_ID_FLAG_NEXT; media.query(MEDIA_IOC_ENUM_ENTITIES, entity);
        entity.id |= MEDIA_ENT_ID_FLAG_NEXT) {
     if (entity.type == MEDIA_ENT_F_CAM_SENSOR) sensor = entity;
     is_of_video |= makedev(entity.dev.major, entity.dev.minor) == video;
@@ -142,7 +142,7 @@ void find_sensor(const Device& media, dev_t video, VideoDevice& found) {
 
 std::optional<VideoDevice> described(const Device& video) {
   v4l2_capability capability{};
-  if (!video.ask(VIDIOC_QUERYCAP, capability)) return std::nullopt;
+  if (!video.query(VIDIOC_QUERYCAP, capability)) return std::nullopt;
   const auto capabilities = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0
                                 ? capability.device_caps
                                 : capability.capabilities;
@@ -153,7 +153,7 @@ std::optional<VideoDevice> described(const Device& video) {
     format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE;
   else
     return std::nullopt;
-  if (!video.ask(VIDIOC_G_FMT, format)) return std::nullopt;
+  if (!video.query(VIDIOC_G_FMT, format)) return std::nullopt;
   // The fields of both types begin alike.
   const auto& buffers = format.fmt.pix;
   return VideoDevice{

@@ -58,7 +58,6 @@
 #include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/guarded.hpp"
-#include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
@@ -175,7 +174,7 @@ class CameraSegment {
                                       : GST_CLOCK_TIME_NONE,
                               start);
     }
-    segment_.reach(end);
+    segment_.extend_to(end);
     return mapped;
   }
 
@@ -449,13 +448,13 @@ static GstFlowReturn handle_transfer(GstEvtParse* self, GstBuffer* buffer,
   return push_pieces(self);
 }
 
-static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
+static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   auto* self = GST_EVT_PARSE(parent);
-  const OwnedBuffer buffer(taken);
+  const OwnedBuffer buffer(received);
   if (!self->priv->stream->state && !start_stream(self)) return GST_FLOW_ERROR;
-  const MappedBytes bytes(GST_ELEMENT(self), OwnedBuffer(gst_buffer_ref(taken)));
+  const MappedBytes bytes(GST_ELEMENT(self), OwnedBuffer(gst_buffer_ref(received)));
   if (!bytes.is_mapped()) return GST_FLOW_ERROR;
-  return reported(self, [&] { return handle_transfer(self, taken, bytes.get()); });
+  return reported(self, [&] { return handle_transfer(self, received, bytes.get()); });
 }
 
 /// Pushes the last words before the stream ends or changes.
@@ -503,7 +502,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       gst_event_unref(event);
       return TRUE;
     case GST_EVENT_GAP:
-      gst_event_unref(event);  // the camera's words tell its times
+      gst_event_unref(event);  // the words of the camera have its times
       return TRUE;
     case GST_EVENT_EOS:
       end_stream(self);

@@ -54,9 +54,9 @@ void EventPictures::drop_buffer() {
   gst_aggregator_pad_drop_buffer(main_pad());
 }
 
-/// Advances to the time of a buffer. Returns true if a picture is due before the buffer can be
-/// processed. May throw.
-bool EventPictures::approach(GstBuffer* buffer, const EventInterval& interval) {
+/// Starts over if a buffer is too far from the last one, and starts the pictures if there are none
+/// yet. May throw.
+void EventPictures::advance_to(GstBuffer* buffer, const EventInterval& interval) {
   if (!taken_) {
     const bool returns =
         GST_BUFFER_IS_DISCONT(buffer) && interval.start + event_resolution < known_;
@@ -73,7 +73,6 @@ bool EventPictures::approach(GstBuffer* buffer, const EventInterval& interval) {
   if (!times_ && state_->has_framerate() &&
       (interval.end > segment_start || interval.start >= segment_start))
     begin_pictures(std::max(interval.start, segment_start));
-  return times_ && interval.start >= times_->events().end;
 }
 
 /// Adds the events of a buffer that are due, and pushes the picture that this completes, if any.
@@ -95,7 +94,8 @@ GstFlowReturn EventPictures::handle_buffer(GstBuffer* buffer) {
           "pause of " + std::to_string((interval->end - interval->start) / GST_SECOND) + " s");
     interval->end = interval->start + shown_pause;
   }
-  if (approach(buffer, *interval)) return push_next_picture();
+  advance_to(buffer, *interval);
+  if (times_ && interval->start >= times_->events().end) return push_next_picture();
   std::optional<GstClockTime> due;
   if (times_) due = times_->events().end;
   bool all = false;
@@ -257,7 +257,7 @@ GstFlowReturn EventPictures::choose_caps(GstCaps* downstream, GstCaps** result) 
                      "pictures of that size in a format of this element. Insert eventscale before "
                      "this element, or videoconvertscale after it.",
                      state_->renderer.width(), state_->renderer.height()),
-                    ("downstream takes %" GST_PTR_FORMAT, downstream));
+                    ("downstream accepts %" GST_PTR_FORMAT, downstream));
   return GST_FLOW_NOT_NEGOTIATED;
 }
 

@@ -110,7 +110,7 @@ class EventPictures : public EventAggregator {
 
   void drain();
   void start_over();
-  bool approach(GstBuffer* buffer, const EventInterval& interval);
+  void advance_to(GstBuffer* buffer, const EventInterval& interval);
   bool add_events(const MappedEvents& mapped, const EventInterval& interval,
                   std::optional<GstClockTime> end, GstBuffer* buffer);
   GstFlowReturn handle_buffer(GstBuffer* buffer);

@@ -69,7 +69,7 @@ class EventFuse final : public FramesWithEvents {
     if (!continues(segment_of(main_pad()), segment)) jump();
   }
 
-  /// The video's caps with the nearest framerate that downstream takes.
+  /// The video's caps with the nearest framerate that downstream accepts.
   OwnedCaps output_caps(GstCaps* input) override {
     const OwnedCaps any = input_caps(OwnedCaps(gst_caps_ref(input)));
     OwnedCaps output(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(element()), any.get()));

@@ -8,7 +8,7 @@
  * the events of the interval that it starts, or of the #GstEventOverlay:accumulation-time before
  * the interval's end. Frames without a duration or framerate show the events since the last
  * one. The two streams are synchronized by running time. Events are scaled to the video if the
- * sensor has a different size. Grey video becomes RGB, unless downstream takes only grey.
+ * sensor has a different size. Grey video becomes RGB, unless downstream accepts only grey.
  *
  * Video from a live source waits for events no longer than its latency. Other video waits for the
  * events of its interval, or for a GAP event or EOS.
@@ -72,7 +72,7 @@ class EventOverlay final : public FramesWithEvents {
     shown_.reset();
   }
 
-  /// Grey video is drawn on in colour, unless downstream takes only grey.
+  /// Grey video is drawn on in colour, unless downstream accepts only grey.
   OwnedCaps output_caps(GstCaps* input) override {
     OwnedCaps output(gst_caps_ref(input));
     if (is_grey(gst_caps_get_structure(input, 0))) {
@@ -84,8 +84,8 @@ class EventOverlay final : public FramesWithEvents {
           fields, "format",
           gst_structure_get_value(gst_caps_get_structure(formats.get(), 0), "format"));
       gst_structure_remove_field(fields, "colorimetry");
-      OwnedCaps taken(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(element()), colours.get()));
-      if (!gst_caps_is_empty(taken.get())) output.reset(gst_caps_fixate(taken.release()));
+      OwnedCaps accepted(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(element()), colours.get()));
+      if (!gst_caps_is_empty(accepted.get())) output.reset(gst_caps_fixate(accepted.release()));
     }
     GstVideoInfo drawn;
     if (gst_video_info_from_caps(&drawn, output.get())) drawn_ = drawn;

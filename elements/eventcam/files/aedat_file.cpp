@@ -15,7 +15,7 @@ using namespace eventcamera;
 static constexpr Microseconds max_wait = 100'000;
 
 void AedatFile::warn_skipped(const char* what, const std::string& cause) {
-  warn_(element_, {GST_STREAM_ERROR_MUX, std::string("Left out ") + what + "."}, cause);
+  warn_(element_, {GST_STREAM_ERROR_MUX, std::string("Dropped ") + what + "."}, cause);
 }
 
 /* streams */

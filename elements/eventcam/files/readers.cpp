@@ -18,7 +18,7 @@
 #include "src/formats/hdf5/hdf5_reader.hpp"
 #endif
 #ifdef HAVE_NPZ
-#include "src/formats/numpy/npz_decoder.hpp"
+#include "src/formats/numpy/npz.hpp"
 #endif
 #ifdef HAVE_ROS
 #include "src/formats/ros/bag_decoder.hpp"

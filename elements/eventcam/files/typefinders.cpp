@@ -7,8 +7,8 @@
 
 #include "gst/base/owned.hpp"
 #include "src/formats/compressed_file.hpp"
+#include "src/formats/corruption.hpp"
 #include "src/formats/file_formats.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 using namespace eventcamera;
 
@@ -55,7 +55,7 @@ static guint probability(Likelihood likelihood) {
 
 static void find_format(GstTypeFind* find, gpointer data) {
   const auto& format = *static_cast<const FileFormat*>(data);
-  // A block of Zstandard gives nothing before its end, and typefind sees no more than this.
+  // Zstandard outputs a block only at its end, and typefinders see no more than this.
   constexpr guint64 max_compressed = 1U << 17;
   auto bytes = first_bytes(find, max_recognised_bytes);
   std::vector<guint8> content;

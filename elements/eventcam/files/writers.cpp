@@ -12,7 +12,7 @@
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #ifdef HAVE_NPZ
-#include "src/formats/numpy/npz_encoder.hpp"
+#include "src/formats/numpy/npz.hpp"
 #endif
 #include "src/formats/text/csv_encoder.hpp"
 #ifdef HAVE_ROS

@@ -53,7 +53,7 @@ DEFINE_EVENT_FILTER(GstEventCrop, gst_event_crop, EVENT_CROP, Crop, eventcrop)
 
 static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection direction,
                                GstCaps* caps, GstCaps* filter) {
-  const Settings settings = settings_of(G_OBJECT(transform)).copy();
+  const Settings settings = gst_event_crop_settings(G_OBJECT(transform)).copy();
   const int sign = direction == GST_PAD_SINK ? -1 : 1;
   return changed_caps(caps, filter, [&](GstStructure* structure) {
     return change_side(structure, "width", sign * cut_columns(settings)) &&
@@ -63,7 +63,7 @@ static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection dire
 
 static void gst_event_crop_class_init(GstEventCropClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  Properties<settings_of> properties(object_class);
+  Properties<gst_event_crop_settings> properties(object_class);
   const auto add = [&](auto field, const char* name, const char* blurb) {
     properties.add(field, name, blurb, 0, max_side);
   };

@@ -43,7 +43,6 @@
 #include "gst/base/event_caps.hpp"
 #include "gst/base/event_faults.hpp"
 #include "gst/base/event_pool.hpp"
-#include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
@@ -217,7 +216,7 @@ static GstFlowReturn advance(GstEventCut* self, const EventInterval& interval) {
 }
 
 /// Starts over if an interval is earlier than the last one. Triggers that wait belong to it.
-static void approach(GstEventCut* self, const EventInterval& interval) {
+static void start_over_if_earlier(GstEventCut* self, const EventInterval& interval) {
   const GstClockTime reached = self->priv->stream->reached;
   if (interval.start + event_resolution >= reached) return;
   GST_DEBUG_OBJECT(self, "time goes back from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
@@ -232,14 +231,14 @@ static void add(GstEventCut* self, const MappedEvents& mapped, Microseconds max_
   const auto labels = labels_of(buffer);
   stream->is_labelled |= !labels.empty();
   std::size_t excess = 0;
-  const auto take = [&](const AbsoluteEvent& event) {
+  const auto keep = [&](const AbsoluteEvent& event) {
     if (stream->events.size() < max_events)
       stream->events.push_back(event);
     else
       ++excess;
   };
   const auto invalid =
-      stream->validator->take(mapped.events(), mapped.start(), max_t, take, labels);
+      stream->validator->for_each_valid(mapped.events(), mapped.start(), max_t, keep, labels);
   stream->faults.warn(self, invalid, buffer);
   if (excess > 0)
     stream->warn_of_excess(
@@ -270,7 +269,7 @@ static GstFlowReturn submit_input_buffer(GstBaseTransform* transform, gboolean, 
   GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, events,
                  GST_TIME_ARGS(interval->start));
   return reported(self, [&] {
-    approach(self, *interval);
+    start_over_if_earlier(self, *interval);
     if (GST_BUFFER_IS_DISCONT(input)) {
       const auto result = advance(self, {interval->start, interval->start});
       if (result != GST_FLOW_OK) return result;
@@ -291,7 +290,7 @@ static bool handle_gap(GstEventCut* self, GstEvent* event) {
   if (!self->priv->stream->validator || start > G_MAXINT64) return true;
   if (!GST_CLOCK_TIME_IS_VALID(duration)) duration = 0;
   const EventInterval interval{start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)};
-  approach(self, interval);
+  start_over_if_earlier(self, interval);
   return advance(self, interval) == GST_FLOW_OK;
 }
 

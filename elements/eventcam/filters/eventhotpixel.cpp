@@ -116,7 +116,7 @@ DEFINE_EVENT_FILTER(GstEventHotPixel, gst_event_hot_pixel, EVENT_HOT_PIXEL, HotP
                     eventhotpixel)
 
 static void gst_event_hot_pixel_class_init(GstEventHotPixelClass* klass) {
-  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  Properties<gst_event_hot_pixel_settings> properties(G_OBJECT_CLASS(klass));
   properties.add_fixed(&Settings::location, "location",
                        "Text file of hot pixels, read at the start and, with learn, written on "
                        "stop if they have changed");

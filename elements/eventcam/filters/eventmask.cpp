@@ -62,7 +62,7 @@ class Mask final : public EventFilter {
 DEFINE_EVENT_FILTER(GstEventMask, gst_event_mask, EVENT_MASK, Mask, eventmask)
 
 static void gst_event_mask_class_init(GstEventMaskClass* klass) {
-  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  Properties<gst_event_mask_settings> properties(G_OBJECT_CLASS(klass));
   properties.add_fixed(
       &Settings::location, "location",
       "PNG picture of the sensor's size, read when a stream begins; black pixels are dropped");

@@ -44,11 +44,10 @@
 #include <utility>
 #include <vector>
 
-#include "elements/eventcam/filters/eventmerge_pad.hpp"
 #include "elements/eventcam/filters/merged_timeline.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/element_type.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
@@ -250,7 +249,7 @@ class EventMerge final : public EventAggregator {
                       ("Cannot merge: the sensors need %s, and downstream does not take that size. "
                        "Do not set a smaller one downstream.",
                        text.c_str()),
-                      ("downstream takes %" GST_PTR_FORMAT, downstream));
+                      ("downstream accepts %" GST_PTR_FORMAT, downstream));
     return GST_FLOW_NOT_NEGOTIATED;
   }
 

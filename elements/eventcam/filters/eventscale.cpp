@@ -83,7 +83,7 @@ static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection, GstCaps* caps, G
 }
 
 static void gst_event_scale_class_init(GstEventScaleClass* klass) {
-  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  Properties<gst_event_scale_settings> properties(G_OBJECT_CLASS(klass));
   properties.add(&Settings::min_events, "min-events",
                  "Number of events of a polarity for which an output pixel fires once, at the time "
                  "of the last one (events)",

@@ -89,7 +89,7 @@ DEFINE_EVENT_FILTER(GstEventUndistort, gst_event_undistort, EVENT_UNDISTORT, Und
                     eventundistort)
 
 static void gst_event_undistort_class_init(GstEventUndistortClass* klass) {
-  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  Properties<gst_event_undistort_settings> properties(G_OBJECT_CLASS(klass));
   properties.add_fixed(
       &Settings::location, "location",
       "YAML or XML file with the calibration of the camera, read when a stream begins");

@@ -66,7 +66,7 @@
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/sensor_size.hpp"
 #include "src/measure/stream_comparison.hpp"
-#include "src/render/map_picture.hpp"
+#include "src/render/rgb_picture.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_compare_debug);
 #define GST_CAT_DEFAULT event_compare_debug

@@ -56,7 +56,7 @@
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event_validator.hpp"
 #include "src/measure/event_statistics.hpp"
-#include "src/render/map_picture.hpp"
+#include "src/render/rgb_picture.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_stats_debug);
 #define GST_CAT_DEFAULT event_stats_debug
@@ -223,11 +223,11 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
   }
   const auto [events, labels] = ClippedEvents(mapped, buffer, whole, clipped);
   const bool is_labelled = !labels.empty();
-  const auto skipped = measurement.validator.take(
+  const auto skipped = measurement.validator.for_each_valid(
       events, stream_time(GST_BASE_TRANSFORM(self)->segment, whole.start) / 1000, length_of(whole),
       [&](const AbsoluteEvent& event) {
         measurement.concluded = false;
-        const auto interval = measurement.last_times.take(event);
+        const auto interval = measurement.last_times.update(event);
         for (auto* part : {&measurement.cumulative, &measurement.recent}) {
           part->statistics.add(event, interval);
           if (is_labelled) part->causes.add(event.cause);

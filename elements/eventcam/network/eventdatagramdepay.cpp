@@ -52,11 +52,10 @@
 #include "gst/base/element_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_caps.hpp"
-#include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/wire/datagram_unpacker.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_depay_debug);
@@ -213,7 +212,7 @@ static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& receptio
   GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
                  state.events.size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)),
                  GST_TIME_ARGS(GST_BUFFER_DURATION(buffer)));
-  state.segment.reach(nanoseconds(state.end));
+  state.segment.extend_to(nanoseconds(state.end));
   if (std::exchange(state.is_discontinuous, false))
     GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
   return gst_pad_push(priv.src, buffer);
@@ -299,12 +298,12 @@ static GstClockTime arrival_of(const State& state, GstBuffer* buffer) {
   return gst_segment_to_running_time(&state.upstream, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
 }
 
-static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
+static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   auto* self = GST_EVENT_DATAGRAM_DEPAY(parent);
-  OwnedBuffer buffer(taken);
+  OwnedBuffer buffer(received);
   auto& state = self->priv->stream->state;
   if (!state) return GST_FLOW_FLUSHING;
-  const auto arrival = arrival_of(*state, taken);
+  const auto arrival = arrival_of(*state, received);
   if (!GST_CLOCK_TIME_IS_VALID(arrival) && state->settings.format == DatagramFormat::spif) {
     GST_ELEMENT_ERROR(self, STREAM, FORMAT,
                       ("SPIF events have no timestamps, and their datagrams no arrival time. Set "
@@ -312,7 +311,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
                       ("a buffer has no PTS in a segment of times"));
     return GST_FLOW_ERROR;
   }
-  if (!state->sender.may_have_sent(taken, arrival)) {
+  if (!state->sender.may_have_sent(received, arrival)) {
     reject_second_sender(self, arrival);
     return GST_FLOW_OK;
   }
@@ -320,7 +319,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   if (!bytes.is_mapped()) return GST_FLOW_ERROR;
   return catch_exceptions(
       self, Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."},
-      [&] { return receive(self, taken, bytes.get(), arrival); });
+      [&] { return receive(self, received, bytes.get(), arrival); });
 }
 
 /// Starts a new stream with the next datagram.

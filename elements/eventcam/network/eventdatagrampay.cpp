@@ -41,7 +41,6 @@
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_caps.hpp"
 #include "gst/base/event_faults.hpp"
-#include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
@@ -208,23 +207,23 @@ static void collect(GstEventDatagramPay* self, GstBuffer* buffer, const MappedEv
     stream->faults.warn(self, EventFault::beyond_sensor, buffer);
 }
 
-static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
+static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   auto* self = GST_EVENT_DATAGRAM_PAY(parent);
   auto& priv = *self->priv;
-  const OwnedBuffer buffer(taken);
+  const OwnedBuffer buffer(received);
   if (!priv.stream->packer) return GST_FLOW_NOT_NEGOTIATED;
-  const auto interval = interval_of(taken);
+  const auto interval = interval_of(received);
   if (!interval) {
-    priv.stream->faults.warn(self, interval_fault(taken), taken);
+    priv.stream->faults.warn(self, interval_fault(received), received);
     return GST_FLOW_OK;
   }
-  const MappedEvents mapped(taken);
+  const MappedEvents mapped(received);
   if (!mapped) {
-    priv.stream->faults.warn(self, EventFault::partial_event, taken);
+    priv.stream->faults.warn(self, EventFault::partial_event, received);
     return GST_FLOW_OK;
   }
   return pack(self, [&](DatagramPacker& packer, const auto& send) {
-    collect(self, taken, mapped);
+    collect(self, received, mapped);
     packer.set_max_span(max_span(priv.settings.copy().max_latency));
     packer.pack(priv.stream->events, send);
     if (is_flush_due(self, *interval)) packer.flush(send);
@@ -269,9 +268,9 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   auto* self = GST_EVENT_DATAGRAM_PAY(parent);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CAPS: {
-      const gboolean taken = handle_caps(self, event);
+      const gboolean handled = handle_caps(self, event);
       gst_event_unref(event);
-      return taken;
+      return handled;
     }
     case GST_EVENT_GAP:
       handle_gap(self, event);

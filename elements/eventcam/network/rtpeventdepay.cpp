@@ -63,7 +63,7 @@
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/wire/rtp_unpacker.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(rtp_event_depay_debug);
@@ -147,7 +147,7 @@ static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
   const auto duration = static_cast<GstClockTime>(interval.duration);
   update_segment(self, start, interval.arrival);
   auto& state = *self->priv->stream->state;
-  state.segment.reach(start + duration);
+  state.segment.extend_to(start + duration);
   state.is_discontinuous |= interval.is_discontinuous;
   GST_LOG_OBJECT(self,
                  "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT "%s",

@@ -44,7 +44,6 @@
 #include "gst/base/event_caps.hpp"
 #include "gst/base/event_faults.hpp"
 #include "gst/base/guarded.hpp"
-#include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
@@ -52,7 +51,6 @@
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/sensor_events.hpp"
-#include "src/wire/pending_interval.hpp"
 #include "src/wire/rtp_packer.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(rtp_event_pay_debug);
@@ -304,25 +302,25 @@ static GstFlowReturn reject(GstRtpEventPay* self, EventFault fault, GstBuffer* b
   return GST_FLOW_OK;
 }
 
-static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken) {
+static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* received) {
   auto* self = GST_RTP_EVENT_PAY(payload);
   auto& priv = *self->priv;
-  const OwnedBuffer buffer(taken);
+  const OwnedBuffer buffer(received);
   if (!priv.stream->state) return GST_FLOW_NOT_NEGOTIATED;
   constexpr guint max_csrc_count = 15;
   priv.stream->csrc_count = static_cast<guint8>(
-      std::min(gst_rtp_base_payload_get_source_count(payload, taken), max_csrc_count));
-  const auto interval = interval_of(taken);
+      std::min(gst_rtp_base_payload_get_source_count(payload, received), max_csrc_count));
+  const auto interval = interval_of(received);
   if (!interval || interval->start > static_cast<GstClockTime>(max_rtp_start))
-    return reject(self, interval_fault(taken), taken);
-  const MappedEvents mapped(taken);
-  if (!mapped) return reject(self, EventFault::partial_event, taken);
+    return reject(self, interval_fault(received), received);
+  const MappedEvents mapped(received);
+  if (!mapped) return reject(self, EventFault::partial_event, received);
   GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, mapped.events().size(),
                  GST_TIME_ARGS(interval->start));
   return reported(self, [&] {
     const auto rejected = add_interval(self, *interval, mapped.events());
     priv.sent.lock()->rejected += rejected.outside + rejected.unsorted;
-    priv.stream->faults.warn(self, rejected, taken);
+    priv.stream->faults.warn(self, rejected, received);
   });
 }
 

@@ -71,7 +71,6 @@
 #include "gst/base/event_caps.hpp"
 #include "gst/base/event_faults.hpp"
 #include "gst/base/event_pool.hpp"
-#include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
@@ -191,7 +190,7 @@ static GstFlowReturn drain(GstEventTensor* self) {
 }
 
 /// Ends the current windows if an interval is too far from the last one.
-static GstFlowReturn approach(GstEventTensor* self, const EventInterval& interval) {
+static GstFlowReturn drain_before_jump(GstEventTensor* self, const EventInterval& interval) {
   const auto last = self->priv->stream->state->windows.reached();
   if (!last) return GST_FLOW_OK;
   const auto reached = static_cast<GstClockTime>(*last);
@@ -210,7 +209,7 @@ static GstFlowReturn add(GstEventTensor* self, std::span<const Event> events, Mi
   auto& priv = *self->priv;
   const GstClockTime start = std::max(interval.start, priv.stream->segment.start);
   if (interval.end < start || (interval.end == start && interval.start < start)) return GST_FLOW_OK;
-  const GstFlowReturn result = approach(self, {start, interval.end});
+  const GstFlowReturn result = drain_before_jump(self, {start, interval.end});
   if (result != GST_FLOW_OK) return result;
   do {
     const auto added = priv.stream->state->windows.add(
@@ -234,28 +233,28 @@ static GstFlowReturn add(GstEventTensor* self, std::span<const Event> events, Mi
 
 /* data */
 
-static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
+static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   auto* self = GST_EVENT_TENSOR(parent);
   auto& priv = *self->priv;
-  const OwnedBuffer buffer(taken);
+  const OwnedBuffer buffer(received);
   if (!priv.stream->state) return GST_FLOW_NOT_NEGOTIATED;
-  priv.stream->discontinuous |= GST_BUFFER_IS_DISCONT(taken);
+  priv.stream->discontinuous |= GST_BUFFER_IS_DISCONT(received);
   const auto gap_result = std::exchange(priv.stream->gap_result, GST_FLOW_OK);
   if (gap_result != GST_FLOW_OK) return gap_result;
-  const auto interval = interval_of(taken);
+  const auto interval = interval_of(received);
   if (!interval || interval->end > max_tensor_time) {
-    priv.stream->faults.warn(self, interval_fault(taken), taken);
+    priv.stream->faults.warn(self, interval_fault(received), received);
     return GST_FLOW_OK;
   }
-  const MappedEvents mapped(taken);
+  const MappedEvents mapped(received);
   if (!mapped) {
-    priv.stream->faults.warn(self, EventFault::partial_event, taken);
+    priv.stream->faults.warn(self, EventFault::partial_event, received);
     return GST_FLOW_OK;
   }
   GST_LOG_OBJECT(priv.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                  mapped.events().size(), GST_TIME_ARGS(interval->start));
   return catch_exceptions(self, no_memory, [&] {
-    return add(self, mapped.events(), mapped.start(), *interval, taken);
+    return add(self, mapped.events(), mapped.start(), *interval, received);
   });
 }
 
@@ -290,7 +289,7 @@ static bool post_unless_accepted(GstEventTensor* self, GstCaps* caps) {
   const OwnedCaps wanted(gst_pad_peer_query_caps(self->priv->src, nullptr));
   if (gst_caps_can_intersect(wanted.get(), caps)) return true;
   gchar* const cause = gst_info_strdup_printf(
-      "downstream takes %" GST_PTR_FORMAT ", not %" GST_PTR_FORMAT, wanted.get(), caps);
+      "downstream accepts %" GST_PTR_FORMAT ", not %" GST_PTR_FORMAT, wanted.get(), caps);
   post_message(self, GST_MESSAGE_ERROR,
                {GST_STREAM_ERROR_FORMAT, "Downstream does not accept these tensors" +
                                              mismatch_text(wanted.get(), caps) + "."},
@@ -336,9 +335,9 @@ static gboolean handle_caps(GstEventTensor* self, GstEvent* event) {
   GST_DEBUG_OBJECT(self, "events of %dx%d pixels become %" GST_PTR_FORMAT, info.width, info.height,
                    out.get());
   if (!post_unless_accepted(self, out.get())) return FALSE;
-  const gboolean taken = gst_pad_push_event(priv.src, gst_event_new_caps(out.get()));
+  const gboolean handled = gst_pad_push_event(priv.src, gst_event_new_caps(out.get()));
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
-  return taken;
+  return handled;
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
@@ -346,9 +345,9 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   auto& priv = *self->priv;
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CAPS: {
-      const gboolean taken = handle_caps(self, event);
+      const gboolean handled = handle_caps(self, event);
       gst_event_unref(event);
-      return taken;
+      return handled;
     }
     case GST_EVENT_GAP:
       if (handle_gap(self, event)) {

@@ -11,11 +11,10 @@
 
 #include "gst/base/errors.hpp"
 #include "gst/base/event_caps.hpp"
-#include "gst/base/latency.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "src/formats/unsupported_format.hpp"
+#include "src/formats/corruption.hpp"
 
 GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
 #define GST_CAT_DEFAULT event_reader_debug
@@ -346,7 +345,7 @@ GstFlowReturn EventReader::handle_buffer(GstBuffer* buffer) {
   return result;
 }
 
-/// Pushes the output of the bytes that were given to the decompressor. May throw.
+/// Pushes the output of the decompressor. May throw.
 GstFlowReturn EventReader::push_decompressed() {
   GstFlowReturn result = GST_FLOW_OK;
   while (result == GST_FLOW_OK) {

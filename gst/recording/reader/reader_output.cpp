@@ -148,17 +148,17 @@ class ReaderPad {
   bool send_caps(SensorSize size) {
     if (size == size_) return true;
     const OwnedCaps caps = event_caps(size.width, size.height);
-    const bool taken = push_caps(caps.get());
-    if (taken) size_ = size;
-    return taken;
+    const bool accepted = push_caps(caps.get());
+    if (accepted) size_ = size;
+    return accepted;
   }
 
   bool send_caps(const GstVideoInfo& info) {
     if (video_ && gst_video_info_is_equal(&*video_, &info)) return true;
     const OwnedCaps caps(gst_video_info_to_caps(&info));
-    const bool taken = push_caps(caps.get());
-    if (taken) video_ = info;
-    return taken;
+    const bool accepted = push_caps(caps.get());
+    if (accepted) video_ = info;
+    return accepted;
   }
 
   bool has_video() const { return video_.has_value(); }
@@ -508,11 +508,11 @@ bool ReaderOutput::send_caps(std::size_t index) {
   const auto& stream = recording_->streams()[index];
   auto& pad = pad_of(index);
   if (stream.info.kind == StreamKind::events) {
-    const bool taken = pad.send_caps(stream.info.size);
-    if (!taken)
+    const bool accepted = pad.send_caps(stream.info.size);
+    if (!accepted)
       GST_DEBUG_OBJECT(pad.get(), "a sensor of %dx%d pixels is refused", stream.info.size.width,
                        stream.info.size.height);
-    return taken;
+    return accepted;
   }
   GstVideoInfo info;
   return pad.has_video() || !frame_video_info(*stream.first_frame, &info) || pad.send_caps(info);

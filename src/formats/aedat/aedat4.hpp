@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "src/core/event.hpp"
+#include "src/formats/compression/compressed_frames.hpp"
 #include "src/formats/decoder.hpp"
 
 namespace eventcamera {
@@ -18,6 +19,13 @@ enum class Aedat4Compression : std::uint8_t {
   zstd = 3,
   zstd_high = 4,
 };
+
+/// Codec of compressed packets; `compression` must not be `none`.
+constexpr FrameCodec codec_of(Aedat4Compression compression) {
+  const bool is_lz4 =
+      compression == Aedat4Compression::lz4 || compression == Aedat4Compression::lz4_high;
+  return is_lz4 ? FrameCodec::lz4 : FrameCodec::zstd;
+}
 
 /// First line of the file.
 constexpr std::string_view aedat4_magic = "#!AER-DAT4.0\r\n";

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "src/core/byte_order.hpp"
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_flatbuffer.hpp"
 

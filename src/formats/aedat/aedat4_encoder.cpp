@@ -7,9 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/formats/aedat/aedat4.fbs.h"
-#include "src/formats/aedat/aedat4_compression.hpp"
 #include "src/formats/aedat/aedat4_info_node.hpp"
 
 namespace eventcamera {
@@ -23,9 +22,25 @@ constexpr std::size_t max_events = 4096;
 /// FlatBufferBuilder is a class or an alias, depending on the version of FlatBuffers.
 class Aedat4Builder : public flatbuffers::FlatBufferBuilder {};
 
+Aedat4Compressor::Aedat4Compressor(Aedat4Compression compression) {
+  if (compression == Aedat4Compression::none) return;
+  const bool is_high =
+      compression == Aedat4Compression::lz4_high || compression == Aedat4Compression::zstd_high;
+  compressor_.emplace(codec_of(compression),
+                      is_high ? FrameCompressor::Level::high : FrameCompressor::Level::standard);
+}
+
+void Aedat4Compressor::compress(std::span<const std::uint8_t> content,
+                                std::vector<std::uint8_t>& out) {
+  if (compressor_)
+    compressor_->compress(content, out);
+  else
+    out.insert(out.end(), content.begin(), content.end());
+}
+
 Aedat4Encoder::Aedat4Encoder(Aedat4Settings settings)
     : settings_(std::move(settings)),
-      compressor_(std::make_unique<Aedat4Compressor>(settings_.compression)),
+      compressor_(settings_.compression),
       builder_(std::make_unique<Aedat4Builder>()) {
   if (!is_side(settings_.size.width) || !is_side(settings_.size.height))
     throw std::invalid_argument("AEDAT4 supports sensors of 1x1 to 16384x16384 pixels");
@@ -124,7 +139,7 @@ bool Aedat4Encoder::append_end(std::vector<std::uint8_t>& out) {
   patch_.emplace(FilePatch{table_field_at_, std::vector<std::uint8_t>(sizeof position_)});
   std::memcpy(patch_->bytes.data(), &position_, sizeof position_);
   const auto at = out.size();
-  compressor_->compress(aedat4_table_content(table_), out);
+  compressor_.compress(aedat4_table_content(table_), out);
   position_ += out.size() - at;
   return false;
 }
@@ -177,7 +192,7 @@ void Aedat4Encoder::write_packet(int stream, std::int64_t elements, Microseconds
                                  Microseconds end, std::vector<std::uint8_t>& out) {
   const auto at = out.size();
   out.resize(at + aedat4_packet_header);
-  compressor_->compress({builder_->GetBufferPointer(), builder_->GetSize()}, out);
+  compressor_.compress({builder_->GetBufferPointer(), builder_->GetSize()}, out);
   const auto size = static_cast<std::int32_t>(out.size() - at - aedat4_packet_header);
   const std::int32_t header[] = {stream, size};
   std::memcpy(out.data() + at, header, sizeof header);

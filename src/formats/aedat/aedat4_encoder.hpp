@@ -15,7 +15,18 @@
 namespace eventcamera {
 
 class Aedat4Builder;
-class Aedat4Compressor;
+
+/// Compresses packets.
+class Aedat4Compressor {
+ public:
+  explicit Aedat4Compressor(Aedat4Compression compression);
+
+  /// Appends the compressed `content` to `out`.
+  void compress(std::span<const std::uint8_t> content, std::vector<std::uint8_t>& out);
+
+ private:
+  std::optional<FrameCompressor> compressor_;  ///< none: packets are stored as they are
+};
 
 /// Settings of an AEDAT4 file.
 struct Aedat4Settings {
@@ -68,7 +79,7 @@ class Aedat4Encoder final : public Encoder {
                     std::vector<std::uint8_t>& out);
 
   Aedat4Settings settings_;
-  std::unique_ptr<Aedat4Compressor> compressor_;
+  Aedat4Compressor compressor_;
   std::unique_ptr<Aedat4Builder> builder_;
   std::vector<AbsoluteEvent> held_;
   std::uint64_t position_ = 0;        ///< of the next bytes in the file

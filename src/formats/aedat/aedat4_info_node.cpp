@@ -8,7 +8,7 @@
 #include <pugixml.hpp>
 #include <sstream>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 
 namespace eventcamera {
 

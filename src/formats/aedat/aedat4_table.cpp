@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "src/core/byte_order.hpp"
-#include "src/formats/aedat/aedat4_compression.hpp"
+#include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_flatbuffer.hpp"
 
 namespace eventcamera {

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "src/formats/byte_queue.hpp"
-#include "src/formats/unsupported_format.hpp"
+#include "src/formats/corruption.hpp"
 
 namespace eventcamera {
 

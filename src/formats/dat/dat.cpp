@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/formats/prophesee_header.hpp"
 #include "src/formats/unit_stream_decoder.hpp"
 #include "src/formats/unwrapped_clock.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/formats/unit_stream_decoder.hpp"
 #include "src/formats/word_writer.hpp"
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <cassert>
 
-#include "src/formats/byte_appender.hpp"
 #include "src/formats/byte_cursor.hpp"
 
 namespace eventcamera {

@@ -10,9 +10,9 @@
 #include <new>
 
 #include "src/core/byte_order.hpp"
+#include "src/formats/corruption.hpp"
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_filters.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 

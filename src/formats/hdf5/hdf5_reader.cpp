@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "src/formats/byte_source.hpp"
+#include "src/formats/corruption.hpp"
 #include "src/formats/hdf5/hdf5_dataset.hpp"
 #include "src/formats/hdf5/hdf5_file.hpp"
 #include "src/formats/hdf5/hdf5_table.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 
@@ -38,7 +38,7 @@ class Hdf5Decoder final : public Decoder {
   void push(std::span<const std::uint8_t> piece) override { collected_.push(piece); }
 
   void drain() override {
-    reader_ = std::make_unique<Hdf5Reader>(collected_.take(), selection_);
+    reader_ = std::make_unique<Hdf5Reader>(collected_.finish(), selection_);
     describe();
   }
 

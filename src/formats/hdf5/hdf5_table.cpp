@@ -6,11 +6,10 @@
 #include <charconv>
 #include <utility>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
+#include "src/formats/corruption.hpp"
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_handle.hpp"
-#include "src/formats/hdf5/number_table.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 
@@ -42,8 +41,8 @@ class EcfTable final : public Hdf5Table {
       note(corruption, events_, row, "ECF chunk with too few events");
     for (auto i = row - begin; i < std::min<std::uint64_t>(decoded_.size(), end - begin); ++i) {
       const auto& event = decoded_[i];
-      validator.take(event.t, event.x, event.y(), event.polarity() == Polarity::on, out,
-                     corruption);
+      validator.append(event.t, event.x, event.y(), event.polarity() == Polarity::on, out,
+                       corruption);
     }
     return end;
   }
@@ -80,13 +79,6 @@ class EcfTable final : public Hdf5Table {
   std::vector<AbsoluteEvent> decoded_;
 };
 
-/// Creates the table of the Metavision layout with ECF compression. Throws UnsupportedFormat.
-std::unique_ptr<Hdf5Table> make_ecf_table(Hdf5Dataset events, SensorSize size);
-
-std::unique_ptr<Hdf5Table> make_ecf_table(Hdf5Dataset events, SensorSize size) {
-  return std::make_unique<EcfTable>(std::move(events), size);
-}
-
 /// Parses a size such as 1280x720.
 SensorSize read_geometry(std::string_view text) {
   SensorSize size;
@@ -119,7 +111,8 @@ std::unique_ptr<Hdf5Table> open_metavision(hid_t file) {
   const std::string members[] = {"t", "x", "y", "p"};
   events.choose(members);
   const auto size = read_geometry(read_text_attribute(file, "geometry").value_or(""));
-  if (events.has_only_filter(ecf_filter)) return make_ecf_table(std::move(events), size);
+  if (events.has_only_filter(ecf_filter))
+    return std::make_unique<EcfTable>(std::move(events), size);
   return make_row_table(Hdf5Format::metavision, std::move(events), path, size,
                         ColumnOrder{0, 1, 2, 3}, TimeUnit::microseconds);
 }

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_file.hpp"
 #include "src/formats/hdf5/hdf5_layout.hpp"

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/hdf5/number_table.hpp"
+#include "src/formats/hdf5/hdf5_table.hpp"
 
 #include <iterator>
 #include <utility>
 
+#include "src/formats/corruption.hpp"
 #include "src/formats/hdf5/hdf5_dataset.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 
@@ -40,7 +40,7 @@ class NumberTable : public Hdf5Table {
         continue;
       }
       const auto label = has_labels_ ? label_from(cause_[i], object_class_[i]) : Label{};
-      validator.take(t, x_[i], y_[i], *on, label, out, corruption);
+      validator.append(t, x_[i], y_[i], *on, label, out, corruption);
     }
     return end;
   }

@@ -323,7 +323,8 @@ void NpyDecoder::read_elements(const std::uint8_t* bytes, std::uint64_t count, D
     const Window t(t_field, size), x(x_field, size), y(y_field, size), p(p_field, size);
     for (; bytes < end; bytes += size, position_ += size) {
       if (const auto on = polarities_.is_on(p.read(bytes)); on)
-        validator_.take(t.read(bytes), x.read(bytes), y.read(bytes), *on, out.events, corruption_);
+        validator_.append(t.read(bytes), x.read(bytes), y.read(bytes), *on, out.events,
+                          corruption_);
       else
         note_unreadable(static_cast<std::uint64_t>(end - bytes) / size);
     }
@@ -341,7 +342,7 @@ void NpyDecoder::read_elements(const std::uint8_t* bytes, std::uint64_t count, D
     if (t && x && y && on) {
       const auto label =
           label_from(label_number(EventColumn::cause), label_number(EventColumn::object_class));
-      validator_.take(*t, *x, *y, *on, label, out.events, corruption_);
+      validator_.append(*t, *x, *y, *on, label, out.events, corruption_);
     } else {
       note_unreadable(static_cast<std::uint64_t>(end - bytes) / size);
     }

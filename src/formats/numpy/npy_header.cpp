@@ -6,7 +6,7 @@
 #include <string>
 
 #include "src/core/byte_order.hpp"
-#include "src/formats/unsupported_format.hpp"
+#include "src/formats/corruption.hpp"
 
 namespace eventcamera {
 

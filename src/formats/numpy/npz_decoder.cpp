@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/numpy/npz_decoder.hpp"
+#include "src/formats/numpy/npz.hpp"
 
 #include <algorithm>
 #include <array>
 #include <utility>
 #include <vector>
 
-#include "src/core/max_side.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/formats/byte_source.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/zip_archive.hpp"
@@ -303,7 +303,7 @@ class NpzDecoder final : public Decoder {
   void push(std::span<const std::uint8_t> piece) override { collected_.push(piece); }
 
   void drain() override {
-    bytes_ = collected_.take();
+    bytes_ = collected_.finish();
     open(*bytes_);
   }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/numpy/npz_encoder.hpp"
+#include "src/formats/numpy/npz.hpp"
 
 #include <zlib.h>
 
@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "src/formats/numpy/npy_header.hpp"
-#include "src/formats/numpy/zip_writer.hpp"
+#include "src/formats/numpy/zip_archive.hpp"
 #include "src/formats/temporary_file.hpp"
 
 namespace eventcamera {

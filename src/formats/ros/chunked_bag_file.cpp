@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include "src/formats/corruption.hpp"
 #include "src/formats/magic.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 
@@ -33,7 +33,7 @@ std::optional<BagMessage> ChunkedBagFile::next() {
     if (record_ == 0) continue;
     const auto record = queue_.peek(record_).first(record_);
     const auto position = queue_.position();
-    index_.reached(position);
+    index_.record_position(position);
     if (kind_ == Head::Kind::chunk)
       chunk_ = records_of(record, position, ended_);
     else if (const auto message = read_record(record, position))
@@ -52,7 +52,7 @@ bool ChunkedBagFile::read_magic() {
   if (!has_at(0, magic_, start)) throw UnsupportedFormat("it does not begin as a bag does");
   queue_.consume(magic_.size());
   magic_read_ = true;
-  index_.reached(queue_.position());
+  index_.record_position(queue_.position());
   return true;
 }
 

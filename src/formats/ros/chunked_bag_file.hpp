@@ -49,7 +49,7 @@ class ChunkIndex {
   }
 
   /// Records the position of a chunk or a message, if no index was set.
-  void reached(std::uint64_t position) {
+  void record_position(std::uint64_t position) {
     if (indexed_.empty() && read_.due(position)) read_.note({latest_, position});
   }
 

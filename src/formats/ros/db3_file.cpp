@@ -16,8 +16,8 @@
 
 #include "src/formats/byte_source.hpp"
 #include "src/formats/compression/compressed_frames.hpp"
+#include "src/formats/corruption.hpp"
 #include "src/formats/ros/bag_file.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 
@@ -273,7 +273,7 @@ class Db3File final : public BagFile {
 
   void finish() override {
     if (database_) return;
-    own_bytes_ = collected_.take();
+    own_bytes_ = collected_.finish();
     database_ = std::make_unique<SqliteDatabase>(*own_bytes_);
     read_topics();
   }

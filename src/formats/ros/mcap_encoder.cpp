@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "src/formats/byte_appender.hpp"
+#include "src/formats/byte_cursor.hpp"
 #include "src/formats/compression/compressed_frames.hpp"
 #include "src/formats/evt/evt3_words.hpp"
 #include "src/formats/evt/words.hpp"

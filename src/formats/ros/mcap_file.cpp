@@ -48,7 +48,7 @@ bool is_compression(std::string_view name) {
 /// Size of a chunk record's fields before its records, without the name of the compression.
 constexpr std::size_t chunk_fields = 40;
 
-/// Bytes that tell whether a record is a chunk.
+/// Bytes needed to recognise a chunk.
 constexpr std::size_t chunk_head = mcap_record_header + chunk_fields + 4;
 
 bool begins_chunk(std::span<const std::uint8_t> bytes) {

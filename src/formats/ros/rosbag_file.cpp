@@ -13,7 +13,6 @@
 
 #include "src/formats/byte_cursor.hpp"
 #include "src/formats/compression/compressed_frames.hpp"
-#include "src/formats/expansion_limit.hpp"
 #include "src/formats/magic.hpp"
 #include "src/formats/ros/chunked_bag_file.hpp"
 
@@ -34,7 +33,7 @@ enum class Op : std::uint8_t {
 /// Limit of a record's header, bytes.
 constexpr std::uint32_t max_header = 1 << 16;
 
-/// Bytes that tell whether a record is a chunk: its header has 45.
+/// Bytes needed to recognise a chunk, whose header has 45.
 constexpr std::size_t chunk_head = 64;
 
 /// The fields of a header: each is its size, 32 bits, and "name=value".

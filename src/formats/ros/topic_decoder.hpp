@@ -135,11 +135,4 @@ std::unique_ptr<TopicDecoder> make_topic_decoder(const BagTopic& topic, Corrupti
 std::unique_ptr<TopicDecoder> make_event_packet_decoder(const BagTopic& topic,
                                                         Corruption& corruption);
 
-/// dvs_msgs/EventArray, and prophesee_event_msgs/EventArray, which is the same: a list of events.
-std::unique_ptr<TopicDecoder> make_event_array_decoder(const BagTopic& topic,
-                                                       Corruption& corruption);
-
-/// sensor_msgs/Image.
-std::unique_ptr<TopicDecoder> make_image_decoder(const BagTopic& topic, Corruption& corruption);
-
 }  // namespace eventcamera

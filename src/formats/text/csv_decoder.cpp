@@ -7,8 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "src/core/max_side.hpp"
-#include "src/formats/text/decimal.hpp"
+#include "src/core/sensor_size.hpp"
 
 namespace eventcamera {
 
@@ -479,7 +478,7 @@ const char* CsvDecoder::read_lines(const char* at, const char* end, Decoded& out
         const char* const next = plain_lines_->read(at, row);
         if (next == nullptr) break;
         ++lines;
-        validator_.take(row.t, row.x, row.y, row.on, out.events, corruption_);
+        validator_.append(row.t, row.x, row.y, row.on, out.events, corruption_);
         at = next;
       }
       position_ += static_cast<std::uint64_t>(at - first);
@@ -516,8 +515,8 @@ void CsvDecoder::read_line(std::string_view line, Decoded& out) {
               ", expected: " + std::to_string(columns_.size()) + ")");
     return;
   }
-  validator_.take(row->t.value, row->x, row->y, row->on, label_from(row->cause, row->object_class),
-                  out.events, corruption_);
+  validator_.append(row->t.value, row->x, row->y, row->on,
+                    label_from(row->cause, row->object_class), out.events, corruption_);
 }
 
 }  // namespace eventcamera

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/text/decimal.hpp"
+#include "src/formats/text/csv_decoder.hpp"
 
 #include <algorithm>
 #include <limits>
