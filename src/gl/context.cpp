@@ -44,8 +44,10 @@ Context::Context(const Load& load) {
   CreateSync = reinterpret_cast<PFNEGLCREATESYNCKHRPROC>(load("eglCreateSyncKHR"));
   WaitForSync = reinterpret_cast<PFNEGLCLIENTWAITSYNCKHRPROC>(load("eglClientWaitSyncKHR"));
   DestroySync = reinterpret_cast<PFNEGLDESTROYSYNCKHRPROC>(load("eglDestroySyncKHR"));
+  GetCurrentContext = reinterpret_cast<PFNEGLGETCURRENTCONTEXTPROC>(load("eglGetCurrentContext"));
+  ReleaseThread = reinterpret_cast<PFNEGLRELEASETHREADPROC>(load("eglReleaseThread"));
   if (get_display != nullptr && CreateSync != nullptr && WaitForSync != nullptr &&
-      DestroySync != nullptr)
+      DestroySync != nullptr && GetCurrentContext != nullptr && ReleaseThread != nullptr)
     egl_display = get_display();
   for (const char* name : {"glGetGraphicsResetStatus", "glGetGraphicsResetStatusKHR",
                            "glGetGraphicsResetStatusEXT", "glGetGraphicsResetStatusARB"})

@@ -79,6 +79,8 @@ class Context {
   PFNEGLCREATESYNCKHRPROC CreateSync = nullptr;
   PFNEGLCLIENTWAITSYNCKHRPROC WaitForSync = nullptr;
   PFNEGLDESTROYSYNCKHRPROC DestroySync = nullptr;
+  PFNEGLGETCURRENTCONTEXTPROC GetCurrentContext = nullptr;
+  PFNEGLRELEASETHREADPROC ReleaseThread = nullptr;
   EGLDisplay egl_display = nullptr;
 
   /// Called with the name of each kernel before it runs, to measure it; may be empty.

@@ -78,7 +78,7 @@ class PixelSimulator final : public DvsSimulator {
         denoiser_(format),
         pixels_(format.width, format.height),
         fired_(format.width, format.height) {
-    state_.reserve(2 * planes * pixel_count(format) * 4);
+    state_.reserve(pixel_count(format) * planes * 2 * 4);
   }
 
  private:

@@ -136,7 +136,10 @@ void Fence::wait() const {
 }
 
 void Fence::wait_without_context() const {
-  if (egl_sync_ != EGL_NO_SYNC_KHR) gl_.WaitForSync(gl_.egl_display, egl_sync_, 0, patience);
+  if (egl_sync_ == EGL_NO_SYNC_KHR) return;
+  gl_.WaitForSync(gl_.egl_display, egl_sync_, 0, patience);
+  // libEGL of libglvnd frees the data of a thread that ends while the process exits twice.
+  if (gl_.GetCurrentContext() == EGL_NO_CONTEXT) gl_.ReleaseThread();
 }
 
 }  // namespace eventcamera::gl

@@ -118,9 +118,11 @@ class Comparison {
     intervals_ += 0.5;  // for each of both
     const auto events = scene::copy(*made);
     EXPECT_TRUE(scene::sorted(events));
-    for (const auto& event : events)
-      out[static_cast<std::size_t>(event.y() * width + event.x)].push_back(
+    for (const auto& event : events) {
+      const int pixel = event.y() * width + event.x;
+      out[static_cast<std::size_t>(pixel)].push_back(
           {start / 1000 + event.t, event.polarity() == Polarity::on});
+    }
   }
 
   LumaFormat format_{width, height, 8};
@@ -223,9 +225,9 @@ TEST_P(EveryApi, SimulatesMoreEventsThanFitAtFirst) {
   const auto frame = [](unsigned seed) {
     return scene::noise<std::uint8_t>(width, height, 8, seed);
   };
-  comparison.push(frame(0), 0);
-  comparison.restart_after(frame(1), frame_time);
-  for (unsigned i = 2; i < 6; ++i) comparison.push(frame(i), i * frame_time);
+  comparison.push(frame(1), 0);
+  comparison.restart_after(frame(2), frame_time);
+  for (unsigned i = 3; i < 7; ++i) comparison.push(frame(i), i * frame_time);
   comparison.expect_equal("many events");
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <random>
 #include <span>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -290,6 +291,7 @@ Function driver(const char* name) {
 
 /// Calls that wait for the GPU, or would copy what it has not yet written.
 int waits = 0;
+int releases = 0;
 bool is_gpu_busy = false;
 
 void* load_counting_waits(const char* name) {
@@ -307,7 +309,27 @@ void* load_counting_waits(const char* name) {
       ++waits;
       return driver<PFNGLMAPBUFFERRANGEPROC>("glMapBufferRange")(target, offset, length, access);
     });
+  if (function == "eglReleaseThread")
+    return reinterpret_cast<void*>(+[]() -> EGLBoolean {
+      ++releases;
+      return eglReleaseThread();
+    });
   return gl_test::load(name);
+}
+
+TEST(Simulator, LeavesNoDataOfEglInAThreadThatWaits) {
+  const EglContext current(false);
+  const gl::Context context(load_counting_waits);
+  const auto simulator = gl::make_frame_simulator(context, {64, 48, 8});
+  Texture texture(64, 48, 1);
+  texture.upload(bytes_of(scene::noise<std::uint8_t>(64, 48, 8, 1)));
+  simulator->queue(texture.frame({one, 0, 0, 0}), 0, {});
+  releases = 0;
+  simulator->wait();  // this thread keeps its context
+  EXPECT_EQ(releases, 0);
+  std::thread([&] { simulator->wait(); }).join();
+  EXPECT_EQ(releases, 1);
+  EXPECT_EQ(simulator->read(), nullptr);
 }
 
 TEST(Simulator, ReadsEventsBackWhileTheGpuWorksOnTheNextFrame) {
