@@ -2,6 +2,7 @@
 // Runs all benchmarks. Accepts the options of Google Benchmark, and --few-frames for the shortest
 // possible run.
 #include <benchmark/benchmark.h>
+#include <hwy/targets.h>
 
 #include <algorithm>
 #include <cstring>
@@ -18,6 +19,8 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
 
+  const auto targets = hwy::SupportedTargets();
+  benchmark::AddCustomContext("vectors", hwy::TargetName(targets & -targets));  // the best target
   const auto scenes = bench::scenes(few_frames);
   for (const auto& scene : scenes) {
     bench::register_simulators(scene);

@@ -18,6 +18,7 @@ def replace_tables(path, source, text):
 
 def run_on(context):
     """Date and machine of a run of Google Benchmark."""
-    return (f"Run on {context['date'][:10]} on {context['num_cpus']} CPUs at"
+    vectors = f" with {context['vectors']}" if "vectors" in context else ""
+    return (f"Run on {context['date'][:10]} on {context['num_cpus']} CPUs{vectors} at"
             f" {context['mhz_per_cpu']} MHz; initial load average"
             f" {context['load_avg'][0]:.1f}.\n")
