@@ -484,12 +484,12 @@ bool ReaderOutput::find_size(std::size_t index) {
     }
   }
   if (stream.is_implausible) {
-    constexpr int max_side = UsedPixels::max_guessed_side;
+    constexpr int side = UsedPixels::max_guessed_side;
     post_message(
         element_, GST_MESSAGE_ERROR,
         {GST_STREAM_ERROR_FORMAT,
          "The file does not state its sensor size, and its events lie beyond " +
-             in_pixels({max_side, max_side}) + ". If that is right, set width and height."},
+             in_pixels({side, side}) + ". If that is right, set width and height."},
         "columns and rows may have fractions, or other columns may have been read for them");
     return false;
   }
