@@ -57,11 +57,11 @@ template <class Enum>
 GType enum_type(const char* name, std::initializer_list<Choice<Enum>> choices) {
   const GType known = g_type_from_name(name);
   if (known != G_TYPE_INVALID) return known;
-  auto* const values = g_new0(GEnumValue, choices.size() + 1);  // the type keeps them
+  auto* const values = g_new0(GEnumValue, choices.size() + 1);
   std::ranges::transform(choices, values, [](const Choice<Enum>& choice) {
     return GEnumValue{static_cast<gint>(choice.value), choice.description, choice.name};
   });
-  return enum_type(name, values);
+  return enum_type(name, values);  // NOLINT(clang-analyzer-unix.Malloc): the type keeps them
 }
 
 /// Registers a type. For classes that several plugins contain, each with its own type name: names

@@ -61,7 +61,10 @@ class Image {
     if (other.bytes_ != nullptr) std::memcpy(bytes_, other.bytes_, size());
   }
   Image(Image&&) noexcept = default;
-  Image& operator=(const Image& other) { return *this = Image(other); }
+  Image& operator=(const Image& other) {
+    if (this != &other) *this = Image(other);
+    return *this;
+  }
   Image& operator=(Image&&) noexcept = default;
   ~Image() = default;
 
