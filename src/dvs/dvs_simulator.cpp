@@ -82,11 +82,7 @@ class PixelSimulator final : public DvsSimulator {
 
   const EventBuckets& events(Nanoseconds, const Settings&) override { return *made_; }
 
-  std::optional<Nanoseconds> latest() const override {
-    const auto microseconds = fired_.latest();
-    if (!microseconds) return std::nullopt;
-    return static_cast<Nanoseconds>(*microseconds * 1000) + 1;  // rounded up
-  }
+  std::optional<Nanoseconds> latest() const override { return fired_.latest(); }
 
   const EventBuckets& late(Nanoseconds duration) override {
     fired_.begin(in_microseconds(duration), settings_.max_rate, 0);

@@ -54,14 +54,15 @@ class IntervalEvents {
     return read;
   }
 
-  /// Microseconds from the end of the interval to the last deferred event of a rolling shutter, if
-  /// any.
-  std::optional<double> latest() const {
+  /// Time from the end of the interval to the last deferred event of a rolling shutter, rounded up;
+  /// none if there is none.
+  std::optional<Nanoseconds> latest() const {
     std::optional<double> latest;
-    if (rolling_shutter_ == 0) return latest;
+    if (rolling_shutter_ == 0) return std::nullopt;
     for (const auto& band : deferred_)
       for (const auto& deferred : band) latest = std::max(latest, std::optional(deferred.t));
-    return latest;
+    if (!latest) return std::nullopt;
+    return static_cast<Nanoseconds>(*latest * 1000) + 1;
   }
 
   /// Drops the causes of the deferred and waiting events.

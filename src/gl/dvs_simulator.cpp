@@ -200,11 +200,7 @@ class PixelSimulator final : public DvsSimulator {
     return fired_.end(events_, threads());
   }
 
-  std::optional<Nanoseconds> latest() const override {
-    const auto microseconds = fired_.latest();
-    if (!microseconds) return std::nullopt;
-    return static_cast<Nanoseconds>(*microseconds * 1000) + 1;  // rounded up
-  }
+  std::optional<Nanoseconds> latest() const override { return fired_.latest(); }
 
   const EventBuckets& late(Nanoseconds duration) override {
     fired_.begin(in_microseconds(duration), settings_.max_rate, 0);
