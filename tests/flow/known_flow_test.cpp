@@ -69,10 +69,6 @@ struct Sequence {
   double noise = 2;       ///< standard deviation, grey levels
 };
 
-void PrintTo(const Sequence& sequence, std::ostream* out) {
-  *out << sequence.name;
-}
-
 /// Frames 0, 1 and 2.
 Image<std::uint8_t> frame(const Sequence& sequence, int number) {
   std::mt19937 random(static_cast<unsigned>(number) + 1);
