@@ -168,11 +168,18 @@ TEST(Dvs, TakesOverexposedPixelsForBrighter) {
   }
 }
 
-/// All events of a short video whose rows have `padding` bytes past their end.
+struct Film {
+  std::vector<Event> events;
+  std::vector<Label> labels;
+
+  friend bool operator==(const Film&, const Film&) = default;
+};
+
+/// A short video whose rows have `padding` bytes past their end.
 template <class Pixel>
-std::vector<std::vector<Event>> film(DvsSimulator& simulator, int width, int height, int bits,
-                                     int threads, int padding = 0) {
-  std::vector<std::vector<Event>> intervals;
+Film film(DvsSimulator& simulator, int width, int height, int bits, const Settings& common,
+          int padding = 0) {
+  Film film;
   const auto stride = width * static_cast<std::ptrdiff_t>(sizeof(Pixel)) + padding;
   std::vector<std::uint8_t> memory(static_cast<std::size_t>(stride * height), 0xa5);
   for (int i = 0; i < 4; ++i) {
@@ -180,18 +187,20 @@ std::vector<std::vector<Event>> film(DvsSimulator& simulator, int width, int hei
     for (int y = 0; y < height; ++y)
       std::memcpy(memory.data() + y * stride, frame.row(y),
                   static_cast<std::size_t>(width) * sizeof(Pixel));
-    Settings common;
-    common.threads = threads;
-    if (const auto* made = simulator.push({{width, height, bits}, memory.data(), stride},
-                                          i * 33'333'333LL, common)) {
-      intervals.push_back(scene::copy(*made));
-      EXPECT_TRUE(scene::sorted(intervals.back()));
-    }
+    const auto* made =
+        simulator.push({{width, height, bits}, memory.data(), stride}, i * 33'333'333LL, common);
+    if (made == nullptr) continue;
+    auto events = scene::copy(*made);
+    std::vector<Label> labels(events.size());
+    if (simulator.has_labels()) simulator.label({events, labels});
+    EXPECT_TRUE(scene::sorted(events));
+    film.events.insert(film.events.end(), events.begin(), events.end());
+    film.labels.insert(film.labels.end(), labels.begin(), labels.end());
   }
-  return intervals;
+  return film;
 }
 
-TEST(Dvs, IsTheSameForAllThreadsStridesAndTargets) {
+TEST(Dvs, IsTheSameForAllThreadsStridesAndTargetsAndWithLabels) {
   struct Size {
     int width, height;
   };
@@ -199,18 +208,22 @@ TEST(Dvs, IsTheSameForAllThreadsStridesAndTargets) {
     auto along_motion = everything();
     along_motion.upsampling = Upsampling::motion;
     along_motion.max_interpolated_frames = 4;
-    for (const auto& settings : {everything(), along_motion, settings_of(DvsPreset::v2e_noisy)}) {
+    for (const auto& settings :
+         {everything(), along_motion, settings_of(DvsPreset::v2e_noisy),
+          settings_of(DvsPreset::davis346), DvsSettings{.leak_rate = 5, .adaptation = 0.3}}) {
       for (const int bits : {8, 10, 12, 16}) {
-        const auto play = [&](int threads, int padding) {
+        const auto play = [&](int threads, bool has_labels, int padding) {
           const auto simulator = make_dvs_simulator({size.width, size.height, bits});
           simulator->set(settings);
           const auto play_depth = bits == 8 ? film<std::uint8_t> : film<std::uint16_t>;
-          return play_depth(*simulator, size.width, size.height, bits, threads, padding);
+          return play_depth(*simulator, size.width, size.height, bits,
+                            {.threads = threads, .labels = has_labels}, padding);
         };
-        const auto expected = play(1, 0);
-        EXPECT_TRUE(play(2, 14) == expected);
+        const auto expected = play(1, true, 0);
+        EXPECT_TRUE(play(2, false, 14).events == expected.events);
         targets::for_each([&](const char* target) {
-          EXPECT_TRUE(play(2, 0) == expected) << target << " " << size.width << "x" << size.height;
+          EXPECT_TRUE(play(2, true, 0) == expected)
+              << target << " " << size.width << "x" << size.height;
         });
       }
     }
@@ -220,14 +233,15 @@ TEST(Dvs, IsTheSameForAllThreadsStridesAndTargets) {
 TEST(Dvs, ForgetsAndRepeatsItself) {
   auto settings = everything();
   const auto simulator = make_dvs_simulator({60, 40, 8});
-  simulator->set(settings);
-  const auto expected = film<std::uint8_t>(*simulator, 60, 40, 8, 2);
-  simulator->reset();
-  EXPECT_TRUE(film<std::uint8_t>(*simulator, 60, 40, 8, 2) == expected);
+  const auto play = [&] {
+    simulator->set(settings);
+    simulator->reset();
+    return film<std::uint8_t>(*simulator, 60, 40, 8, {.threads = 2}).events;
+  };
+  const auto expected = play();
+  EXPECT_TRUE(play() == expected);
   settings.seed = 12;
-  simulator->set(settings);
-  simulator->reset();
-  EXPECT_FALSE(film<std::uint8_t>(*simulator, 60, 40, 8, 2) == expected);
+  EXPECT_FALSE(play() == expected);
 }
 
 TEST(Dvs, GoesOnWhileTheLastFrameStands) {
