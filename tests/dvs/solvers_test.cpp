@@ -13,6 +13,7 @@
 #include "src/dvs/light_response.hpp"
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/pixel_solver.hpp"
+#include "src/dvs/random.hpp"
 #include "src/dvs/trajectory.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/dvs/playback.hpp"
@@ -30,6 +31,23 @@ TEST(Elementary, FunctionsAreTheirNamesakes) {
     ASSERT_NEAR(cosine, std::cos(x), 3e-8) << x;
     ASSERT_NEAR(sine, std::sin(x), 2e-9) << x;
   }
+}
+
+TEST(Random, IsNormalInTwoIndependentNumbers) {
+  const Random random(3);
+  constexpr int count = 200'000;
+  double squares = 0;
+  double fourths = 0;
+  double products = 0;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const auto [first, second] = random.normals(i / 4, Random::Purpose::event, i % 4);
+    squares += first * first + second * second;
+    fourths += std::pow(first, 4) + std::pow(second, 4);
+    products += first * second;
+  }
+  EXPECT_NEAR(squares / (2 * count), 1, 0.015);
+  EXPECT_NEAR(fourths / (2 * count), 3, 0.1);
+  EXPECT_NEAR(products / count, 0, 0.01);
 }
 
 TEST(Decay, IsTheExponentialFunction) {

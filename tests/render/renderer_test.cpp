@@ -310,6 +310,14 @@ TEST(Renderer, KeepsSoManyEventsAndNoMore) {
   EXPECT_EQ(draw(renderer, ever, 10), draw(other, ever, 10));
 }
 
+TEST(Exponential, IsOneAtNothingAndFadesToNothing) {
+  constexpr Microseconds time_constant = 33'333;
+  const Exponential exponential(time_constant);
+  for (Microseconds age = 0; age < 8 * time_constant; age += 1001)
+    EXPECT_NEAR(exponential.after(age), std::exp(-static_cast<double>(age) / time_constant), 2e-4);
+  EXPECT_EQ(exponential.after(Microseconds{1} << 60), 0);
+}
+
 int distance(const Colour& a, const Colour& b) {
   return std::max(
       {std::abs(a.red - b.red), std::abs(a.green - b.green), std::abs(a.blue - b.blue)});
