@@ -133,10 +133,12 @@ class DataSets(unittest.TestCase):
         self.assertIn("3 videos of the manifest compared, 0 differences", event_dataset("verify", recipe))
         manifest = load(folder, "manifest.json")
         manifest["videos"][0]["written"]["npz"]["sha256"] = "0" * 64
+        manifest["videos"][1]["input"]["sha256"] = "0" * 64
         with open(path_of(f"{folder}/other.json"), "w", encoding="utf-8") as file:
             json.dump(manifest, file)
         printed = event_dataset("verify", recipe, "--manifest", path_of(f"{folder}/other.json"), status=1)
         self.assertIn("run/four: other events, by the same versions", printed)
+        self.assertIn("run/three's: the input has changed since the manifest", printed)
         self.check_damage(folder, recipe)
 
     def check_damage(self, folder, recipe):
