@@ -151,6 +151,11 @@ class Consumer {
     segment.flags = flags;
     push([segment] { return gst_event_new_segment(&segment); });
   }
+  void push_custom() {
+    push([] {
+      return gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("custom"));
+    });
+  }
   /// Pushes an interval of 10 ms into each input: a frame, or a trigger and three events.
   void push_interval(guint index, bool discontinuous = false) {
     steps_.emplace_back([=](const Input& input) {
@@ -241,10 +246,12 @@ TEST_P(EveryConsumer, EndsEachSegmentOnceAfterItsStart) {
   }
 }
 
-TEST_P(EveryConsumer, EndsWithoutData) {
+TEST_P(EveryConsumer, ForwardsCustomEventsWithoutData) {
   Consumer it(GetParam());
   it.push_segment();
+  it.push_custom();
   it.end();
+  for (const auto& output : it.outputs()) EXPECT_GE(output->named("custom").size(), 1U);
 }
 
 TEST_P(EveryConsumer, EndsAfterGaps) {
@@ -260,41 +267,44 @@ TEST_P(EveryConsumer, ForwardsCustomEvents) {
   Consumer it(GetParam());
   it.push_segment();
   for (guint i = 0; i < 3; ++i) it.push_interval(i);
-  it.push([] {
-    return gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("custom"));
-  });
+  it.push_custom();
   it.end();
   for (const auto& output : it.outputs()) EXPECT_GE(output->named("custom").size(), 1U);
 }
 
-/// The output after a flush is that of an element which receives nothing before.
+/// The output after a flush is that of an element which receives nothing before, also if a segment
+/// has ended.
 TEST_P(EveryConsumer, StartsOverAfterAFlush) {
-  Consumer it(GetParam());
-  Consumer fresh(GetParam());
-  it.push_segment();
-  // An input holds one interval while another has none.
-  const guint before = it.inputs() > 1 ? 1 : 3;
-  for (guint i = 0; i < before; ++i) it.push_interval(i);
-  it.play();
-  // A sequence number in common tells aggregators that all inputs are flushed together.
-  const auto seqnum = gst_util_seqnum_next();
-  for (const bool starts : {true, false}) {
-    it.push([=] {
-      GstEvent* const event = starts ? gst_event_new_flush_start() : gst_event_new_flush_stop(TRUE);
-      gst_event_set_seqnum(event, seqnum);
-      return event;
-    });
+  for (const bool ends_segment : {false, true}) {
+    Consumer it(GetParam());
+    Consumer fresh(GetParam());
+    it.push_segment();
+    // An input holds one interval while another has none.
+    const guint before = it.inputs() > 1 ? 1 : 3;
+    for (guint i = 0; i < before; ++i) it.push_interval(i);
+    if (ends_segment) it.push([] { return gst_event_new_segment_done(GST_FORMAT_TIME, 0); });
     it.play();
-  }
-  for (auto* consumer : {&it, &fresh}) {
-    consumer->push_segment(1 * GST_SECOND);
-    for (guint i = 0; i < 3; ++i) consumer->push_interval(before + i);
-    consumer->end();
-    consumer->expect_segments();
-  }
-  for (std::size_t i = 0; i < it.outputs().size(); ++i) {
-    EXPECT_EQ(it.outputs()[i]->buffers_after_flushes(),
-              fresh.outputs()[i]->buffers_after_flushes());
+    // A sequence number in common tells aggregators that all inputs are flushed together.
+    const auto seqnum = gst_util_seqnum_next();
+    for (const bool starts : {true, false}) {
+      it.push([=] {
+        GstEvent* const event =
+            starts ? gst_event_new_flush_start() : gst_event_new_flush_stop(TRUE);
+        gst_event_set_seqnum(event, seqnum);
+        return event;
+      });
+      it.play();
+    }
+    for (auto* consumer : {&it, &fresh}) {
+      consumer->push_segment(1 * GST_SECOND);
+      for (guint i = 0; i < 3; ++i) consumer->push_interval(before + i);
+      consumer->end();
+      consumer->expect_segments();
+    }
+    for (std::size_t i = 0; i < it.outputs().size(); ++i) {
+      EXPECT_EQ(it.outputs()[i]->buffers_after_flushes(),
+                fresh.outputs()[i]->buffers_after_flushes());
+    }
   }
 }
 
