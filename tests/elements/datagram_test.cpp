@@ -333,32 +333,6 @@ TEST(Payloader, SendsBeforeTheEndOfASegment) {
   EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 1);
 }
 
-TEST(Payloader, ForgetsEventsThatAreFlushed) {
-  Harness h(patient);
-  h.caps(events_caps, "application/x-event-datagram");
-  h.push(ten_events(5));
-  flush({h.get()});
-  push_segment(h.get());
-  h.push(ten_events(0));
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  const auto buffer = h.pull();
-  ASSERT_TRUE(buffer);
-  EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), 0);
-  EXPECT_EQ(gst_buffer_get_size(buffer.get()), 80);
-  EXPECT_FALSE(h.pull());
-}
-
-TEST(Payloader, SkipsEventsOutsideTheSensor) {
-  Harness h("eventdatagrampay format=spif");
-  h.caps(events_caps, "application/x-event-datagram");
-  h.push(buffer_of(0,
-                   {Event::at(640, 2, 1, Polarity::on), Event::at(639, 2, 2, Polarity::on),
-                    Event::at(1, 480, 3, Polarity::on)},
-                   40 * GST_MSECOND));
-  EXPECT_EQ(gst_buffer_get_size(h.pull().get()), 4);
-  EXPECT_EQ(h.warning(), "Cannot send all events: some are outside the sensor; skipping them.");
-}
-
 /// A queue sends refused caps again, before the next buffer.
 TEST(Payloader, RefusesThemEachTime) {
   Harness h("eventdatagrampay format=jaer");

@@ -267,17 +267,6 @@ TEST_F(EventLabel, SkipsImagesWithoutATime) {
   EXPECT_EQ(label.text_of_next(GST_MESSAGE_WARNING), "");
 }
 
-TEST_F(EventLabel, SkipsEventsWithoutATime) {
-  begin();
-  push_image(0, 1);
-  push_events(GST_CLOCK_TIME_NONE, {0});
-  push_events(0, {0});
-  push_image(40 * ms, 2);
-  EXPECT_EQ(classes(), Classes{1});
-  EXPECT_EQ(label.text_of_next(GST_MESSAGE_WARNING),
-            "Cannot label all events: a buffer has no PTS; skipping them.");
-}
-
 TEST_F(EventLabel, StartsOverWithEventsThatAreFlushedAlone) {
   begin();
   push_image(0, 1);
@@ -301,15 +290,6 @@ TEST(LiveEventLabel, WaitsNoLongerThanTheLatency) {
       "format=GRAY8, width=64, height=48, framerate=50/1\" ! queue ! label.video_sink");
   EXPECT_TRUE(pipeline.play()) << pipeline.error;
   EXPECT_EQ(pipeline.stat("sink", "rendered"), 9U);
-}
-
-TEST(LiveEventLabel, SaysThatImagesAreMissing) {
-  Pipeline pipeline(
-      "videotestsrc is-live=true pattern=ball num-buffers=3 ! "
-      "video/x-raw,width=64,height=48,framerate=50/1 ! eventsim-diff ! eventlabel ! fakesink");
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-  ASSERT_EQ(pipeline.warnings.size(), 1U);
-  EXPECT_NE(pipeline.warnings[0].find("link a source of images"), std::string::npos);
 }
 
 const std::string moving_ball =

@@ -292,17 +292,6 @@ TEST_F(StatsTest, WritesToALinkAPipeAndADevice) {
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
 }
 
-TEST_F(StatsTest, RefusesEventsWithoutTimes) {
-  for (const std::string element : {"eventstats", "rtpeventpay", "eventdatagrampay"}) {
-    Harness h(element);
-    h.caps(small_sensor, "ANY");
-    push_segment(h.get(), GST_FORMAT_BYTES);
-    const auto error = h.error();
-    EXPECT_NE(error.find("this stream has no timestamps"), std::string::npos)
-        << element << ": " << error;
-  }
-}
-
 /// Sets an element to PAUSED and returns its error.
 std::string refusal_of(const std::string& launch) {
   gst_init(nullptr, nullptr);
@@ -620,28 +609,6 @@ TEST_F(CompareTest, WritesNothingAtAStopWhereNothingHasComeSinceItDid) {
   EXPECT_TRUE(std::filesystem::remove(path("f.json")));
   gst_element_set_state(compare->element.get(), GST_STATE_READY);
   EXPECT_FALSE(std::filesystem::exists(path("f.json")));
-}
-
-/// Which asks for memory again. A tee waits for the answers of both of its branches.
-TEST(Compare, GoesOnWhereItsSourceChanges) {
-  const std::string source =
-      "videotestsrc num-buffers=30 ! video/x-raw, width=64, height=48, framerate=30/1 ! k.  ";
-  Pipeline pipeline(
-      "concat name=k ! eventsim-diff ! tee name=t  t. ! queue ! c.candidate  t. ! queue ! "
-      "c.reference  eventcompare name=c ! fakesink  " +
-      source + source);
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-}
-
-TEST(Compare, AsksOnceForTheStreamThatIsMissing) {
-  Harness h("eventcompare", "candidate", "src");
-  for (const char* width : {"8", "9"})
-    gst_harness_set_src_caps_str(
-        h.get(),
-        (std::string("application/x-event-camera, format=XYTP, height=4, width=") + width).c_str());
-  h.wait_for_events();
-  EXPECT_NE(h.warning().find("link a stream to the pad \"reference\""), std::string::npos);
-  EXPECT_EQ(h.warning(), "");
 }
 
 /// At once, because a source whose size changes may wait for one of the streams itself.
