@@ -172,10 +172,11 @@ class Consumer {
       gst_pad_push(input.pad.get(), buffer);
     });
   }
-  void push_custom() {
+  void push_custom_event_and_tag() {
     push([] {
       return gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("custom"));
     });
+    push([] { return gst_event_new_tag(gst_tag_list_new(GST_TAG_TITLE, "title", nullptr)); });
   }
   /// Pushes an interval of 10 ms into each input: a frame, or a trigger and three events.
   void push_interval(guint index, bool discontinuous = false) {
@@ -218,11 +219,14 @@ class Consumer {
     EXPECT_TRUE(has_ended_) << testing::PrintToString(texts);
     for (const auto& output : outputs_) EXPECT_EQ(output->named("eos").size(), 1U);
   }
-  /// Expects the custom events of the main input, or, where data of all inputs are joined, of each.
-  void expect_custom_events() const {
+  /// Expects the custom events and tags of the main input; where inputs are joined, the custom
+  /// events of each.
+  void expect_custom_events_and_tags() const {
     const bool joins = kind_.name() == "eventmerge" || kind_.name() == "aedatmux";
-    for (const auto& output : outputs_)
+    for (const auto& output : outputs_) {
       EXPECT_EQ(output->named("custom").size(), joins ? inputs_.size() : 1U);
+      EXPECT_TRUE(joins || output->named("buffer").empty() || !output->named("tag").empty());
+    }
   }
   /// Expects every buffer and GAP to follow a SEGMENT, also after a flush.
   void expect_segments() const {
@@ -284,12 +288,12 @@ TEST_P(EveryConsumer, EndsEachSegmentOnceAfterItsStart) {
   }
 }
 
-TEST_P(EveryConsumer, ForwardsCustomEventsWithoutData) {
+TEST_P(EveryConsumer, ForwardsCustomEventsAndTagsWithoutData) {
   Consumer it(GetParam());
   it.push_segment();
-  it.push_custom();
+  it.push_custom_event_and_tag();
   it.end();
-  it.expect_custom_events();
+  it.expect_custom_events_and_tags();
 }
 
 TEST_P(EveryConsumer, EndsAfterGaps) {
@@ -301,13 +305,13 @@ TEST_P(EveryConsumer, EndsAfterGaps) {
   it.expect_segments();
 }
 
-TEST_P(EveryConsumer, ForwardsCustomEvents) {
+TEST_P(EveryConsumer, ForwardsCustomEventsAndTags) {
   Consumer it(GetParam());
   it.push_segment();
   for (guint i = 0; i < 3; ++i) it.push_interval(i);
-  it.push_custom();
+  it.push_custom_event_and_tag();
   it.end();
-  it.expect_custom_events();
+  it.expect_custom_events_and_tags();
 }
 
 /// The output after a flush is that of an element which receives nothing before, also if a segment

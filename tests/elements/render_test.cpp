@@ -98,15 +98,6 @@ void expect(const std::vector<Buffer>& found, const std::vector<Picture>& expect
   }
 }
 
-TEST_F(Render, DrawsAnIntervalAsSimulatorsDo) {
-  begin(grey_at("25/1"));
-  for (int i = 0; i < 4; ++i) push(i * 40 * ms, column(i));
-  expect(finish(), {{0, 40 * ms, accumulated(column(0))},
-                    {40 * ms, 40 * ms, accumulated(column(1))},
-                    {80 * ms, 40 * ms, accumulated(column(2))},
-                    {120 * ms, 40 * ms, accumulated(column(3))}});
-}
-
 /// Intervals of a third of 100 ms, with ends rounded down; all fire at their very end.
 TEST_F(Render, KeepsIntervalsApartThatAreRounded) {
   begin(grey_at("30/1"));
@@ -126,12 +117,8 @@ TEST_F(Render, KeepsIntervalsApartThatAreRounded) {
         << i;
 }
 
-class RenderOverlapping : public Render {
- protected:
-  RenderOverlapping() : Render("eventrender accumulation-time=60000000") {}
-};
-
-TEST_F(RenderOverlapping, DrawsWindowsThatAreLongerThanPictures) {
+TEST_F(Render, DrawsWindowsThatAreLongerThanPictures) {
+  g_object_set(h.element(), "accumulation-time", 60 * ms, nullptr);
   begin(grey_at("50/1"));
   push(0, column(5));
   push(40 * ms, column(6));
@@ -206,12 +193,6 @@ TEST_F(Render, DrawsThroughSilencesButNotThroughLeaps) {
   EXPECT_TRUE(GST_BUFFER_IS_DISCONT(pictures.back().get()));
 }
 
-TEST_F(Render, DrawsWhatThereIsAtTheEnd) {
-  begin(grey_at("10/1"));
-  push(0, column(1));
-  expect(finish(), {{0, 100 * ms, accumulated(column(1))}});
-}
-
 TEST_F(Render, DrawsWhatThereIsAtTheEndOfASegment) {
   begin(grey_at("10/1"));
   push(0, column(1));
@@ -239,22 +220,6 @@ TEST_F(Render, IsDiscontinuousAfterTwoFlushes) {
   segment(0);
   push(0, column(2));
   EXPECT_TRUE(GST_BUFFER_IS_DISCONT(wait_for_picture().get()));
-}
-
-TEST_F(Render, PassesTags) {
-  begin(grey_at("25/1"));
-  gst_harness_push_event(
-      h.get(), gst_event_new_tag(gst_tag_list_new(GST_TAG_CONTAINER_FORMAT, "AEDAT", nullptr)));
-  push(0, column(1));
-  wait_for_picture();
-  const auto event = h.pull_event(GST_EVENT_TAG);
-  ASSERT_TRUE(event);
-  GstTagList* tags = nullptr;
-  gst_event_parse_tag(event.get(), &tags);
-  gchar* format = nullptr;
-  EXPECT_TRUE(gst_tag_list_get_string(tags, GST_TAG_CONTAINER_FORMAT, &format));
-  EXPECT_STREQ(format, "AEDAT");
-  g_free(format);
 }
 
 TEST_F(Render, DrainsAndBeginsAnewInAnotherSegment) {
@@ -319,18 +284,6 @@ TEST_F(Render, DrainsWhenTheSensorChanges) {
   EXPECT_EQ(h.warning(), "");
 }
 
-class RenderEachFormat : public Render, public testing::WithParamInterface<const char*> {};
-INSTANTIATE_TEST_SUITE_P(, RenderEachFormat,
-                         testing::Values("BGRx", "RGBx", "xRGB", "xBGR", "BGRA", "RGBA", "ARGB",
-                                         "ABGR", "RGB", "BGR", "GRAY8"));
-
-class RenderEachMode : public Render, public testing::WithParamInterface<const char*> {
- protected:
-  RenderEachMode() : Render("eventrender palette=grey mode=" + std::string(GetParam())) {}
-};
-INSTANTIATE_TEST_SUITE_P(, RenderEachMode,
-                         testing::Values("accumulate", "decay", "time-surface", "count"));
-
 TEST_F(Render, TakesSettingsWhilePlaying) {
   begin(grey_at("25/1"));
   push(0, column(1));
@@ -344,12 +297,8 @@ TEST_F(Render, TakesSettingsWhilePlaying) {
   EXPECT_EQ(static_cast<guint8>(bytes[2]), 255);
 }
 
-class RenderByCount : public Render {
- protected:
-  RenderByCount() : Render("eventrender event-count=24") {}
-};
-
-TEST_F(RenderByCount, KeepsTheLastEventsUntilOthersCome) {
+TEST_F(Render, KeepsTheLastEventsUntilOthersCome) {
+  g_object_set(h.element(), "event-count", 24U, nullptr);
   begin(grey_at("25/1"));
   push(0, column(1));
   gst_harness_push_event(h.get(), gst_event_new_gap(40 * ms, 40 * ms));
