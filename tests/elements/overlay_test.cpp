@@ -241,16 +241,6 @@ TEST_F(OverlayTest, SendsNoGapBeforeItsSegment) {
   EXPECT_EQ(GST_EVENT_TYPE(event.get()), GST_EVENT_SEGMENT);
 }
 
-TEST_F(OverlayTest, GoesOnWithoutEventsThatEndBeforeTheyBegin) {
-  gst_harness_set_src_caps_str(video.get(),
-                               "video/x-raw, format=GRAY8, width=8, height=4, framerate=25/1");
-  gst_harness_push_event(events.get(), gst_event_new_eos());
-  for (const GstClockTime pts : {0 * ms, 40 * ms}) {
-    push_frame(pts);
-    EXPECT_EQ(drawn(), Places{});
-  }
-}
-
 /// Which asks for memory again. A tee waits for the answers of both of its branches.
 TEST(Overlay, GoesOnWhereItsSourceChanges) {
   const std::string source =

@@ -104,17 +104,6 @@ TEST_F(Tensor, HasTheSettings) {
       << h->out_caps();
 }
 
-TEST_F(Tensor, OverlapsByCount) {
-  begin("event-count=4 overlap=0.5");
-  push_columns(0, 3);
-  expect_tensor(3'333'000, 13'333'000, 0, 4);
-  expect_tensor(13'333'000, 13'333'000, 2, 6);
-  expect_tensor(23'333'000, 13'333'000, 4, 8);
-  end();
-  EXPECT_FALSE(h->pull());
-  EXPECT_NE(h->out_caps().find("framerate=(fraction)0/1"), std::string::npos);
-}
-
 TEST_F(Tensor, EndsWithTheSegment) {
   begin("accumulation-time=25000000");
   push_columns(0, 0);
@@ -202,15 +191,6 @@ TEST_F(Tensor, FollowsNewCaps) {
   EXPECT_NE(h->out_caps().find("dimensions=(string)64:48:1:1"), std::string::npos);
 }
 
-TEST_F(Tensor, GoesOnWithCapsOfTheSameSize) {
-  begin("accumulation-time=50000000");
-  push_columns(0, 2);
-  gst_harness_set_src_caps_str(
-      h->get(), "application/x-event-camera, format=XYTP, width=32, height=24, framerate=50/1");
-  push_columns(3, 4);
-  expect_tensor(0, 50 * ms, 0, 10);
-}
-
 TEST_F(Tensor, TellsWhatToSetForTheTensorsThatDownstreamWants) {
   const std::pair<const char*, const char*> wishes[] = {
       {"types=uint8", "types=uint8 (set data-type)."},
@@ -238,12 +218,6 @@ TEST_F(Tensor, RefusesToBeHuge) {
   EXPECT_NE(h->push(buffer_of(0, column(0), 10 * ms)), GST_FLOW_OK);
   EXPECT_EQ(h->error(),
             "Cannot make tensors that take more than 1 GiB; lower bins or the resolution.");
-}
-
-TEST_F(Tensor, HasWindowsOfAMicrosecondOrMore) {
-  begin("accumulation-time=1 representation=event-frame");
-  EXPECT_EQ(h->push(buffer_of(0, {}, 10 * GST_USECOND)), GST_FLOW_OK);
-  EXPECT_EQ(gst_harness_buffers_received(h->get()), 10U);
 }
 
 /// The result of tensors in place of a GAP.
