@@ -254,19 +254,6 @@ TEST(EventCut, BoundsTheEventsOfAWindow) {
   EXPECT_NE(cut.h.warning().find("more than 16777216 in a window"), std::string::npos);
 }
 
-TEST(EventCut, SkipsInvalidEventsAndBuffers) {
-  Cut cut;
-  cut.push_triggers({{0, 0, true}, {9'000, 0, true}});
-  const std::vector<Event> events{{1, 1, 1}, {2, 8, 1}, {20'000, 1, 1}};
-  EXPECT_EQ(cut.h.push(buffer_of(GST_CLOCK_TIME_NONE, events, 0)), GST_FLOW_OK);
-  EXPECT_EQ(cut.h.push(gst_buffer_new_allocate(nullptr, 7, nullptr)), GST_FLOW_OK);
-  EXPECT_EQ(cut.h.push(buffer_of(0, events, 10 * GST_MSECOND)), GST_FLOW_OK);
-  EXPECT_EQ(cut.windows(), Texts{"0+9000: 1 DISCONT"});
-  EXPECT_EQ(stat_of(cut.h.element(), "rejected-events"), 5U);
-  push_backwards_segment(cut.h.get());
-  EXPECT_NE(cut.h.error().find("backwards"), std::string::npos);
-}
-
 TEST(EventCut, KeepsLabelsAndPassesTriggersOn) {
   Cut cut;
   const OutputOrder order(cut.h.get());
@@ -340,18 +327,6 @@ TEST_P(EventCutPipeline, HasATensorOrPictureOfEachWindow) {
     EXPECT_EQ(times[i] - times[i - 1], 20 * GST_MSECOND);
   EXPECT_EQ(pipeline.stat("cut", "events"), 190U);
   EXPECT_EQ(pipeline.stat("cut", "dropped-events"), 190U - (24 * 4 - 10));
-}
-
-/// Frames of 1 kHz, whose shutter is open for half of the time.
-TEST(EventCutRecording, IsCut) {
-  const std::string path =
-      std::string(g_getenv("SHARED_DATA")) + "/events/evt3-640x480-triggers.raw";
-  if (!std::filesystem::exists(path)) GTEST_SKIP();
-  Player player("filesrc location=" + in_quotes(path) + " ! evtdec ! eventcut name=cut");
-  ASSERT_TRUE(player.play()) << player.error;
-  EXPECT_GT(player.stat("cut", "windows"), 100U);
-  EXPECT_EQ(player.events.size(),
-            player.stat("cut", "events") - player.stat("cut", "dropped-events"));
 }
 
 }  // namespace

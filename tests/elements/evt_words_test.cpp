@@ -197,30 +197,6 @@ TEST_P(EveryWord, FillBuffersOfALimitedSize) {
   EXPECT_EQ(pull_events(reader), expected);
 }
 
-TEST(EvtEnc, PutsManyEventsIntoABufferOfALimitedSize) {
-  Events events;
-  for (int i = 0; i < 10'000; ++i)
-    events.push_back(AbsoluteEvent::at(i % 320, i / 320, i / 100, Polarity::on));
-  for (const char* const limit : {"1400", "4294967295"}) {
-    Writer writer(std::string("evtenc mtu=") + limit, words_caps("EVT2"));
-    writer.write(events, 0);
-    const auto count = gst_harness_buffers_in_queue(writer.get());
-    if (std::string_view(limit) == "1400")
-      EXPECT_LE(count, 31U);  // 29 of them would be full
-    else
-      EXPECT_EQ(count, 1U);
-  }
-}
-
-TEST(EvtDec, NeedsNoFramerateInCaps) {
-  const auto file = file_of(format_of("evt3"), some_events());
-  const TemporaryFile words(file.substr(file.find("% end\n") + 6));
-  Player player(words.source() +
-                "application/x-event-camera,format=EVT3,width=320,height=240 ! evtdec");
-  EXPECT_TRUE(player.play()) << player.error;
-  EXPECT_EQ(player.events.size(), 20'000U);
-}
-
 TEST(EvtEnc, KeepsTriggers) {
   using eventcamera::Trigger;
   const auto events = some_events();

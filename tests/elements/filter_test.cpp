@@ -211,30 +211,6 @@ TEST_F(FilterTest, RejectsEventsThatAreInvalid) {
   EXPECT_NE(h.warning().find("earlier than the previous one"), std::string::npos);
 }
 
-TEST_F(FilterTest, RejectsBuffersThatAreInvalid) {
-  EXPECT_EQ(h.push(buffer_of(GST_CLOCK_TIME_NONE, {on(0)}, 5 * ms)), GST_FLOW_OK);
-  EXPECT_NE(h.warning().find("no PTS"), std::string::npos);
-  GstBuffer* partial = buffer_of(0, {on(0)}, 5 * ms);
-  gst_buffer_set_size(partial, 7);
-  EXPECT_EQ(h.push(partial), GST_FLOW_OK);
-  EXPECT_NE(h.warning().find("not a multiple of 8"), std::string::npos);
-  EXPECT_FALSE(h.pull());
-  EXPECT_TRUE(passes(5 * ms));
-}
-
-TEST_F(FilterTest, RefusesSegmentsBackwardsOrWithoutTimes) {
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  segment.rate = -1;
-  segment.stop = GST_SECOND;
-  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
-  EXPECT_EQ(h.error(), "Cannot filter events backwards; play at a positive rate.");
-  gst_segment_init(&segment, GST_FORMAT_BYTES);
-  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
-  EXPECT_NE(h.error().find("no timestamps"), std::string::npos);
-  EXPECT_EQ(h.push(buffer_of(0, {on(0)}, ms)), GST_FLOW_ERROR);
-}
-
 TEST_F(FilterTest, TakesNewSettingsWhilePlaying) {
   EXPECT_TRUE(passes(0));
   g_object_set(h.element(), "refractory-period", guint64{20 * ms}, nullptr);
