@@ -31,9 +31,9 @@ class Buffer {
   /// Replaces the contents by `size` zeros.
   void assign_zeros(std::size_t size);
 
-  /// Copies the first bytes to `out`, once the GPU has written them. Throws Error if the context is
-  /// lost.
-  void read(std::span<std::byte> out) const;
+  /// Copies bytes from `offset` on to `out`, once the GPU has written them. Throws Error if the
+  /// context is lost.
+  void read(std::span<std::byte> out, std::size_t offset = 0) const;
 
  private:
   const Context& gl_;
