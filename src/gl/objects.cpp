@@ -96,7 +96,8 @@ void Kernel::run(Groups groups, std::initializer_list<const Buffer*> buffers,
     gl_.BindBufferBase(GL_SHADER_STORAGE_BUFFER, binding++, buffer->name());
   GLint location = 0;
   for (const int value : values) gl_.Uniform1i(location++, value);
-  gl_.DispatchCompute(static_cast<GLuint>(groups.x), static_cast<GLuint>(groups.y), 1);
+  gl_.DispatchCompute(static_cast<GLuint>(groups.x), static_cast<GLuint>(groups.y),
+                      static_cast<GLuint>(groups.z));
   gl_.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
 }
 
