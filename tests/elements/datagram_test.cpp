@@ -167,22 +167,6 @@ TEST(Payloader, LetsNoEventWaitIfNoBufferComes) {
   }
 }
 
-TEST(Payloader, FillsDatagramsIfItMay) {
-  Harness h(patient);
-  h.caps(events_caps, "application/x-event-datagram");
-  for (int i = 0; i < 39; ++i) h.push(ten_events(i, 10 * GST_MSECOND));
-  EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 3);
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 4);
-  const auto first = h.pull();
-  EXPECT_EQ(GST_BUFFER_PTS(first.get()), 0);
-  EXPECT_EQ(GST_BUFFER_DURATION(first.get()), 99 * GST_MSECOND);
-  EXPECT_EQ(GST_BUFFER_PTS(h.pull().get()), 100 * GST_MSECOND);
-  EXPECT_EQ(stat_of(h.element(), "packets"), 4);
-  EXPECT_EQ(stat_of(h.element(), "events"), 390);
-  EXPECT_EQ(stat_of(h.element(), "bytes"), 390 * 8);
-}
-
 TEST(Payloader, SendsDuringGapsAndBeforeSegmentsStartOrEnd) {
   Harness h(patient);
   h.caps(events_caps, "application/x-event-datagram");
@@ -360,18 +344,6 @@ TEST(Depayloader, NeedsArrivalTimesForEventsWithoutTimes) {
   Depay h("format=spif");
   EXPECT_EQ(h.push(datagram({1, 0, 2, 0x80}, GST_CLOCK_TIME_NONE)), GST_FLOW_ERROR);
   EXPECT_NE(h.error().find("do-timestamp=true"), std::string::npos);
-}
-
-TEST(Depayloader, ContinuesWithoutArrivalTimesWhenTheSenderStartsOver) {
-  Depay h("format=t32-x16-y15-on1");
-  for (const guint32 t : {5'000'000, 8'000'000, 1'000'000})
-    EXPECT_EQ(h.push(t32(t, 0, GST_CLOCK_TIME_NONE)), GST_FLOW_OK);
-  GstSegment segment;
-  gst_event_copy_segment(h.pull_event(GST_EVENT_SEGMENT).get(), &segment);
-  EXPECT_EQ(segment.base, 0);
-  gst_event_copy_segment(h.pull_event(GST_EVENT_SEGMENT).get(), &segment);
-  EXPECT_EQ(segment.start, GST_SECOND);
-  EXPECT_EQ(segment.base, 3 * GST_SECOND);
 }
 
 TEST(Depayloader, SegmentsHaveTheSequenceNumberOfUpstream) {

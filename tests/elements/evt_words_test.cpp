@@ -229,29 +229,6 @@ TEST(EvtEnc, KeepsTriggers) {
     }
 }
 
-TEST(EvtEnc, DoesNotCollectTriggersWithoutEvents) {
-  std::vector<eventcamera::Trigger> triggers;
-  Writer writer("evtenc", "application/x-prophesee-raw");
-  for (int i = 0; i < 20; ++i) {
-    for (int j = 0; j < 10'000; ++j)
-      triggers.push_back({10 * static_cast<Microseconds>(triggers.size()), 1, j % 2 == 0});
-    EXPECT_TRUE(gst_harness_push_event(writer.get(), event_of(std::span(triggers).last<10'000>())));
-  }
-  auto bytes = writer.pull_bytes();
-  EXPECT_GT(bytes.size(), 200'000U);
-  writer.write(AbsoluteEvent::at(1, 2, 1'000'000, Polarity::on), 1'000'000);  // too late
-  const auto event = AbsoluteEvent::at(1, 2, 3'000'000, Polarity::on);
-  writer.write(event, 3'000'000);
-  EXPECT_TRUE(writer.dropped().starts_with("Dropped 1 event earlier "));
-  bytes += writer.end();
-  const auto decoder = eventcamera::make_prophesee_raw_decoder();
-  eventcamera::Decoded decoded;
-  decoder->decode({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, decoded);
-  decoder->finish(decoded);
-  EXPECT_EQ(decoded.triggers, triggers);
-  EXPECT_EQ(decoded.events, std::vector{event});
-}
-
 TEST(EvtEnc, TakesTheFormatThatDownstreamLeaves) {
   Writer h("evtenc format=EVT4", "application/x-event-camera, format=(string){ EVT2, EVT3, EVT4 }");
   EXPECT_NE(h.out_caps().find("EVT4"), std::string::npos);

@@ -198,18 +198,13 @@ TEST_F(FileTest, MasksPixels) {
   EXPECT_EQ(passed(h, {on(1, 1), on(2, 1), on(3, 1)}), (Pixels{{1, 1}, {3, 1}}));
 }
 
-TEST_F(FileTest, MaskOfAnotherSizeIsAnError) {
+TEST_F(FileTest, MaskThatDoesNotFitIsAnError) {
   write_mask(4, 8, std::vector<png_byte>(32, 255));
   const auto error = error_of("eventmask" + location());
   EXPECT_NE(error.find("4 x 8 pixels, but the sensor has 8 x 4"), std::string::npos) << error;
   EXPECT_NE(error.find(file.path()), std::string::npos) << error;
-}
-
-TEST_F(FileTest, MaskThatIsNoPictureIsAnError) {
   write("no picture");
   EXPECT_NE(error_of("eventmask" + location()).find("cannot read the mask"), std::string::npos);
-  EXPECT_NE(error_of("eventmask location=/nowhere/at/all.png").find("No such file"),
-            std::string::npos);
 }
 
 /// Focal length 10, principal point (4, 2).
@@ -239,16 +234,12 @@ TEST_F(FileTest, CalibrationMayBeText) {
             std::string::npos);
 }
 
-TEST_F(FileTest, CalibrationOfAnotherSizeIsAnError) {
+TEST_F(FileTest, CalibrationThatDoesNotFitIsAnError) {
   write(calibration("0.", "image_width: 346\nimage_height: 260\n"));
   const auto error = error_of("eventundistort" + location());
   EXPECT_NE(error.find("346 x 260 pixels, but the sensor has 8 x 4"), std::string::npos) << error;
-  write(calibration("0.", "image_height: 3\n"));
-  EXPECT_NE(error_of("eventundistort" + location()).find("8 x 3 pixels"), std::string::npos);
   write("camera: [");
   EXPECT_NE(error_of("eventundistort" + location()).find("line"), std::string::npos);
-  EXPECT_NE(error_of("eventundistort location=/nowhere/at/all.yaml").find("/nowhere"),
-            std::string::npos);
 }
 
 }  // namespace

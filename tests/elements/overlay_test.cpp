@@ -241,19 +241,6 @@ TEST_F(OverlayTest, SendsNoGapBeforeItsSegment) {
   EXPECT_EQ(GST_EVENT_TYPE(event.get()), GST_EVENT_SEGMENT);
 }
 
-/// Which asks for memory again. A tee waits for the answers of both of its branches.
-TEST(Overlay, GoesOnWhereItsSourceChanges) {
-  const std::string source =
-      "videotestsrc num-buffers=30 ! video/x-raw, width=64, height=48, framerate=30/1 ! k.  ";
-  Pipeline pipeline(
-      "concat name=k ! identity single-segment=true ! tee name=t  t. ! queue ! videoconvert ! "
-      "eventoverlay name=overlay ! fakesink name=sink  t. ! queue ! eventsim-diff ! "
-      "overlay.event_sink  " +
-      source + source);
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-  EXPECT_EQ(pipeline.stat("sink", "rendered"), 60U);
-}
-
 class OverlayHalf : public OverlayTest {
  protected:
   OverlayHalf() : OverlayTest("eventoverlay palette=grey opacity=0.5 accumulation-time=80000000") {}

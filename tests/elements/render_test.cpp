@@ -333,16 +333,6 @@ TEST_F(Render, LeavesOutPicturesThatComeTooLate) {
   EXPECT_EQ(dropped, 1U);
 }
 
-TEST_F(Render, DrawsAsManyPicturesAsASinkThatThrottlesTakes) {
-  begin(grey_at("25/1"));
-  push(0, column(1));
-  wait_for_picture();
-  gst_harness_push_upstream_event(
-      h.get(), gst_event_new_qos(GST_QOS_TYPE_THROTTLE, 1, static_cast<gint64>(80 * ms), 0));
-  for (int i = 1; i < 3; ++i) push(i * 40 * ms, column(i));
-  expect(finish(), {{80 * ms, 40 * ms, accumulated(column(2))}});
-}
-
 /// Live source, and a clock controlled by the test.
 class RenderLive : public Render {
  protected:

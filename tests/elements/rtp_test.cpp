@@ -6,20 +6,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <map>
 #include <optional>
 
 #include "src/wire/rtp_payload.hpp"
 #include "tests/elements/event_buffer.hpp"
 #include "tests/wire/rtp_packets.hpp"
-
-static bool is_memory_short = false;
-
-/// Replaces GLib's function for all libraries and plugins.
-extern "C" __attribute__((visibility("default"))) gpointer g_try_malloc(gsize size) {
-  return is_memory_short && size > 65536 ? nullptr : std::malloc(size);
-}
 
 namespace {
 
@@ -396,20 +388,6 @@ TEST(RtpEventDepay, MapsTheSendersTimesToTheTimeOfArrival) {
   EXPECT_EQ(running(0, 14), 140 * ms);
   EXPECT_EQ(running(1, 15), 170 * ms);
   EXPECT_EQ(output.segments[1].time, 170 * ms);
-}
-
-TEST(RtpEventDepay, ReportsThatMemoryIsShort) {
-  const std::vector<Event> events(10'000, Event::at(1, 2, 3, Polarity::on));
-  auto packets = packets_of({{0, 10'000'000, events}});
-  for (const bool is_whole : {true, false}) {
-    Depayloader h;
-    if (!is_whole) packets.pop_back();
-    is_memory_short = true;
-    for (const auto& packet : packets) h.take(packet.get());
-    end(h);
-    is_memory_short = false;
-    EXPECT_EQ(h.error(), "Not enough memory to receive events.");
-  }
 }
 
 TEST(RtpEventDepay, StartsOverWithItsSender) {

@@ -242,23 +242,6 @@ TEST_P(EverySimulator, BeginsAnewInAnotherSegmentButNotInTheSame) {
   expect_interval(5 * GST_SECOND, 5 * GST_SECOND + 40 * ms);
 }
 
-TEST_P(EverySimulator, TimesTheFramesOfASourceOfBytes) {
-  gst_harness_set_live(h.get(), FALSE);
-  h.caps(video);
-  GstSegment bytes;
-  gst_segment_init(&bytes, GST_FORMAT_BYTES);
-  gst_harness_push_event(h.get(), gst_event_new_segment(&bytes));
-  flash(GST_CLOCK_TIME_NONE);
-  flash(GST_CLOCK_TIME_NONE);
-  h.wait_for_events();
-  expect_interval(0, 40 * ms);
-  Owned<GstEvent> last;
-  while (Owned<GstEvent> event = h.pull_event(GST_EVENT_SEGMENT)) last = std::move(event);
-  const GstSegment* segment = nullptr;
-  gst_event_parse_segment(last.get(), &segment);
-  EXPECT_EQ(segment->format, GST_FORMAT_TIME);
-}
-
 TEST_P(EverySimulator, HoldsTheLastFrameThroughAGapOfTheVideo) {
   h.caps(video);
   gst_harness_push_event(h.get(), gst_event_new_gap(0, 10 * ms));
@@ -456,21 +439,6 @@ TEST_P(EverySimulator, DropsLateRowsInAFlush) {
   EXPECT_FALSE(h.pull());
 }
 
-TEST_P(EverySimulator, DrawsTheRowsOfItsFramesWhateverTheShutter) {
-  const auto pictures_with = [](gint64 shutter) {
-    Harness simulator(GetParam());
-    g_object_set(simulator.element(), "rolling-shutter", shutter, nullptr);
-    simulator.caps(video, pictures_of(GetParam()));
-    std::vector<std::string> pictures;
-    for (int i = 0; i < 4; ++i) {
-      push_square(simulator, i, i * 40 * ms);
-      pictures.push_back(bytes_of(simulator.pull().get()));
-    }
-    return pictures;
-  };
-  EXPECT_EQ(pictures_with(23 * ms), pictures_with(0));
-}
-
 struct Latency {
   std::string caps;
   std::vector<int> intervals;  ///< of frames, ms
@@ -530,25 +498,6 @@ TEST_P(EverySimulator, KeepsLatenessFromUpstream) {
   while (GstEvent* event = gst_harness_try_pull_upstream_event(h.get())) {
     EXPECT_NE(GST_EVENT_TYPE(event), GST_EVENT_QOS);
     gst_event_unref(event);
-  }
-}
-
-TEST(Dvs, SendsTheNoiseOfAGap) {
-  for (const std::string element : {"eventsim-dvs", "gleventsim-dvs"}) {
-    Harness h(element + " leak-rate=100");
-    h.caps(video);
-    h.push(h.flat(0, 90));
-    gst_harness_push_event(h.get(), gst_event_new_gap(40 * ms, 100 * ms));
-    h.push(h.flat(140 * ms, 90));
-    const auto held = h.pull();  // up to a frame's length before the end of the gap
-    ASSERT_TRUE(held);
-    EXPECT_EQ(GST_BUFFER_PTS(held.get()), 0U);
-    EXPECT_EQ(GST_BUFFER_DURATION(held.get()), 100 * ms);
-    EXPECT_EQ(events_of(held.get()).size(), 32U * 24U * 10U);
-    const auto next = h.pull();
-    ASSERT_TRUE(next);
-    EXPECT_EQ(GST_BUFFER_PTS(next.get()), 100 * ms);
-    EXPECT_EQ(GST_BUFFER_DURATION(next.get()), 40 * ms);
   }
 }
 
