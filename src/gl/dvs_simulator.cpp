@@ -362,26 +362,26 @@ class PixelSimulator final : public DvsSimulator {
     is_second_ = !is_second_;
   }
 
+  /// Writes the tables of an interval, and the responses if they changed.
   void write_tables(bool moves) {
     const PixelModel& model = pixels_.model();
-    Words words;
-    words.add_64(model.random.key());
-    words.add_float(model.mean_thresholds.positive);
-    words.add_float(model.mean_thresholds.negative);
-    words.add_float(model.settings.threshold_sigma);
-    words.add_float(model.settings.threshold_jitter);
-    words.add_float(model.gap);
-    words.add_float(model.latency);
-    words.add_float(model.latency_jitter);
-    words.add_float(model.adaptation.rate());
-    words.add_float(model.adaptation.duration());
-    const std::size_t header = words.size();
-    const auto here = [&] { return static_cast<std::uint32_t>(words.size() - header); };
-    words.add_all(std::span(response_.table()));
+    Words header;
+    header.add_64(model.random.key());
+    header.add_float(model.mean_thresholds.positive);
+    header.add_float(model.mean_thresholds.negative);
+    header.add_float(model.settings.threshold_sigma);
+    header.add_float(model.settings.threshold_jitter);
+    header.add_float(model.gap);
+    header.add_float(model.latency);
+    header.add_float(model.latency_jitter);
+    header.add_float(model.adaptation.rate());
+    header.add_float(model.adaptation.duration());
 
+    Words words;
+    const auto& responses = response_.table();
+    const auto here = [&] { return static_cast<std::uint32_t>(responses.size() + words.size()); };
     const int columns = moves ? tiles_.columns() : 1;
     const int rows = moves ? tiles_.rows() : 1;
-    const std::size_t first_tile = words.size();
     plans_ = static_cast<int>(here());
     for (int tile = 0; tile < columns * rows; ++tile) words.add(std::uint32_t{0});
     std::map<int, std::uint32_t> plans;
@@ -400,9 +400,21 @@ class PixelSimulator final : public DvsSimulator {
         plan = here();
         add_plan(timeline_.plan(steps), steps, shade_tables, words);
       }
-      words[first_tile + static_cast<std::size_t>(tile)] = plan;
+      words[static_cast<std::size_t>(tile)] = plan;
     }
-    tables_.assign(words.bytes());
+
+    const auto response_bytes = std::as_bytes(std::span(responses));
+    const std::size_t first_plan = header.bytes().size() + response_bytes.size();
+    const std::size_t size = first_plan + words.bytes().size();
+    if (size > tables_.size()) {
+      tables_.reserve(std::bit_ceil(size));
+      responses_.clear();
+    }
+    tables_.assign(header.bytes());
+    tables_.assign(words.bytes(), first_plan);
+    if (responses == responses_) return;
+    tables_.assign(response_bytes, header.bytes().size());
+    responses_ = responses;
   }
 
   static void add_shades(const ShadeTables& tables, Words& words) {
@@ -460,8 +472,9 @@ class PixelSimulator final : public DvsSimulator {
   bool is_second_ = false;  ///< the second one is the current state
   Buffer scene_;            ///< frames that the CPU prepared, and the flow
   Buffer tables_;
-  int plans_ = 0;       ///< place in tables_
-  bool moves_ = false;  ///< the last interval follows the flow
+  std::vector<float> responses_;  ///< in tables_
+  int plans_ = 0;                 ///< place in tables_
+  bool moves_ = false;            ///< the last interval follows the flow
   EventSort sort_;
   Unread unread_[max_queued];
   int last_ = 0;             ///< index of the last interval

@@ -25,11 +25,11 @@ void Buffer::reserve(std::size_t size) {
   size_ = size;
 }
 
-void Buffer::assign(std::span<const std::byte> bytes) {
-  reserve(bytes.size());
+void Buffer::assign(std::span<const std::byte> bytes, std::size_t offset) {
+  reserve(offset + bytes.size());
   gl_.BindBuffer(GL_SHADER_STORAGE_BUFFER, name_);
-  gl_.BufferSubData(GL_SHADER_STORAGE_BUFFER, 0, static_cast<GLsizeiptr>(bytes.size()),
-                    bytes.data());
+  gl_.BufferSubData(GL_SHADER_STORAGE_BUFFER, static_cast<GLintptr>(offset),
+                    static_cast<GLsizeiptr>(bytes.size()), bytes.data());
 }
 
 void Buffer::assign_zeros(std::size_t size) {

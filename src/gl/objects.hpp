@@ -25,8 +25,8 @@ class Buffer {
   /// Makes it at least `size` bytes long; if it must grow, its contents are lost. Throws Error.
   void reserve(std::size_t size);
 
-  /// Replaces the contents.
-  void assign(std::span<const std::byte> bytes);
+  /// Replaces the contents from `offset` on. If it must grow for this, its contents are lost.
+  void assign(std::span<const std::byte> bytes, std::size_t offset = 0);
 
   /// Replaces the contents by `size` zeros.
   void assign_zeros(std::size_t size);
