@@ -5,7 +5,6 @@
 
 #include "src/flow/dis/dis.hpp"
 #include "src/flow/opencv.hpp"
-#include "src/flow/opencv_dis.hpp"
 
 /// OpenCV's implementation of DIS with the parameters of ours, for images of at least 64x64 pixels.
 inline eventcamera::Image<eventcamera::Flow> opencv_dis(

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Lists of hot pixels.
-#include "src/filter/pixel_list.hpp"
+#include "src/filter/hot_pixel_filter.hpp"
 
 #include <stdexcept>
 
