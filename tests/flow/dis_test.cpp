@@ -8,7 +8,6 @@
 #include <tuple>
 
 #include "src/flow/opencv.hpp"
-#include "src/flow/opencv_dis.hpp"
 #include "tests/flow/moving_pictures.hpp"
 
 namespace {

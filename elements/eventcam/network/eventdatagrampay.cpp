@@ -44,7 +44,7 @@
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
-#include "src/wire/datagram_packer.hpp"
+#include "src/wire/datagrams.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_pay_debug);
 #define GST_CAT_DEFAULT event_datagram_pay_debug

@@ -4,6 +4,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "src/core/event.hpp"
 #include "src/formats/compression/compressed_frames.hpp"
@@ -57,5 +62,18 @@ constexpr std::size_t aedat4_max_packet = std::size_t{64} << 20;
 
 /// Times beyond this, in either direction, are corrupt: 36,000 years.
 constexpr Microseconds aedat4_last_time = Microseconds{1} << 60;
+
+/// Content of the XML in an AEDAT4 header.
+struct Aedat4InfoNode {
+  std::vector<StreamInfo> streams;
+  bool whole = true;  ///< false: the XML is corrupt, and `streams` is incomplete
+};
+
+Aedat4InfoNode read_info_node(std::string_view xml);
+
+std::string write_info_node(std::span<const StreamInfo> streams, Aedat4Compression compression);
+
+/// Kind of streams whose packets have this four-character identifier.
+StreamKind aedat4_kind(std::string_view identifier);
 
 }  // namespace eventcamera

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/aedat/aedat4_info_node.hpp"
+#include "src/formats/aedat/aedat4.hpp"
 
 #include <algorithm>
 #include <array>
