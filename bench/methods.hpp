@@ -33,7 +33,7 @@ inline Method dense_method(const std::string& name, FlowMethod flow) {
           }};
 }
 
-/// Thresholds are those of the settings.
+/// The settings have the thresholds.
 inline Method dvs_method(const std::string& name, const DvsSettings& settings) {
   return {name, 0, [settings](const auto& format) {
             auto simulator = make_dvs_simulator(format);

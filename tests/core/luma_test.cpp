@@ -44,8 +44,8 @@ int in_8_bits(int value, int bits) {
 constexpr std::pair<int, int> sizes[] = {{1, 1},  {2, 3},  {3, 2},   {5, 4},  {15, 3},  {16, 2},
                                          {17, 5}, {31, 7}, {33, 40}, {66, 3}, {131, 37}};
 
-/// Random samples, extremes included, with `padding` samples past each row but the last: its end is
-/// that of the memory, so that a sanitizer sees what is read past it.
+/// Random samples, extremes included, with `padding` samples past each row but the last, which ends
+/// the memory, so that a sanitizer sees reads past it.
 template <class Sample>
 struct Rows {
   Rows(int per_row, int rows, int padding, int white, unsigned seed)

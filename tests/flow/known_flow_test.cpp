@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// End-point errors between noisy pictures warped by a known flow: those of tracks and of
+// End-point errors between noisy pictures warped by a known flow: the errors of tracks and of
 // Farneback's flow are no larger than OpenCV's, in mean and 95th percentile, and hardly more tracks
 // are lost.
 #include <gtest/gtest.h>

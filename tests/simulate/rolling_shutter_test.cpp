@@ -61,7 +61,7 @@ bool is_earlier(const AbsoluteEvent& a, const AbsoluteEvent& b) {
   return std::tuple(a.t, a.y(), a.x, a.y_p) < std::tuple(b.t, b.y(), b.x, b.y_p);
 }
 
-/// Collects the events of a simulator, with absolute times, until those of its late rows.
+/// Collects the events of a simulator, late rows included, with absolute times.
 class Recording {
  public:
   explicit Recording(std::unique_ptr<Simulator> simulator) : simulator_(std::move(simulator)) {}
