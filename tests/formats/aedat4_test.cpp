@@ -15,9 +15,9 @@
 #include <numeric>
 
 #include "src/core/byte_order.hpp"
+#include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
-#include "src/formats/aedat/aedat4_table.hpp"
 #include "tests/formats/aedat_files.hpp"
 #include "tests/formats/pieces.hpp"
 #include "tests/formats/random_events.hpp"
