@@ -238,7 +238,7 @@ class RtpUnpacker {
     std::uint64_t earliest_ = 0;
   };
 
-  /// Decodes a packet's events after those of the current interval. False, without any change, if
+  /// Appends a packet's events to the current interval's. False, without any change, if
   /// any part of the packet is invalid.
   std::optional<RtpPayloadHeader> decode(const RtpPacket& packet) {
     events_.resize(event_count_);

@@ -158,7 +158,7 @@ class ChunkedBagFile : public BagFile {
 
   using Bytes = std::span<const std::uint8_t>;
 
-  /// `magic`: first bytes of the file. `scanned_bytes`: as many as begins_record() needs.
+  /// `magic`: first bytes of the file. `scanned_bytes`: needed by begins_record().
   ChunkedBagFile(AddTopic add_topic, std::string_view magic, std::size_t scanned_bytes)
       : BagFile(std::move(add_topic)), magic_(magic), scanned_bytes_(scanned_bytes) {}
 
