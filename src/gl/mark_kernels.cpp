@@ -17,7 +17,15 @@ void DifferenceKernel::run(const GreyFrame& before, const GreyFrame& now,
   kernel_.run({groups_of(64, words), format_.height},
               {&before.buffer(), &now.buffer(), &out.marks()},
               {format_.width, words, out.marks_across(), (step - 1) * out.marks_a_step(),
-               thresholds.positive, thresholds.negative});
+               thresholds.positive, thresholds.negative, 0, 1});
+}
+
+void DifferenceKernel::run(const Buffer& frames, int ring_size, const Thresholds& thresholds,
+                           int first, int end, const EventList& out) const {
+  const int words = GreyFrame::words_across(format_.width);
+  kernel_.run({groups_of(64, words), format_.height, end - first}, {&frames, &frames, &out.marks()},
+              {format_.width, words, out.marks_across(), (first - 1) * out.marks_a_step(),
+               thresholds.positive, thresholds.negative, first - 1, ring_size});
 }
 
 InterpolationKernel::InterpolationKernel(const Context& gl, const LumaFormat& format)

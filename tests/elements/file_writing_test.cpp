@@ -109,15 +109,6 @@ TEST(Writers, CountSimulatedEventsInStreamTime) {
   }
 }
 
-TEST_P(EveryFormat, TellsOfEventsLeftOutWhereItIsStopped) {
-  Writer h(format());
-  h.write(AbsoluteEvent::at(5, 5, 1000, Polarity::on), 0);
-  h.write(AbsoluteEvent::at(5, 5, 10, Polarity::on), 0);
-  EXPECT_EQ(h.warning(), "");
-  gst_element_set_state(h.element(), GST_STATE_READY);
-  EXPECT_TRUE(h.warning().starts_with("Dropped 1 event earlier"));
-}
-
 TEST(EventNpzEnc, TellsOfEventsThatAreLostWithoutTheEnd) {
   Writer h(format_of("npz"));
   h.write(some_events(), 0);

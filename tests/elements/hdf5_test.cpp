@@ -158,18 +158,6 @@ struct Sink : Harness {
   void end() { gst_harness_push_event(get(), gst_event_new_eos()); }
 };
 
-TEST_P(Hdf5, IsWholeWhereThePipelineIsStoppedBeforeTheEnd) {
-  const auto path = folder_ / "out.h5";
-  const Events events = {AbsoluteEvent::at(5, 6, 1'000'007, Polarity::on),
-                         AbsoluteEvent::at(7, 8, 1'000'009, Polarity::off)};
-  {
-    Sink sink("eventhdf5sink format=" + std::string(GetParam()) + " location=" + in_quotes(path));
-    sink.caps(events_caps);
-    EXPECT_EQ(sink.push(events, 1'000'000), GST_FLOW_OK);
-  }
-  EXPECT_TRUE(read(path) == events);
-}
-
 TEST_P(Hdf5, IsWrittenToAnotherFileAfterAStop) {
   const auto first = folder_ / "first.h5";
   const auto second = folder_ / "second.h5";

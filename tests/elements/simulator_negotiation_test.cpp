@@ -243,35 +243,4 @@ TEST(Allocation, TellsUpstreamThatAnyStrideIsWelcome) {
   gst_caps_unref(caps);
 }
 
-TEST(Allocation, AsksForFramesThatDoNotStraddleCacheLines) {
-  Pipeline pipeline(
-      "videotestsrc num-buffers=8 ! video/x-raw,format=GRAY8,width=640,height=480 ! "
-      "videoconvert ! eventsim-frame name=simulator ! fakesink");
-  int straddling = 0;
-  GstPad* sink = gst_element_get_static_pad(pipeline["simulator"], "sink");
-  gst_pad_add_probe(
-      sink, GST_PAD_PROBE_TYPE_BUFFER,
-      [](GstPad*, GstPadProbeInfo* info, gpointer count) {
-        GstMapInfo map;
-        gst_buffer_map(GST_PAD_PROBE_INFO_BUFFER(info), &map, GST_MAP_READ);
-        if (reinterpret_cast<std::uintptr_t>(map.data) % 64 != 0) ++*static_cast<int*>(count);
-        gst_buffer_unmap(GST_PAD_PROBE_INFO_BUFFER(info), &map);
-        return GST_PAD_PROBE_OK;
-      },
-      &straddling, nullptr);
-  gst_object_unref(sink);
-  EXPECT_TRUE(pipeline.play());
-  EXPECT_EQ(straddling, 0);
-}
-
-TEST(Allocation, TakesPicturesFromAPool) {
-  Harness h("eventsim-frame");
-  h.caps("video/x-raw, format=GRAY8" + size, "video/x-raw, format=GRAY8");
-  h.push(h.flat(0, 50));
-  h.push(h.flat(40 * GST_MSECOND, 50));
-  const auto buffer = h.pull();
-  ASSERT_TRUE(buffer);
-  EXPECT_NE(buffer->pool, nullptr);
-}
-
 }  // namespace

@@ -50,27 +50,6 @@ TEST_P(EverySimulator, GivesTheSameBytesForAnyStrideAndNumberOfThreads) {
   EXPECT_EQ(intervals(padded, 4, is_on_gpu(GetParam()) ? 20 : 19), expected);
 }
 
-TEST_P(EverySimulator, GivesEventsWithinThePictureSorted) {
-  Harness h(GetParam());
-  h.caps(video(61, 43));
-  for (int i = 0; i < 4; ++i) {
-    h.push(h.frame(i * 40 * GST_MSECOND, [i](int x, int y) { return moving_square(x, y, i); }));
-    const auto buffer = h.pull();
-    if (!buffer) continue;
-    const auto events = events_of(buffer.get());
-    for (std::size_t k = 0; k < events.size(); ++k) {
-      ASSERT_LT(events[k].x, 61);
-      ASSERT_LT(gst_event_camera_event_get_y(&events[k]), 43U);
-      ASSERT_LE(events[k].t, 40'000U);
-      if (k > 0) {
-        ASSERT_LT(std::tuple(events[k - 1].t, gst_event_camera_event_get_y(&events[k - 1]),
-                             events[k - 1].x),
-                  std::tuple(events[k].t, gst_event_camera_event_get_y(&events[k]), events[k].x));
-      }
-    }
-  }
-}
-
 TEST_P(EverySimulator, BeginsAnewWhenTheSizeChanges) {
   Harness h(GetParam());
   h.caps(video(61, 43));
@@ -136,34 +115,6 @@ TEST_P(EverySimulator, StandsBesideItsLikes) {
   }
   for (auto& thread : threads) thread.join();
   EXPECT_EQ(equal, 4);
-}
-
-TEST_P(EverySimulator, TakesPropertiesWhilePlaying) {
-  Harness h(GetParam());
-  h.caps(video(61, 43));
-  std::atomic<bool> done = false;
-  std::thread application([&] {
-    for (int i = 0; !done; ++i) {
-      const double unit = is_physical(GetParam()) ? 0.02 : 1;
-      g_object_set(h.element(), "positive-threshold", unit * (i % 50 + 1.5), "negative-threshold",
-                   unit * (i % 40 + 0.5), "n-threads", i % 3, "palette", i % 4, nullptr);
-      if (is_physical(GetParam()))
-        g_object_set(h.element(), "preset", i % 7, "cutoff-frequency", i % 3 * 50.0, "response",
-                     i % 3, "upsampling", i % 2, "pixel-latency",
-                     guint64{30} * static_cast<guint64>(i % 4) * GST_MSECOND, "max-rate",
-                     i % 2 * 1e5, nullptr);
-      else if (!std::string(GetParam()).ends_with("-frame"))
-        g_object_set(h.element(), "interpolated-frames", i % 20, nullptr);
-      if (std::string(GetParam()).ends_with("-dense"))
-        g_object_set(h.element(), "interpolation", i % 2, nullptr);
-      if (std::string(GetParam()) == "eventsim-dense")
-        g_object_set(h.element(), "flow", i % 3, nullptr);
-    }
-  });
-  intervals(h, 15);
-  done = true;
-  application.join();
-  EXPECT_EQ(h.error(), "");
 }
 
 /// A frame with an invalid meta.
@@ -329,18 +280,6 @@ TEST(Stream, WarnsOfAFileWithoutTheTimesOfBuffers) {
     gst_harness_set_src_caps_str(h.get(), video(61, 43).c_str());
     h.wait_for_events();
     EXPECT_EQ(h.warning().find("eventnpzenc") != std::string::npos, writer.empty());
-  }
-}
-
-TEST(Stream, WarnsOfNoVideoThatIsTurnedUpright) {
-  for (const char* before : {"videoflip video-direction=auto ! queue",
-                             "bin.( bin.( videoflip video-direction=auto ) ! identity )"}) {
-    Harness h(std::string(before) + " ! eventsim-frame name=simulator");
-    h.caps(video(61, 43));
-    push_orientation(h, "rotate-90");
-    h.push(h.flat(0, 50));
-    h.wait_for_events();
-    EXPECT_EQ(h.warning(), "") << before;
   }
 }
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Moves points to where they are in step j. If several reach the same pixel, the last one in raster
-// order wins. In a second run, points that moved mark the pixels that they left.
+// Moves points to where they are in each step from `first` on. If several reach the same pixel, the
+// last one in raster order wins. Points that moved mark the pixels that they left.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Motions { ivec2 motions[]; };
-layout(std430, binding = 1) buffer Winners { uint winners[]; };  // place of a point plus 1, left
+layout(std430, binding = 1) buffer Winners { uint winners[]; };  // by step; place of a point plus 2
 layout(location = 0) uniform int width;
-layout(location = 1) uniform int j;  // number of the step
-layout(location = 2) uniform int marks_left;
+layout(location = 1) uniform int first;
+layout(location = 2) uniform int steps;
 
-const uint left = 0x80000000u;
+const uint left = 1u;
 
 void main() {
   int x = int(gl_GlobalInvocationID.x);
@@ -17,9 +17,10 @@ void main() {
   if (x >= width) return;
   ivec2 motion = motions[y * width + x];
   if (motion.x == int(none)) return;
-  ivec2 at = ivec2(x, y) + (motion * j + 32768 >> 16);
-  if (marks_left == 0)
-    atomicMax(winners[at.y * width + at.x], uint(y * width + x + 1));
-  else if (at != ivec2(x, y))
-    winners[y * width + x] |= left;
+  int rows = int(gl_NumWorkGroups.y);
+  for (int i = 0; i < steps; ++i) {
+    ivec2 at = ivec2(x, y) + (motion * (first + i) + 32768 >> 16);
+    atomicMax(winners[(i * rows + at.y) * width + at.x], uint(y * width + x + 2));
+    if (at != ivec2(x, y)) atomicMax(winners[(i * rows + y) * width + x], left);
+  }
 }
