@@ -516,7 +516,7 @@ class EventReader {
     return handle_bytes_segment(start, seqnum);
   }
 
-  /// A file begins, or upstream has done a seek that it was asked for.
+  /// Begins a file, or completes a seek that upstream has done.
   gboolean handle_bytes_segment(guint64 start, guint32 seqnum) {
     const auto restart = timeline_.restart();
     const bool is_sought = restart && restart->byte() == start && seqnum != restart->superseded;

@@ -11,9 +11,9 @@
 #include <string>
 #include <tuple>
 
+#include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
-#include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/aedat/aedat_decoder.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/decoder.hpp"

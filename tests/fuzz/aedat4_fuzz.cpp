@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // AEDAT4, through the reader for all AEDAT versions, and its packet table.
+#include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_decoder.hpp"
-#include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/aedat/aedat_decoder.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 #include "tests/fuzz/item_sums.hpp"

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "src/formats/aedat/aedat4.hpp"
-#include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/encoder.hpp"
 
 namespace eventcamera {

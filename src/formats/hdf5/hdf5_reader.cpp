@@ -114,7 +114,7 @@ class Hdf5Decoder final : public Decoder {
   std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
   std::vector<AbsoluteEvent> events_;
   std::vector<Trigger> triggers_;
-  bool events_due_ = false;  ///< events_ are to be returned
+  bool events_due_ = false;  ///< next() returns events_
   Microseconds triggers_until_ = std::numeric_limits<Microseconds>::min();  ///< time of the last
   bool opened_ = false;  ///< opened, not collected
 };

@@ -50,7 +50,7 @@ class JoinedColumns {
       field.offset += header_.element_bytes;
     }
     header_.element_bytes += array.header.element_bytes;
-    // More than there are if an array is shorter, which NpyDecoder reports.
+    // Too many if another array is shorter, which NpyDecoder reports.
     header_.count = std::max(header_.count, array.header.count);
     arrays_.push_back(std::move(array));
   }

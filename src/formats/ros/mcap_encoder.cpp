@@ -104,7 +104,7 @@ std::uint64_t nanoseconds(Microseconds t) {
   return static_cast<std::uint64_t>(t) * 1000;
 }
 
-/// Size of a packet's encoding in the message, with its zero.
+/// Name of the encoding in a message, with its final zero.
 constexpr std::string_view name_of(BagEvents events) {
   return events == BagEvents::evt3 ? std::string_view("evt3\0", 5) : std::string_view("mono\0", 5);
 }
