@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // What writers of event files of every format write, leave out and report.
-#include <ctime>
-
 #include "src/formats/file_formats.hpp"
 #include "tests/elements/event_files.hpp"
 #include "tests/elements/recording_files.hpp"
@@ -247,22 +245,6 @@ TEST_P(EveryFormat, SurvivesTriggersOfAnyKind) {
   reader.read(h.end());
   EXPECT_EQ(pull_events(reader), events);
   EXPECT_EQ(reader.warning(), "");
-}
-
-TEST_P(EveryFormat, WritesAnyNumberOfTriggersAmongTheEventsOfABuffer) {
-  constexpr int count = 60'000;
-  Events events;
-  std::vector<eventcamera::Trigger> triggers;
-  for (int i = 0; i < count; ++i) {
-    triggers.push_back({10 * i, 1, i % 2 == 0});
-    events.push_back(AbsoluteEvent::at(5, 5, 10 * i + 5, Polarity::on));
-  }
-  Writer h(format());
-  EXPECT_TRUE(gst_harness_push_event(h.get(), event_of(triggers)));
-  const std::clock_t before = std::clock();
-  h.write(events, 0);
-  EXPECT_LT(std::clock() - before, 10 * CLOCKS_PER_SEC);  // not a pass over all for each of them
-  EXPECT_EQ(events_in(format(), h.end()).size(), events.size());
 }
 
 }  // namespace

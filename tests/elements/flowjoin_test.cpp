@@ -158,15 +158,6 @@ TEST_F(FlowJoin, MatchesByRunningTime) {
   EXPECT_EQ(joined(), 2.F);
 }
 
-TEST_F(FlowJoin, PassesFramesWithoutATime) {
-  begin();
-  push_frame(GST_CLOCK_TIME_NONE);
-  push_flow(0, 2);
-  EXPECT_EQ(joined(), none);
-  push_frame(0);
-  EXPECT_EQ(joined(), 2.F);
-}
-
 TEST_F(FlowJoin, NeedsFlowOfTheSizeOfTheVideo) {
   begin("2:3:4");
   push_frame(0);

@@ -251,16 +251,6 @@ TEST_F(MergeTest, EndsASegmentOnceAllStreamsHave) {
   gint64 position = -1;
   gst_event_parse_segment_done(done.get(), nullptr, &position);
   EXPECT_EQ(position, gint64{20 * ms});
-
-  for (auto* input : {a(), b()}) play_on(input, 20 * ms);
-  push(a(), 0, {on(1, 0, 0)});
-  push(b(), 0, {on(2, 0, 1)});
-  EXPECT_EQ(rest(), (Events{on_at(1, 0, 0), on_at(2, 0, 1)}));
-  const auto segment = next_event(a(), GST_EVENT_SEGMENT);
-  ASSERT_TRUE(segment);
-  GstSegment played;
-  gst_event_copy_segment(segment.get(), &played);
-  EXPECT_EQ(played.base, 20 * ms);
 }
 
 /// A seek is forwarded to all streams, or refused.
@@ -538,18 +528,6 @@ TEST(Merge, GoesOnWithALiveStreamAlone) {
     ASSERT_TRUE(player.play()) << player.error;
     EXPECT_EQ(player.events.size() > 100, frames > 0);
   }
-}
-
-TEST(Merge, MergesLiveStreams) {
-  Player player(
-      "videotestsrc is-live=true pattern=ball num-buffers=15 ! video/x-raw, width=64, height=48, "
-      "framerate=50/1 ! eventsim-frame ! queue ! eventmerge name=m sink_1::ypos=48  videotestsrc "
-      "is-live=true pattern=ball num-buffers=10 ! video/x-raw, width=64, height=48, "
-      "framerate=30/1 ! eventsim-frame ! queue ! m.sink_1  m.");
-  ASSERT_TRUE(player.play()) << player.error;
-  EXPECT_TRUE(player.warnings.empty()) << player.warnings.front();
-  EXPECT_TRUE(std::ranges::any_of(player.events, [](const auto& e) { return e.y() < 48; }));
-  EXPECT_TRUE(std::ranges::any_of(player.events, [](const auto& e) { return e.y() >= 48; }));
 }
 
 /// The live stream goes on without the other one, whose events are then too late.

@@ -63,17 +63,6 @@ class OverlayTest : public testing::Test {
 
 using Places = std::vector<std::pair<int, int>>;
 
-TEST_F(OverlayTest, DrawsTheEventsOfEachFramesInterval) {
-  begin("width=8, height=4");
-  push_frame(0);
-  push_events(0, {Event::at(1, 0, 0, Polarity::on), Event::at(2, 1, 40'000, Polarity::off)});
-  EXPECT_EQ(drawn(), (Places{{1, 255}, {10, 0}}));
-  push_frame(40 * ms);
-  push_events(40 * ms, {Event::at(7, 3, 5, Polarity::on), Event::at(7, 3, 6, Polarity::off)});
-  EXPECT_EQ(drawn(), (Places{{31, 64}}));
-  EXPECT_EQ(last_pts, 40 * ms);
-}
-
 TEST_F(OverlayTest, CutsBuffersOfEventsWhereFramesEnd) {
   begin("width=8, height=4");
   push_frame(0);
@@ -222,23 +211,6 @@ TEST_F(OverlayTest, PassesGapsInTheVideoOn) {
     if (GST_EVENT_TYPE(event.get()) == GST_EVENT_GAP)
       gst_event_parse_gap(event.get(), &start, nullptr);
   EXPECT_EQ(start, 80 * ms);
-}
-
-TEST_F(OverlayTest, SendsNoGapBeforeItsSegment) {
-  begin("width=8, height=4");
-  push_frame(0);
-  push_events(0, {});
-  EXPECT_EQ(drawn(), Places{});
-  while (const Owned<GstEvent> event{gst_harness_try_pull_event(video.get())}) continue;
-  for (auto* h : {video.get(), events.get()}) play_on(h, 40 * ms);
-  gst_harness_push_event(video.get(), gst_event_new_gap(0, 40 * ms));
-  push_events(0, {});
-  push_frame(40 * ms);
-  push_events(40 * ms, {});
-  EXPECT_EQ(drawn(), Places{});
-  const Owned<GstEvent> event(gst_harness_pull_event(video.get()));
-  ASSERT_TRUE(event);
-  EXPECT_EQ(GST_EVENT_TYPE(event.get()), GST_EVENT_SEGMENT);
 }
 
 class OverlayHalf : public OverlayTest {

@@ -98,25 +98,6 @@ void expect(const std::vector<Buffer>& found, const std::vector<Picture>& expect
   }
 }
 
-/// Intervals of a third of 100 ms, with ends rounded down; all fire at their very end.
-TEST_F(Render, KeepsIntervalsApartThatAreRounded) {
-  begin(grey_at("30/1"));
-  const auto time = [](guint64 i) { return gst_util_uint64_scale(i, GST_SECOND, 30); };
-  constexpr guint64 first = 1;  // makes rounding matter
-  for (guint64 i = first; i < 20; ++i) {
-    const auto duration = time(i + 1) - time(i);
-    push(time(i),
-         {Event::at(static_cast<int>(i), 3, static_cast<guint32>(duration / 1000), Polarity::on)},
-         duration);
-  }
-  const auto pictures = finish();
-  ASSERT_EQ(pictures.size(), 19U);
-  for (guint64 i = first; i < 20; ++i)
-    EXPECT_TRUE(bytes_of(pictures[i - first].get()) ==
-                accumulated({Event::at(static_cast<int>(i), 3, 1, Polarity::on)}))
-        << i;
-}
-
 TEST_F(Render, DrawsWindowsThatAreLongerThanPictures) {
   g_object_set(h.element(), "accumulation-time", 60 * ms, nullptr);
   begin(grey_at("50/1"));
@@ -147,17 +128,6 @@ TEST_F(Render, MakesAPictureOfEachBufferWhereTheFramerateVaries) {
   expect(finish(), {{7, 20 * ms, accumulated(column(1))},
                     {20 * ms + 7, 100 * ms, accumulated(column(2))},
                     {120 * ms + 7, 5 * ms, blank}});
-}
-
-TEST_F(Render, DrawsThroughGaps) {
-  begin(grey_at("25/1"));
-  push(0, column(1));
-  gst_harness_push_event(h.get(), gst_event_new_gap(40 * ms, 80 * ms));
-  push(120 * ms, column(2));
-  expect(finish(), {{0, 40 * ms, accumulated(column(1))},
-                    {40 * ms, 40 * ms, blank},
-                    {80 * ms, 40 * ms, blank},
-                    {120 * ms, 40 * ms, accumulated(column(2))}});
 }
 
 TEST_F(Render, SkipsThePicturesOfLongPauses) {

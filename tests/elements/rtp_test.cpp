@@ -237,20 +237,6 @@ TEST_P(EveryFormat, CountsLossAndDuplication) {
   EXPECT_GT(output.discontinuities, 2);
 }
 
-TEST(RtpEventPay, JoinsShortBuffersUpToItsLatency) {
-  Harness h("rtpeventpay max-latency=5000000 ! rtpeventdepay");
-  h.caps(davis_caps);
-  std::vector<Interval> intervals;
-  for (int i = 0; i < 20; ++i)
-    intervals.push_back({i * 1'000'000, 1'000'000, {Event::at(i, 2, 500, Polarity::on)}});
-  for (const auto& interval : intervals) push(h, interval);
-  end(h);
-  const Output output(h);
-  EXPECT_EQ(absolute(output.intervals), absolute(intervals));
-  ASSERT_LE(output.intervals.size(), 10U);
-  for (const auto& interval : output.intervals) EXPECT_LE(interval.duration, 5'000'000);
-}
-
 void push_custom_event(Harness& h, const char* name) {
   gst_harness_push_event(
       h.get(), gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty(name)));

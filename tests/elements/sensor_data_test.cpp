@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/elements/pipeline.hpp"
+#include "tests/elements/harness.hpp"
 
 namespace {
 

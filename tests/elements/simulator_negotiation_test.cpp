@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Accepted input, output formats, and the memory of output buffers.
 #include <array>
+#include <cmath>
 
 #include "tests/elements/harness.hpp"
-#include "tests/elements/pipeline.hpp"
 
 namespace {
 
@@ -14,18 +14,14 @@ const std::string size = ", width=32, height=24, framerate=25/1";
 class EverySimulator : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
 
-TEST_P(EverySimulator, MakesEventsWhereDownstreamTakesAnything) {
-  Harness h(GetParam());
-  h.caps("video/x-raw, format=GRAY8" + size, "ANY");
-  EXPECT_EQ(h.out_caps(),
-            "application/x-event-camera, width=(int)32, height=(int)24, framerate=(fraction)25/1, "
-            "format=(string)XYTP");
-}
-
-TEST_P(EverySimulator, MakesEventsWhereDownstreamPrefersVideoButTakesBoth) {
-  Harness h(GetParam());
-  h.caps("video/x-raw, format=GRAY8" + size, "video/x-raw(ANY); application/x-event-camera");
-  EXPECT_EQ(h.out_caps().rfind("application/x-event-camera", 0), 0U) << h.out_caps();
+TEST_P(EverySimulator, MakesEventsWhereDownstreamTakesThem) {
+  for (const char* downstream : {"ANY", "video/x-raw(ANY); application/x-event-camera"}) {
+    Harness h(GetParam());
+    h.caps("video/x-raw, format=GRAY8" + size, downstream);
+    EXPECT_EQ(h.out_caps(),
+              "application/x-event-camera, width=(int)32, height=(int)24, "
+              "framerate=(fraction)25/1, format=(string)XYTP");
+  }
 }
 
 TEST_P(EverySimulator, MakesVideoWhereDownstreamTakesOnlyThat) {

@@ -139,15 +139,6 @@ TEST_F(Tensor, IsNotMadeOfLongPauses) {
   EXPECT_EQ(h->warning(), "");
 }
 
-TEST_F(Tensor, ComesAfterNoLaterGapOfUnknownLength) {
-  begin("accumulation-time=20000000");
-  push_columns(0, 0);
-  gst_harness_push_event(h->get(), gst_event_new_gap(10 * ms, GST_CLOCK_TIME_NONE));
-  push_columns(1, 1);
-  expect_tensor(0, 20 * ms, 0, 4);
-  EXPECT_FALSE(h->pull_event(GST_EVENT_GAP));
-}
-
 TEST_F(Tensor, IsOneOfAGapWhereWindowsAreBuffers) {
   begin("frame-count=2");
   push_columns(0, 0);
