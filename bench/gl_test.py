@@ -12,8 +12,8 @@ import plots
 METHODS = {
     "frame": "difference",
     "dense-farneback": "interpolate",
-    "sparse": "reach",
-    "diff": "land",
+    "sparse": "move_points",
+    "diff": "move_differences",
     "dvs-esim": "dvs",
     "dvs": "dvs",
 }

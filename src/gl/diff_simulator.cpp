@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "src/gl/mark_kernels.hpp"
+#include "src/gl/kernels.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/shaders.hpp"
 
@@ -29,7 +29,7 @@ class DiffSimulator final : public Simulator {
         luma_(gl),
         difference_(gl, format),
         split_(gl, "split", shaders::split),
-        land_(gl, "land", shaders::land),
+        move_(gl, "move_differences", shaders::move_differences),
         mark_(gl, "mark", shaders::mark),
         tracker_(gl, format, 1),
         strongest_(gl),
@@ -78,7 +78,7 @@ class DiffSimulator final : public Simulator {
     for (int first = 1; first < steps; first += at_once) {
       const int count = std::min(at_once, steps - first);
       for (const auto* part : {&on_, &off_})
-        land_.run(groups, {&part->pictures[before].picture().buffer(), &part->motions, &strongest_},
+        move_.run(groups, {&part->pictures[before].picture().buffer(), &part->motions, &strongest_},
                   {width, first, count, part == &on_ ? 1 : 0});
       mark_.run({groups_of(64, list.marks_across()), height, count}, {&strongest_, &list.marks()},
                 {width, list.marks_across(), (first - 1) * list.marks_a_step()});
@@ -88,7 +88,7 @@ class DiffSimulator final : public Simulator {
   LumaKernel luma_;
   DifferenceKernel difference_;
   Kernel split_;
-  Kernel land_;
+  Kernel move_;
   Kernel mark_;
   PointTracker tracker_;
   Buffer strongest_;  ///< largest difference on each pixel of interpolated frames

@@ -332,8 +332,8 @@ class PixelSimulator final : public DvsSimulator {
   void run() {
     const double duration = unread_[last_].duration;
     const auto whole = static_cast<std::uint32_t>(duration);
-    Buffer& sorted = unread_[last_].events;
-    Buffer& events = sort_.unsorted(sorted, whole);
+    const Buffer& sorted = unread_[last_].events;
+    Buffer& events = sort_.unsorted(sorted);
     const ListHeader header = {0, static_cast<std::uint32_t>(sorted.size() / sizeof(Event) - 1)};
     events.assign(std::as_bytes(std::span(header)));
     const PixelModel& model = pixels_.model();

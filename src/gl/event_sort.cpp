@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <utility>
 
 #include "src/gl/grey_frame.hpp"
 #include "src/gl/shaders.hpp"
@@ -25,30 +24,24 @@ EventSort::EventSort(const Context& gl, const LumaFormat& format)
       place_passes_(bytes_of(pixel_count(format) - 1)),
       kernel_(gl, "sort", shaders::sort),
       counts_(gl),
-      other_(gl) {
+      lists_{Buffer(gl), Buffer(gl)} {
   counts_.reserve(groups * 256 * sizeof(std::uint32_t));
 }
 
-int EventSort::passes(std::uint32_t duration) const {
-  // Events past the end have the largest time.
-  return place_passes_ + std::min(4, bytes_of(std::uint64_t{duration} + 1));
-}
-
-Buffer& EventSort::unsorted(Buffer& sorted, std::uint32_t duration) {
-  other_.reserve(sorted.size());
-  return passes(duration) % 2 == 0 ? sorted : other_;
+Buffer& EventSort::unsorted(const Buffer& sorted) {
+  for (auto& list : lists_) list.reserve(sorted.size());
+  return lists_[0];
 }
 
 void EventSort::run(const Buffer& sorted, std::uint32_t duration) const {
-  const int count = passes(duration);
-  const Buffer* from = count % 2 == 0 ? &sorted : &other_;
-  const Buffer* to = count % 2 == 0 ? &other_ : &sorted;
-  for (int pass = 0; pass < count; ++pass) {
+  // Events past the end have the largest time.
+  const int passes = place_passes_ + std::min(4, bytes_of(std::uint64_t{duration} + 1));
+  for (int pass = 0; pass < passes; ++pass) {
+    const auto& to = pass + 1 == passes ? sorted : lists_[(pass + 1) % 2];
     const bool is_time = pass >= place_passes_;
     const int shift = 8 * (is_time ? pass - place_passes_ : pass);
     for (const int moves : {0, 1})
-      kernel_.run({groups}, {from, &counts_, to}, {width_, is_time, shift, moves});
-    std::swap(from, to);
+      kernel_.run({groups}, {&lists_[pass % 2], &counts_, &to}, {width_, is_time, shift, moves});
   }
 }
 

@@ -15,20 +15,19 @@ class EventSort {
  public:
   EventSort(const Context& gl, const LumaFormat& format);
 
-  /// The list to write, as large as `sorted`. `duration` of the interval, microseconds.
-  Buffer& unsorted(Buffer& sorted, std::uint32_t duration);
+  /// The list to write, as large as `sorted`.
+  Buffer& unsorted(const Buffer& sorted);
 
-  /// Queues the sorting of unsorted() into `sorted`. Does not wait.
+  /// Queues the sorting of unsorted() into `sorted`. Does not wait. `duration` of the interval,
+  /// microseconds.
   void run(const Buffer& sorted, std::uint32_t duration) const;
 
  private:
-  int passes(std::uint32_t duration) const;
-
   int width_;
   int place_passes_;
   Kernel kernel_;
   Buffer counts_;
-  Buffer other_;  ///< passes alternate between it and the sorted list
+  Buffer lists_[2];  ///< passes alternate between these, until the last one
 };
 
 }  // namespace eventcamera::gl

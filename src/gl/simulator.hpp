@@ -8,7 +8,7 @@
 #include "src/flow/dense_flow.hpp"
 #include "src/gl/event_list.hpp"
 #include "src/gl/grey_frame.hpp"
-#include "src/gl/mark_kernels.hpp"
+#include "src/gl/kernels.hpp"
 #include "src/gl/objects.hpp"
 #include "src/simulate/simulator.hpp"
 #include "src/simulate/warp.hpp"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "src/gl/mark_kernels.hpp"
+#include "src/gl/kernels.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/shaders.hpp"
 
@@ -18,7 +18,7 @@ class SparseSimulator final : public Simulator {
         luma_(gl),
         difference_(gl, format),
         changed_(gl, "changed", shaders::changed),
-        reach_(gl, "reach", shaders::reach),
+        move_(gl, "move_points", shaders::move_points),
         paint_(gl, "paint", shaders::paint),
         tracker_(gl, format, 2),
         points_(gl),
@@ -51,7 +51,7 @@ class SparseSimulator final : public Simulator {
     between_.reserve(static_cast<std::size_t>(ring_size) * last.picture().buffer().size());
     for (int first = 0; first <= steps.count();) {
       const int end = std::min(std::max(first - 1, 0) + ring_size, steps.count() + 1);
-      reach_.run(groups, {&points_, &winners_}, {width, first, end - first});
+      move_.run(groups, {&points_, &winners_}, {width, first, end - first});
       paint_.run({groups_of(64, GreyFrame::words_across(width)), format().height, end - first},
                  {&last.picture().buffer(), &now.picture().buffer(), &winners_, &between_},
                  {width, first, steps.count(), ring_size});
@@ -69,7 +69,7 @@ class SparseSimulator final : public Simulator {
   LumaKernel luma_;
   DifferenceKernel difference_;
   Kernel changed_;
-  Kernel reach_;
+  Kernel move_;
   Kernel paint_;
   PointTracker tracker_;
   Buffer points_;

@@ -186,7 +186,7 @@ TEST_P(EveryApi, SortsEventsAndKeepsTheOrderOfEqualOnes) {
       const auto list = list_of(events, capacity);
       gl::Buffer sorted(context, GL_DYNAMIC_READ);
       sorted.reserve(list.size() * sizeof(Event));
-      sort.unsorted(sorted, duration).assign(std::as_bytes(std::span(list)));
+      sort.unsorted(sorted).assign(std::as_bytes(std::span(list)));
       sort.run(sorted, duration);
       std::vector<Event> found(list.size());
       sorted.read(std::as_writable_bytes(std::span(found)));

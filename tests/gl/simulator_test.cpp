@@ -14,7 +14,7 @@
 
 #include "src/core/luma.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
-#include "src/gl/mark_kernels.hpp"
+#include "src/gl/kernels.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/simulator.hpp"
 #include "src/render/accumulator.hpp"

@@ -13,6 +13,17 @@
 
 namespace eventcamera::gl {
 
+/// Computes the luma of textures, exactly as luma_of_rgb() and composite_on_black() do.
+class LumaKernel {
+ public:
+  explicit LumaKernel(const Context& gl);
+  void run(const TextureFrame& frame, const GreyFrame& out) const;
+
+ private:
+  const Context& gl_;
+  Kernel kernel_;
+};
+
 /// Number of steps that a kernel with a word per pixel and step processes at once, at most `steps`:
 /// OpenGL ES guarantees buffers of 128 MiB.
 inline int steps_at_once(const LumaFormat& format, int steps) {
