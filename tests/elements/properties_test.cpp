@@ -167,6 +167,14 @@ TEST(Dvs, HasTheSamePropertiesOnTheGpuExceptLabels) {
   EXPECT_EQ(defaults_of("gleventsim-dvs"), on_cpu_defaults);
 }
 
+TEST(Dvs, DoesNotAdaptForNoTime) {
+  gst_init(nullptr, nullptr);
+  Owned<GstElement> element(gst_element_factory_make("eventsim-dvs", nullptr));
+  auto* const spec =
+      g_object_class_find_property(G_OBJECT_GET_CLASS(element.get()), "adaptation-time");
+  EXPECT_GT(G_PARAM_SPEC_UINT64(spec)->minimum, 0U);  // the growth is divided by it
+}
+
 TEST(Dvs, CountsTimeInNanoseconds) {
   Harness h("eventsim-dvs preset=ideal pixel-latency=7000000");
   h.caps("video/x-raw, format=GRAY8, width=8, height=8, framerate=25/1");

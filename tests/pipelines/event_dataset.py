@@ -149,7 +149,7 @@ class DataSets(unittest.TestCase):
             file.write(b"damage")
         self.assertIn("0 made, 3 unchanged", event_dataset(recipe))
         self.assertRegex(event_dataset("verify", recipe, status=1),
-                         "different: run/four: its file of events is not that of the manifest\n.*, 1 differences")
+                         "different: run/four: its file of events differs from the manifest\n.*, 1 differences")
         os.remove(damaged)
         self.assertIn("3 videos of the manifest compared, 0 differences", event_dataset("verify", recipe))
         event_dataset(recipe_of(folder, RECIPE.replace("npz", "csv")))

@@ -212,21 +212,16 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   auto& priv = *self->priv;
   const OwnedBuffer buffer(received);
   if (!priv.stream->packer) return GST_FLOW_NOT_NEGOTIATED;
-  const auto interval = interval_of(received);
-  if (!interval) {
-    priv.stream->faults.warn(self, interval_fault(received), received);
-    return GST_FLOW_OK;
-  }
   const MappedEvents mapped(received);
   if (!mapped) {
-    priv.stream->faults.warn(self, EventFault::partial_event, received);
+    priv.stream->faults.warn(self, event_fault(received), received);
     return GST_FLOW_OK;
   }
   return pack(self, [&](DatagramPacker& packer, const auto& send) {
     collect(self, received, mapped);
     packer.set_max_span(max_span(priv.settings.copy().max_latency));
     packer.pack(priv.stream->events, send);
-    if (is_flush_due(self, *interval)) packer.flush(send);
+    if (is_flush_due(self, mapped.interval())) packer.flush(send);
   });
 }
 
