@@ -12,7 +12,8 @@
  * exposure-compensation and upsampling=motion, they are read back, and the CPU prepares them as in
  * `eventsim-dvs`; it need not estimate the flow if frames have a #GstEventCameraFlowMeta. glupload
  * drops this meta, so leave such frames in system memory: this element uploads them. Events are
- * read back, and the CPU delays and sorts them.
+ * sorted on the GPU and read back. With pixel-latency, max-rate or rolling-shutter, the CPU delays
+ * them and sorts them again.
  *
  * Needs OpenGL ES 3.1 or OpenGL 4.3. Works without a screen; beside other elements of OpenGL, only
  * if the environment variable GST_GL_WINDOW is egl-device.

@@ -19,14 +19,9 @@ G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstGLEventSimulator, gst_gl_event_simulator,
 #define PARENT_ELEMENT_CLASS GST_ELEMENT_CLASS(gst_gl_event_simulator_parent_class)
 #define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_gl_event_simulator_parent_class)
 
-static SharedContext& context_of(gpointer self) {
+SharedContext& context_of(gpointer self) {
   return *static_cast<SharedContext*>(
       gst_gl_event_simulator_get_instance_private(GST_GL_EVENT_SIMULATOR(self)));
-}
-
-std::unique_ptr<VideoSimulator> in_gl_memory(GObject* element, const GstVideoInfo& video,
-                                             MakeGlSimulator make) {
-  return make_texture_simulator(GST_ELEMENT(element), context_of(element), video, make);
 }
 
 static void set_context(GstElement* self, GstContext* context) {

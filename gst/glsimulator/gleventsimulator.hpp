@@ -30,13 +30,6 @@ inline constexpr SimulatorVideo gl_memory_video = {
 using MakeGlSimulator = std::unique_ptr<eventcamera::gl::Simulator> (*)(
     const eventcamera::gl::Context& gl, const eventcamera::LumaFormat& format);
 
-class SharedContext;
-
-/// Creates the simulator that `make` returns, in the context of an element.
-std::unique_ptr<VideoSimulator> make_texture_simulator(GstElement* element, SharedContext& shared,
-                                                       const GstVideoInfo& video,
-                                                       MakeGlSimulator make);
-
 /// Creates the simulator that `make` returns, in the context of a GstGLEventSimulator.
 std::unique_ptr<VideoSimulator> in_gl_memory(GObject* element, const GstVideoInfo& video,
                                              MakeGlSimulator make);

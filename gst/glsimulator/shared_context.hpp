@@ -51,3 +51,6 @@ class SharedContext {
   GstGLContext* other_ = nullptr;  ///< of the application, to share objects with
   GstGLContext* context_ = nullptr;
 };
+
+/// The context of a GstGLEventSimulator.
+SharedContext& context_of(gpointer element);

@@ -324,9 +324,10 @@ class TextureVideoSimulator final : public VideoSimulator {
 
 }  // namespace
 
-std::unique_ptr<VideoSimulator> make_texture_simulator(GstElement* element, SharedContext& shared,
-                                                       const GstVideoInfo& video,
-                                                       MakeGlSimulator make) {
+std::unique_ptr<VideoSimulator> in_gl_memory(GObject* object, const GstVideoInfo& video,
+                                             MakeGlSimulator make) {
+  GstElement* const element = GST_ELEMENT(object);
+  SharedContext& shared = context_of(element);
   GError* error = nullptr;
   GstGLContext* context = shared.find(&error);
   if (context == nullptr) {

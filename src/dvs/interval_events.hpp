@@ -43,6 +43,12 @@ class IntervalEvents {
     fired_.reset(static_cast<std::uint32_t>(duration), band_count(height_));
   }
 
+  /// True if the interval has exactly the events within it, at their own times.
+  bool is_plain() const {
+    return rolling_shutter_ == 0 && !readout_ &&
+           std::ranges::all_of(deferred_, [](const Deferred& band) { return band.empty(); });
+  }
+
   /// Ends the interval, after the last event. Returns its events, with_cause(): its own slices, or
   /// in `read` those that were read out.
   const EventBuckets& end(StepBuckets& read, ThreadPool& threads) {
@@ -109,7 +115,8 @@ class IntervalEvents {
       added_.insert(added_.end(), events.begin(), events.end());
     }
 
-    /// Adds an event `t` microseconds after the start of the interval, instead of its own time.
+    /// Adds an event with the time `t`, microseconds after the start of the interval, in place of
+    /// its own.
     void add(double t, const Event& event) {
       if (t > duration_)
         deferred_->push_back({t - duration_, event});

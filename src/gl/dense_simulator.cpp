@@ -5,7 +5,7 @@
 
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/gl/farneback.hpp"
-#include "src/gl/mark_kernels.hpp"
+#include "src/gl/kernels.hpp"
 #include "src/gl/shaders.hpp"
 
 namespace eventcamera::gl {

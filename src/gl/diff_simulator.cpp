@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/gl/simulator.hpp"
 
-#include "src/gl/mark_kernels.hpp"
+#include <algorithm>
+#include <cstddef>
+
+#include "src/gl/kernels.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/shaders.hpp"
 
@@ -26,15 +29,13 @@ class DiffSimulator final : public Simulator {
         luma_(gl),
         difference_(gl, format),
         split_(gl, "split", shaders::split),
-        land_(gl, "land", shaders::land),
+        move_(gl, "move_differences", shaders::move_differences),
         mark_(gl, "mark", shaders::mark),
         tracker_(gl, format, 1),
         strongest_(gl),
         frames_{{gl, format}, {gl, format}},
         on_(gl, format),
-        off_(gl, format) {
-    strongest_.assign_zeros(pixel_count(format) * 4);
-  }
+        off_(gl, format) {}
 
  private:
   void start(const TextureFrame& frame) override {
@@ -63,7 +64,7 @@ class DiffSimulator final : public Simulator {
     has_difference_ = true;
   }
 
-  void fire_between(int steps, const EventList& list) const {
+  void fire_between(int steps, const EventList& list) {
     const auto [width, height, bits] = format();
     const Groups groups{groups_of(64, width), height};
     const int before = 1 - last_;
@@ -72,22 +73,25 @@ class DiffSimulator final : public Simulator {
       tracker_.track(part->pictures[before], part->pictures[last_], part->motions);
       tracker_.to_motion(part->motions, steps, part->pictures[last_].picture(), true);
     }
-    for (int j = 1; j < steps; ++j) {
+    const int at_once = steps_at_once(format(), steps - 1);
+    strongest_.reserve_zeros(static_cast<std::size_t>(at_once) * pixel_count(format()) * 4);
+    for (int first = 1; first < steps; first += at_once) {
+      const int count = std::min(at_once, steps - first);
       for (const auto* part : {&on_, &off_})
-        land_.run(groups, {&part->pictures[before].picture().buffer(), &part->motions, &strongest_},
-                  {width, j, part == &on_ ? 1 : 0});
-      mark_.run({groups_of(64, list.marks_across()), height}, {&strongest_, &list.marks()},
-                {width, list.marks_across(), (j - 1) * list.marks_a_step()});
+        move_.run(groups, {&part->pictures[before].picture().buffer(), &part->motions, &strongest_},
+                  {width, first, count, part == &on_ ? 1 : 0});
+      mark_.run({groups_of(64, list.marks_across()), height, count}, {&strongest_, &list.marks()},
+                {width, list.marks_across(), (first - 1) * list.marks_a_step()});
     }
   }
 
   LumaKernel luma_;
   DifferenceKernel difference_;
   Kernel split_;
-  Kernel land_;
+  Kernel move_;
   Kernel mark_;
   PointTracker tracker_;
-  Buffer strongest_;  ///< largest difference on each pixel of an interpolated frame
+  Buffer strongest_;  ///< largest difference on each pixel of interpolated frames
   GreyFrame frames_[2];
   Part on_;
   Part off_;

@@ -14,7 +14,9 @@
 #include <utility>
 #include <vector>
 
+#include "src/core/event.hpp"
 #include "src/core/image.hpp"
+#include "src/core/label.hpp"
 #include "src/core/thread_pool.hpp"
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/exposure_gain.hpp"
@@ -25,6 +27,7 @@
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/sub_intervals.hpp"
+#include "src/gl/event_sort.hpp"
 #include "src/gl/shaders.hpp"
 #include "src/gl/simulator.hpp"
 #include "src/simulate/denoiser.hpp"
@@ -73,6 +76,7 @@ class PixelSimulator final : public DvsSimulator {
         state_(gl),
         scene_(gl),
         tables_(gl),
+        sort_(gl, format),
         unread_{Unread(gl), Unread(gl)},
         frames_(format),
         denoiser_(format),
@@ -86,15 +90,15 @@ class PixelSimulator final : public DvsSimulator {
   struct Unread {
     explicit Unread(const Context& gl) : events(gl, GL_DYNAMIC_READ) {}
 
-    Buffer events;
+    Buffer events;        ///< sorted
     double duration = 0;  ///< microseconds
     double max_rate = 0;
     Nanoseconds rolling_shutter = 0;
     std::optional<Image<Flow>> flow;
   };
 
-  /// An event, as the shader writes it.
-  using EventWords = std::array<std::uint32_t, 2>;
+  /// First words of a list of events: their number, and the number that fits.
+  using ListHeader = std::array<std::uint32_t, 2>;
 
   bool needs_flow() const override { return settings_.upsampling == Upsampling::motion; }
 
@@ -172,29 +176,31 @@ class PixelSimulator final : public DvsSimulator {
     if (count_ == 1) complete();
     const Unread& unread = unread_[(last_ + 3 - count_) % 2];
     --count_;
-    read_.resize(1);
-    unread.events.read(std::as_writable_bytes(std::span(read_)));
-    read_.resize(1 + read_[0][0]);
-    unread.events.read(std::as_writable_bytes(std::span(read_)));
+    ListHeader header;
+    unread.events.read(std::as_writable_bytes(std::span(header)));
+    events_.reset(1, 1);
+    auto& list = events_.bucket(1, 0);
+    list.resize(header[0]);
+    unread.events.read(std::as_writable_bytes(std::span(list)), sizeof header);
     flow_.reset();
     if (unread.flow) {
       read_flow_ = *unread.flow;
       flow_ = read_flow_.view();
     }
     fired_.begin(unread.duration, unread.max_rate, unread.rolling_shutter);
-    return collect(std::span(read_).subspan(1));
+    const bool has_late = !list.empty() && list.back() != without_cause(list.back());
+    return fired_.is_plain() && !has_late ? events_ : collect(list);
   }
 
-  /// Ends the interval with these events.
-  const EventBuckets& collect(std::span<const EventWords> events) {
+  /// Ends the interval with these events, and those of earlier intervals that are due. Events past
+  /// its end carry the rest of their times, as the shader writes it.
+  const EventBuckets& collect(std::span<const Event> events) {
     std::vector<IntervalEvents::Band> bands(static_cast<std::size_t>(band_count(format().height)));
     for (std::size_t i = 0; i < bands.size(); ++i) bands[i].begin(fired_, static_cast<int>(i));
-    for (const auto& [time, pixel] : events) {
-      const int x = static_cast<int>(pixel & 0x3fff);
-      const int y = static_cast<int>(pixel >> 14 & 0x3fff);
-      const double t = time + static_cast<double>(pixel >> 28 & 7) / 8;
-      bands[static_cast<std::size_t>(y / rows_per_band)].add(
-          t, Event::at(x, y, 0, pixel >> 31 != 0 ? Polarity::on : Polarity::off));
+    for (const Event& event : events) {
+      const auto seventh = static_cast<int>(cause_of(event));
+      bands[static_cast<std::size_t>((event.y() & coordinate_bits) / rows_per_band)].add(
+          event.t + (seventh > 0 ? (seventh - 0.5) / 7 : 0), without_cause(event));
     }
     for (auto& band : bands) band.end();
     return fired_.end(events_, threads());
@@ -316,7 +322,7 @@ class PixelSimulator final : public DvsSimulator {
     write_tables(moves);
     if (needs_luma() && has_last_) write_scene(moves);
     constexpr std::size_t first_capacity = 4096;
-    unread_[last_].events.reserve(first_capacity * sizeof(EventWords));
+    unread_[last_].events.reserve(first_capacity * sizeof(Event));
     run();
     timeline_.end();
     is_second_ = !is_second_;
@@ -324,9 +330,11 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   void run() {
-    Buffer& events = unread_[last_].events;
-    const EventWords header = {0,
-                               static_cast<std::uint32_t>(events.size() / sizeof(EventWords) - 1)};
+    const double duration = unread_[last_].duration;
+    const auto whole = static_cast<std::uint32_t>(duration);
+    const Buffer& sorted = unread_[last_].events;
+    Buffer& events = sort_.unsorted(sorted);
+    const ListHeader header = {0, static_cast<std::uint32_t>(sorted.size() / sizeof(Event) - 1)};
     events.assign(std::as_bytes(std::span(header)));
     const PixelModel& model = pixels_.model();
     const int before = is_second_ ? planes : 0;
@@ -336,42 +344,44 @@ class PixelSimulator final : public DvsSimulator {
                 {format().width, format().height, before, planes - before, model.has_bandwidth(),
                  model.has_noise(), model.holds_reference(), response_.bits(),
                  response_.gain() != 1 ? saturated_luma(response_.white()) : response_.white() + 1,
-                 plans_, moves_, max_events});
+                 plans_, moves_, max_events, static_cast<int>(whole),
+                 std::bit_cast<int>(static_cast<float>(duration - whole))});
+    sort_.run(sorted, whole);
   }
 
   /// Simulates the last interval again if its events did not fit into their buffer.
   void complete() {
     if (std::exchange(is_complete_, true)) return;
     Buffer& events = unread_[last_].events;
-    EventWords header;
-    events.read(std::as_writable_bytes(std::span(&header, 1)));
+    ListHeader header;
+    events.read(std::as_writable_bytes(std::span(header)));
     if (header[0] <= header[1]) return;
-    events.reserve(std::bit_ceil(std::size_t{header[0]} + 1) * sizeof(EventWords));
+    events.reserve(std::bit_ceil(std::size_t{header[0]} + 1) * sizeof(Event));
     is_second_ = !is_second_;
     run();
     is_second_ = !is_second_;
   }
 
+  /// Writes the tables of an interval, and the responses if they changed.
   void write_tables(bool moves) {
     const PixelModel& model = pixels_.model();
-    Words words;
-    words.add_64(model.random.key());
-    words.add_float(model.mean_thresholds.positive);
-    words.add_float(model.mean_thresholds.negative);
-    words.add_float(model.settings.threshold_sigma);
-    words.add_float(model.settings.threshold_jitter);
-    words.add_float(model.gap);
-    words.add_float(model.latency);
-    words.add_float(model.latency_jitter);
-    words.add_float(model.adaptation.rate());
-    words.add_float(model.adaptation.duration());
-    const std::size_t header = words.size();
-    const auto here = [&] { return static_cast<std::uint32_t>(words.size() - header); };
-    words.add_all(std::span(response_.table()));
+    Words header;
+    header.add_64(model.random.key());
+    header.add_float(model.mean_thresholds.positive);
+    header.add_float(model.mean_thresholds.negative);
+    header.add_float(model.settings.threshold_sigma);
+    header.add_float(model.settings.threshold_jitter);
+    header.add_float(model.gap);
+    header.add_float(model.latency);
+    header.add_float(model.latency_jitter);
+    header.add_float(model.adaptation.rate());
+    header.add_float(model.adaptation.duration());
 
+    Words words;
+    const auto& responses = response_.table();
+    const auto here = [&] { return static_cast<std::uint32_t>(responses.size() + words.size()); };
     const int columns = moves ? tiles_.columns() : 1;
     const int rows = moves ? tiles_.rows() : 1;
-    const std::size_t first_tile = words.size();
     plans_ = static_cast<int>(here());
     for (int tile = 0; tile < columns * rows; ++tile) words.add(std::uint32_t{0});
     std::map<int, std::uint32_t> plans;
@@ -390,9 +400,21 @@ class PixelSimulator final : public DvsSimulator {
         plan = here();
         add_plan(timeline_.plan(steps), steps, shade_tables, words);
       }
-      words[first_tile + static_cast<std::size_t>(tile)] = plan;
+      words[static_cast<std::size_t>(tile)] = plan;
     }
-    tables_.assign(words.bytes());
+
+    const auto response_bytes = std::as_bytes(std::span(responses));
+    const std::size_t first_plan = header.bytes().size() + response_bytes.size();
+    const std::size_t size = first_plan + words.bytes().size();
+    if (size > tables_.size()) {
+      tables_.reserve(std::bit_ceil(size));
+      responses_.clear();
+    }
+    tables_.assign(header.bytes());
+    tables_.assign(words.bytes(), first_plan);
+    if (responses == responses_) return;
+    tables_.assign(response_bytes, header.bytes().size());
+    responses_ = responses;
   }
 
   static void add_shades(const ShadeTables& tables, Words& words) {
@@ -450,13 +472,14 @@ class PixelSimulator final : public DvsSimulator {
   bool is_second_ = false;  ///< the second one is the current state
   Buffer scene_;            ///< frames that the CPU prepared, and the flow
   Buffer tables_;
-  int plans_ = 0;       ///< place in tables_
-  bool moves_ = false;  ///< the last interval follows the flow
+  std::vector<float> responses_;  ///< in tables_
+  int plans_ = 0;                 ///< place in tables_
+  bool moves_ = false;            ///< the last interval follows the flow
+  EventSort sort_;
   Unread unread_[max_queued];
   int last_ = 0;             ///< index of the last interval
   int count_ = 0;            ///< number of unread intervals
   bool is_complete_ = true;  ///< the buffer of the last interval has all its events
-  std::vector<EventWords> read_;
   Image<Flow> read_flow_;
 
   FramePair<std::uint8_t> frames_;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/gl/simulator.hpp"
 
-#include "src/gl/mark_kernels.hpp"
+#include "src/gl/kernels.hpp"
 
 namespace eventcamera::gl {
 namespace {

@@ -37,15 +37,4 @@ class GreyFrame {
   Buffer buffer_;
 };
 
-/// Computes the luma of textures, exactly as luma_of_rgb() and composite_on_black() do.
-class LumaKernel {
- public:
-  explicit LumaKernel(const Context& gl);
-  void run(const TextureFrame& frame, const GreyFrame& out) const;
-
- private:
-  const Context& gl_;
-  Kernel kernel_;
-};
-
 }  // namespace eventcamera::gl

@@ -25,22 +25,22 @@ void Buffer::reserve(std::size_t size) {
   size_ = size;
 }
 
-void Buffer::assign(std::span<const std::byte> bytes) {
-  reserve(bytes.size());
+void Buffer::assign(std::span<const std::byte> bytes, std::size_t offset) {
+  reserve(offset + bytes.size());
   gl_.BindBuffer(GL_SHADER_STORAGE_BUFFER, name_);
-  gl_.BufferSubData(GL_SHADER_STORAGE_BUFFER, 0, static_cast<GLsizeiptr>(bytes.size()),
-                    bytes.data());
+  gl_.BufferSubData(GL_SHADER_STORAGE_BUFFER, static_cast<GLintptr>(offset),
+                    static_cast<GLsizeiptr>(bytes.size()), bytes.data());
 }
 
 void Buffer::assign_zeros(std::size_t size) {
   assign(std::vector<std::byte>(size));
 }
 
-void Buffer::read(std::span<std::byte> out) const {
+void Buffer::read(std::span<std::byte> out, std::size_t offset) const {
   if (out.empty()) return;
   gl_.BindBuffer(GL_SHADER_STORAGE_BUFFER, name_);
-  const auto size = static_cast<GLsizeiptr>(out.size());
-  const void* mapped = gl_.MapBufferRange(GL_SHADER_STORAGE_BUFFER, 0, size, GL_MAP_READ_BIT);
+  const void* mapped = gl_.MapBufferRange(GL_SHADER_STORAGE_BUFFER, static_cast<GLintptr>(offset),
+                                          static_cast<GLsizeiptr>(out.size()), GL_MAP_READ_BIT);
   if (mapped == nullptr) {
     gl_.check();
     throw Error("cannot map an OpenGL buffer");
@@ -96,7 +96,8 @@ void Kernel::run(Groups groups, std::initializer_list<const Buffer*> buffers,
     gl_.BindBufferBase(GL_SHADER_STORAGE_BUFFER, binding++, buffer->name());
   GLint location = 0;
   for (const int value : values) gl_.Uniform1i(location++, value);
-  gl_.DispatchCompute(static_cast<GLuint>(groups.x), static_cast<GLuint>(groups.y), 1);
+  gl_.DispatchCompute(static_cast<GLuint>(groups.x), static_cast<GLuint>(groups.y),
+                      static_cast<GLuint>(groups.z));
   gl_.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
 }
 

@@ -25,15 +25,20 @@ class Buffer {
   /// Makes it at least `size` bytes long; if it must grow, its contents are lost. Throws Error.
   void reserve(std::size_t size);
 
-  /// Replaces the contents.
-  void assign(std::span<const std::byte> bytes);
+  /// Replaces the contents from `offset` on. If it must grow for this, its contents are lost.
+  void assign(std::span<const std::byte> bytes, std::size_t offset = 0);
 
   /// Replaces the contents by `size` zeros.
   void assign_zeros(std::size_t size);
 
-  /// Copies the first bytes to `out`, once the GPU has written them. Throws Error if the context is
-  /// lost.
-  void read(std::span<std::byte> out) const;
+  /// Like reserve(), but a buffer that grows contains zeros.
+  void reserve_zeros(std::size_t size) {
+    if (size > size_) assign_zeros(size);
+  }
+
+  /// Copies bytes from `offset` on to `out`, once the GPU has written them. Throws Error if the
+  /// context is lost.
+  void read(std::span<std::byte> out, std::size_t offset = 0) const;
 
  private:
   const Context& gl_;
@@ -46,6 +51,7 @@ class Buffer {
 struct Groups {
   int x = 1;
   int y = 1;
+  int z = 1;
 };
 
 /// Number of groups of `size` that cover `count`.

@@ -8,7 +8,7 @@
 #include "src/flow/dense_flow.hpp"
 #include "src/gl/event_list.hpp"
 #include "src/gl/grey_frame.hpp"
-#include "src/gl/mark_kernels.hpp"
+#include "src/gl/kernels.hpp"
 #include "src/gl/objects.hpp"
 #include "src/simulate/simulator.hpp"
 #include "src/simulate/warp.hpp"
@@ -22,9 +22,9 @@ namespace eventcamera::gl {
 /// Processing of a frame: a LumaKernel turns its texture into a GreyFrame; a method (frame_,
 /// dense_, sparse_ or diff_simulator) compares it with the last one and marks the pixels that fire
 /// in each step; an EventList counts, sorts and reads back the marked pixels, or a DrawKernel draws
-/// them. dvs_simulator has its own list, whose events have their own times. Each kernel is a
-/// compute shader (shaders/). Dense flow is computed in farneback, tracks in point_tracker, with
-/// the formulas and bounds of their namesakes in src/flow.
+/// them. dvs_simulator has its own list, whose events have their own times; EventSort sorts it.
+/// Each kernel is a compute shader (shaders/). Dense flow is computed in farneback, tracks in
+/// point_tracker, with the formulas and bounds of their namesakes in src/flow.
 ///
 /// To keep both the caller and the GPU busy, queue() the next frame before read() of the previous
 /// interval's events.
@@ -126,7 +126,7 @@ std::unique_ptr<Simulator> make_diff_simulator(const Context& gl, const LumaForm
 
 /// Like eventcamera::DvsSimulator, without labels. Solved in single precision: a pixel in 10,000
 /// may fire another time, and an event in 1,000 differ by more than a microsecond. The CPU removes
-/// noise, finds gain and flow, and collects the events. hold_until() needs the context.
+/// noise, finds gain and flow, and delays late events. hold_until() needs the context.
 class DvsSimulator : public Simulator {
  public:
   /// Applies to the next frames.

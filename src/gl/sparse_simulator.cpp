@@ -2,8 +2,9 @@
 #include "src/gl/simulator.hpp"
 
 #include <algorithm>
+#include <cstddef>
 
-#include "src/gl/mark_kernels.hpp"
+#include "src/gl/kernels.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/shaders.hpp"
 
@@ -17,15 +18,14 @@ class SparseSimulator final : public Simulator {
         luma_(gl),
         difference_(gl, format),
         changed_(gl, "changed", shaders::changed),
-        reach_(gl, "reach", shaders::reach),
+        move_(gl, "move_points", shaders::move_points),
         paint_(gl, "paint", shaders::paint),
         tracker_(gl, format, 2),
         points_(gl),
         winners_(gl),
-        frames_{{gl, format}, {gl, format}},
-        between_{{gl, format}, {gl, format}} {
+        between_(gl),
+        frames_{{gl, format}, {gl, format}} {
     points_.reserve(pixel_count(format) * 8);
-    winners_.assign_zeros(pixel_count(format) * 4);
   }
 
  private:
@@ -45,13 +45,18 @@ class SparseSimulator final : public Simulator {
     tracker_.to_motion(points_, steps.count(), now.picture(), false);
 
     list.begin(steps);
-    const GreyFrame* before = &last.picture();
-    for (int j = 1; j <= steps.count(); ++j) {
-      const bool ends = j == steps.count();
-      if (!ends) paint(last.picture(), now.picture(), j);
-      const GreyFrame& drawn = ends ? now.picture() : between_[j % 2];
-      difference_.run(*before, drawn, thresholds, j, list);
-      before = &drawn;
+    // Frames of the steps 0 ... count.
+    const int ring_size = std::max(2, steps_at_once(format(), steps.count() + 1));
+    winners_.reserve_zeros(static_cast<std::size_t>(ring_size) * pixel_count(format()) * 4);
+    between_.reserve(static_cast<std::size_t>(ring_size) * last.picture().buffer().size());
+    for (int first = 0; first <= steps.count();) {
+      const int end = std::min(std::max(first - 1, 0) + ring_size, steps.count() + 1);
+      move_.run(groups, {&points_, &winners_}, {width, first, end - first});
+      paint_.run({groups_of(64, GreyFrame::words_across(width)), format().height, end - first},
+                 {&last.picture().buffer(), &now.picture().buffer(), &winners_, &between_},
+                 {width, first, steps.count(), ring_size});
+      difference_.run(between_, ring_size, thresholds, std::max(first, 1), end, list);
+      first = end;
     }
   }
 
@@ -61,26 +66,16 @@ class SparseSimulator final : public Simulator {
     tracker_.build(frames_[now_]);
   }
 
-  /// Draws the interpolated frame of step j.
-  void paint(const GreyFrame& last, const GreyFrame& now, int j) const {
-    const int width = format().width;
-    for (const int marks_left : {0, 1})
-      reach_.run({groups_of(64, width), format().height}, {&points_, &winners_},
-                 {width, j, marks_left});
-    paint_.run({groups_of(64, GreyFrame::words_across(width)), format().height},
-               {&last.buffer(), &now.buffer(), &winners_, &between_[j % 2].buffer()}, {width});
-  }
-
   LumaKernel luma_;
   DifferenceKernel difference_;
   Kernel changed_;
-  Kernel reach_;
+  Kernel move_;
   Kernel paint_;
   PointTracker tracker_;
   Buffer points_;
-  Buffer winners_;  ///< last point on each pixel of an interpolated frame
+  Buffer winners_;  ///< last point on each pixel of interpolated frames
+  Buffer between_;  ///< ring of interpolated frames
   Pyramid frames_[2];
-  GreyFrame between_[2];  ///< interpolated frames
   int now_ = 0;
 };
 

@@ -13,9 +13,9 @@
 #include <tuple>
 
 #include "src/core/byte_order.hpp"
+#include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
-#include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/compression/compressed_frames.hpp"
 #include "tests/formats/aedat_files.hpp"
 #include "tests/formats/recordings.hpp"

@@ -11,9 +11,9 @@
 #include <string>
 #include <tuple>
 
+#include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
-#include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/aedat/aedat_decoder.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/decoder.hpp"
@@ -112,7 +112,7 @@ File aedat_file_with_a_table_of_zeros() {
   for (auto& entry : table.value()) entry.elements = entry.start = entry.end = 0;
   file.name = "aedat_with_a_table_of_zeros";
   file.bytes.erase(file.bytes.begin() + table_at, file.bytes.end());
-  Aedat4Compressor(decoder.compression()).compress(aedat4_table_content(*table), file.bytes);
+  make_aedat4_compressor(decoder.compression()).compress(aedat4_table_content(*table), file.bytes);
   return file;
 }
 

@@ -13,7 +13,7 @@
 
 #include "gst/simulator/camera_profile.hpp"
 #include "src/filter/camera_calibration.hpp"
-#include "src/filter/pixel_list.hpp"
+#include "src/filter/hot_pixel_filter.hpp"
 #include "src/filter/pixel_mask.hpp"
 #include "src/filter/undistort_filter.hpp"
 #include "src/formats/aedat/aedat2_decoder.hpp"

@@ -11,7 +11,7 @@
 
 #include "src/flow/farneback/farneback.hpp"
 #include "src/gl/farneback.hpp"
-#include "src/gl/mark_kernels.hpp"
+#include "src/gl/kernels.hpp"
 #include "src/gl/simulator.hpp"
 #include "src/simulate/dense_simulator.hpp"
 #include "src/simulate/interpolation.hpp"

@@ -4,19 +4,28 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <random>
+#include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "src/core/event.hpp"
+#include "src/core/label.hpp"
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/dvs_simulator.hpp"
 #include "src/flow/dense_flow.hpp"
+#include "src/gl/event_sort.hpp"
+#include "src/gl/objects.hpp"
 #include "src/gl/simulator.hpp"
 #include "tests/dvs/playback.hpp"
 #include "tests/gl/every_api.hpp"
@@ -138,6 +147,60 @@ class Comparison {
 /// A frame of a texture that moves and changes its speed.
 Image<std::uint8_t> moving_frame(int i) {
   return scene::texture<std::uint8_t>(width, height, 8, 0.9 * i + 0.1 * i * i, 0.4 * i);
+}
+
+/// A list as EventSort expects it, with room for `capacity` events.
+std::vector<Event> list_of(const std::vector<Event>& events, std::size_t capacity) {
+  const auto count = static_cast<std::uint32_t>(events.size());
+  std::vector<Event> list(1 + capacity);
+  list[0] = std::bit_cast<Event>(
+      std::array<std::uint32_t, 2>{count, static_cast<std::uint32_t>(capacity)});
+  std::copy_n(events.begin(), std::min(events.size(), capacity), list.begin() + 1);
+  return list;
+}
+
+TEST_P(EveryApi, SortsEventsAndKeepsTheOrderOfEqualOnes) {
+  struct Case {
+    int width, height;
+    std::uint32_t duration;
+  };
+  std::minstd_rand random(1);
+  for (const auto& [columns, rows, duration] : {Case{1, 1, 1},
+                                                {5, 3, 700},
+                                                {300, 200, 33'333},
+                                                {1000, 700, 65'535},
+                                                {16'384, 16'384, 0xfffffffe}}) {
+    gl::EventSort sort(context, {columns, rows, 8});
+    for (const std::size_t count : {0, 1, 255, 256, 257, 100'003}) {
+      const auto below = [&](std::uint32_t end) {
+        return static_cast<std::uint32_t>(std::uint64_t{random()} * end >> 31);
+      };
+      std::vector<Event> events(count);
+      for (auto& event : events) {
+        event = Event::at(static_cast<int>(below(static_cast<std::uint32_t>(columns))),
+                          static_cast<int>(below(static_cast<std::uint32_t>(rows))),
+                          below(duration + 1), below(2) == 0 ? Polarity::off : Polarity::on);
+        if (below(10) == 0) event = with_cause(event, static_cast<Cause>(1 + below(7)));
+      }
+      const std::size_t capacity = std::max<std::size_t>(1, count - count / 1000);
+      const auto list = list_of(events, capacity);
+      gl::Buffer sorted(context, GL_DYNAMIC_READ);
+      sorted.reserve(list.size() * sizeof(Event));
+      sort.unsorted(sorted).assign(std::as_bytes(std::span(list)));
+      sort.run(sorted, duration);
+      std::vector<Event> found(list.size());
+      sorted.read(std::as_writable_bytes(std::span(found)));
+      events.resize(std::min(count, capacity));
+      std::ranges::stable_sort(events, {}, [](const Event& event) {
+        const bool is_late = event != without_cause(event);
+        return std::tuple(is_late, is_late ? 0 : event.t, without_cause(event).y(),
+                          without_cause(event).x);
+      });
+      auto expected = list_of(events, capacity);
+      expected[0] = list[0];
+      ASSERT_TRUE(found == expected) << columns << "x" << rows << ", " << count << " events";
+    }
+  }
 }
 
 TEST_P(EveryApi, SimulatesThePixelsOfEachPreset) {

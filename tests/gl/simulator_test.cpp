@@ -12,8 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "src/core/alpha.hpp"
+#include "src/core/luma.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
+#include "src/gl/kernels.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/simulator.hpp"
 #include "src/render/accumulator.hpp"
@@ -152,6 +153,42 @@ void expect_similar_events(gl::Simulator& ours, Simulator& reference) {
 TEST_P(EveryApi, FollowsDifferencesAsTheCpuDoes) {
   const LumaFormat format{67, 45, 8};
   expect_similar_events(*gl::make_diff_simulator(context, format), *make_diff_simulator(format));
+}
+
+/// A patch of a texture that moves over a flat background.
+Image<std::uint8_t> patch(int side, int i) {
+  auto frame = scene::flat<std::uint8_t>(side, side, 90);
+  const auto texture = scene::texture<std::uint8_t>(40, 24, 8, 0, 0);
+  for (int y = 0; y < texture.height(); ++y)
+    for (int x = 0; x < texture.width(); ++x) frame.at(200 + 3 * i + x, 300 + y) = texture.at(x, y);
+  return frame;
+}
+
+TEST_P(EveryApi, InterpolatesMoreStepsThanItProcessesAtOnce) {
+  constexpr int side = 512;
+  const LumaFormat format{side, side, 8};
+  const Settings settings{
+      .positive_threshold = 6, .negative_threshold = 6, .interpolated_frames = 279};
+  ASSERT_EQ(gl::steps_at_once(format, settings.interpolated_frames), 128);
+  Texture texture(side, side, 1);
+  for (const bool is_sparse : {false, true}) {
+    const auto ours = is_sparse ? gl::make_sparse_simulator(context, format)
+                                : gl::make_diff_simulator(context, format);
+    const auto reference = is_sparse ? make_sparse_simulator(format) : make_diff_simulator(format);
+    for (int i = is_sparse ? 1 : 0; i < 3; ++i) {  // diff interpolates from the third frame on
+      texture.upload(bytes_of(patch(side, i)));
+      const auto time = i * scene::frame_time;
+      const auto* made =
+          gl_test::events_until(*ours, texture.frame({one, 0, 0, 0}), time, settings);
+      const auto* expected = reference->push(scene::luma(patch(side, i)), time, settings);
+      if (i < 2) continue;
+      const auto events = scene::copy(*made);
+      const auto wanted = scene::copy(*expected);
+      EXPECT_GT(wanted.size(), 1'000U);
+      EXPECT_GE(matched(events, wanted, 0), 0.99) << is_sparse;
+      EXPECT_GE(matched(wanted, events, 0), 0.99) << is_sparse;
+    }
+  }
 }
 
 TEST_P(EveryApi, FollowsChangedPixelsAsTheCpuDoes) {

@@ -93,8 +93,6 @@ DEFINE_EVENT_ELEMENT(GstAedatMux, gst_aedat_mux, AEDAT_MUX, GstAggregator, GST_T
 
 constexpr const char* any_pad = "sink_%u";
 
-/* properties */
-
 /* input */
 
 enum class Kind { events, video, unknown };

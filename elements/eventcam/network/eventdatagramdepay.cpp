@@ -56,7 +56,7 @@
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
 #include "src/core/sensor_size.hpp"
-#include "src/wire/datagram_unpacker.hpp"
+#include "src/wire/datagrams.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_depay_debug);
 #define GST_CAT_DEFAULT event_datagram_depay_debug

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Marks the pixels that fire between two frames. Four pixels per invocation; each row of groups is a
-// row of pixels.
+// Marks the pixels that fire between two frames, or in steps between successive frames of a ring.
+// Four pixels per invocation; each row of groups is a row of pixels, each layer a step.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Before { uint before[]; };
@@ -12,6 +12,8 @@ layout(location = 2) uniform int marks_across;
 layout(location = 3) uniform int first_mark;
 layout(location = 4) uniform int positive;
 layout(location = 5) uniform int negative;
+layout(location = 6) uniform int first_step;  // frame before the first layer
+layout(location = 7) uniform int ring_size;   // 1 if each buffer has one frame
 
 // Per 32 pixels: a bit for each that fires, and one for each that fires ON.
 shared uint changed[8];
@@ -26,9 +28,11 @@ void main() {
     brighter[lane] = 0u;
   }
   barrier();
+  int rows = int(gl_NumWorkGroups.y);
+  int step = first_step + int(gl_WorkGroupID.z);
   if (word < words_across) {
-    uint was = before[y * words_across + word];
-    uint is = now[y * words_across + word];
+    uint was = before[(step % ring_size * rows + y) * words_across + word];
+    uint is = now[((step + 1) % ring_size * rows + y) * words_across + word];
     uint fires = 0u;
     uint rises = 0u;
     for (int i = 0; i < 4; ++i) {
@@ -44,5 +48,6 @@ void main() {
   barrier();
   int mark = int(gl_WorkGroupID.x) * 8 + lane;
   if (lane < 8 && mark < marks_across)
-    fired[first_mark + y * marks_across + mark] = uvec2(changed[lane], brighter[lane]);
+    fired[first_mark + (int(gl_WorkGroupID.z) * rows + y) * marks_across + mark] =
+        uvec2(changed[lane], brighter[lane]);
 }

@@ -27,7 +27,7 @@ layout(std430, binding = 2) readonly buffer Tables {
 layout(std430, binding = 3) buffer Events {
   uint event_count;
   uint capacity;
-  uvec2 events[];  // microseconds; x, y, eighths of a microsecond, polarity
+  uvec2 events[];  // as Event
 };
 layout(location = 0) uniform int width;
 layout(location = 1) uniform int height;
@@ -41,6 +41,8 @@ layout(location = 8) uniform int saturated;  // luma from which a pixel keeps a 
 layout(location = 9) uniform int plans;      // first word of the plan of each tile
 layout(location = 10) uniform int moves;     // scene: this frame, the last one, flow
 layout(location = 11) uniform int max_events;
+layout(location = 12) uniform int end_time;  // of the interval: whole microseconds, bits of the rest
+layout(location = 13) uniform int end_rest;
 
 // Planes of the state.
 const int target_plane = 0;
@@ -295,10 +297,14 @@ void fire(float crossed, int polarity) {
   float time = uintBitsToFloat(begin.y) + t;
   uint whole = max(begin.x + uint(time), next_time);
   next_time = whole + 1u;
+  uint place = uint(pixel % width) | uint(pixel / width) << 16 | (polarity > 0 ? 1u << 31 : 0u);
+  float rest = fract(time);
+  if (whole > uint(end_time) || (whole == uint(end_time) && rest > intBitsToFloat(end_rest))) {
+    uint seventh = uint(rest * 7.0) + 1u;  // in bits beside the coordinates
+    place |= (seventh & 3u) << 14 | (seventh & 4u) << 28;
+  }
   uint i = atomicAdd(event_count, 1u);
-  if (i < capacity)
-    events[i] = uvec2(whole, uint(pixel % width) | uint(pixel / width) << 14 |
-                                 uint(fract(time) * 8.0) << 28 | (polarity > 0 ? 1u << 31 : 0u));
+  if (i < capacity) events[i] = uvec2(whole, place);
   if (threshold_jitter > 0.0) {
     vec2 jitter = threshold_jitter * normals(next_hash());
     float fixed_positive = fixed_threshold(positive_mean, 1u);

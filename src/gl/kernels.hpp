@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "src/gl/event_list.hpp"
@@ -11,6 +13,24 @@
 
 namespace eventcamera::gl {
 
+/// Computes the luma of textures, exactly as luma_of_rgb() and composite_on_black() do.
+class LumaKernel {
+ public:
+  explicit LumaKernel(const Context& gl);
+  void run(const TextureFrame& frame, const GreyFrame& out) const;
+
+ private:
+  const Context& gl_;
+  Kernel kernel_;
+};
+
+/// Number of steps that a kernel with a word per pixel and step processes at once, at most `steps`:
+/// OpenGL ES guarantees buffers of 128 MiB.
+inline int steps_at_once(const LumaFormat& format, int steps) {
+  constexpr std::size_t max_words = std::size_t{1} << 25;
+  return std::clamp(static_cast<int>(max_words / pixel_count(format)), 1, steps);
+}
+
 /// Marks the pixels that fire between two frames, like fire_differences().
 class DifferenceKernel {
  public:
@@ -18,6 +38,11 @@ class DifferenceKernel {
 
   /// Writes the marks of `step`, 1 or later.
   void run(const GreyFrame& before, const GreyFrame& now, const Thresholds& thresholds, int step,
+           const EventList& out) const;
+
+  /// Writes the marks of the steps [first, end). The frame after step j is number j % `ring_size`
+  /// in `frames`.
+  void run(const Buffer& frames, int ring_size, const Thresholds& thresholds, int first, int end,
            const EventList& out) const;
 
  private:

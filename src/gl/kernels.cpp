@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/gl/mark_kernels.hpp"
+#include "src/gl/kernels.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -7,6 +7,19 @@
 #include "src/gl/shaders.hpp"
 
 namespace eventcamera::gl {
+
+LumaKernel::LumaKernel(const Context& gl) : gl_(gl), kernel_(gl, "luma", shaders::luma) {}
+
+void LumaKernel::run(const TextureFrame& frame, const GreyFrame& out) const {
+  const auto& [width, height, bits] = frame.format;
+  const int words = GreyFrame::words_across(width);
+  gl_.ActiveTexture(GL_TEXTURE0);
+  gl_.BindTexture(GL_TEXTURE_2D, frame.texture);
+  kernel_.run({groups_of(64, words), height}, {&out.buffer()},
+              {width, words, frame.weights[0], frame.weights[1], frame.weights[2], frame.weights[3],
+               frame.alpha, frame.black});
+  gl_.BindTexture(GL_TEXTURE_2D, 0);
+}
 
 DifferenceKernel::DifferenceKernel(const Context& gl, const LumaFormat& format)
     : format_(format), kernel_(gl, "difference", shaders::difference) {}
@@ -17,7 +30,15 @@ void DifferenceKernel::run(const GreyFrame& before, const GreyFrame& now,
   kernel_.run({groups_of(64, words), format_.height},
               {&before.buffer(), &now.buffer(), &out.marks()},
               {format_.width, words, out.marks_across(), (step - 1) * out.marks_a_step(),
-               thresholds.positive, thresholds.negative});
+               thresholds.positive, thresholds.negative, 0, 1});
+}
+
+void DifferenceKernel::run(const Buffer& frames, int ring_size, const Thresholds& thresholds,
+                           int first, int end, const EventList& out) const {
+  const int words = GreyFrame::words_across(format_.width);
+  kernel_.run({groups_of(64, words), format_.height, end - first}, {&frames, &frames, &out.marks()},
+              {format_.width, words, out.marks_across(), (first - 1) * out.marks_a_step(),
+               thresholds.positive, thresholds.negative, first - 1, ring_size});
 }
 
 InterpolationKernel::InterpolationKernel(const Context& gl, const LumaFormat& format)
