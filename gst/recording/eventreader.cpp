@@ -313,7 +313,7 @@ class EventReader {
         });
   }
 
-  /// Creates the recording, to read a file from its start or a stream of words. May throw.
+  /// Creates the recording, to read a file from its start or a stream of words.
   void open_recording() {
     const std::shared_ptr<GstCaps> caps(caps_ ? gst_caps_copy(caps_.get()) : nullptr, unref_caps);
     auto make = [make_decoder = format_.make_decoder, caps, settings = format_settings_.copy()] {
@@ -343,7 +343,7 @@ class EventReader {
     is_consuming_ = false;
   }
 
-  /// Reads and pushes one item. May throw.
+  /// Reads and pushes one item.
   GstFlowReturn step() {
     const auto output = recording_->next();
     if (bytes_ && bytes_->failed()) return bytes_->flow();
@@ -364,7 +364,7 @@ class EventReader {
     return std::visit([this](const auto& item) { return output_.push(item); }, *output);
   }
 
-  /// Pushes all available output. May throw.
+  /// Pushes all available output.
   GstFlowReturn push_pending() {
     GstFlowReturn result = GST_FLOW_OK;
     while (result == GST_FLOW_OK) result = step();
@@ -431,7 +431,6 @@ class EventReader {
 
   /* push mode: upstream sends the bytes of a file, or words with its own times */
 
-  /// May throw.
   GstFlowReturn handle_buffer(GstBuffer* buffer) {
     const MappedBytes bytes(element_, OwnedBuffer(gst_buffer_ref(buffer)));
     if (!bytes.is_mapped()) return GST_FLOW_ERROR;
@@ -467,7 +466,7 @@ class EventReader {
     return result;
   }
 
-  /// Pushes the output of the decompressor. May throw.
+  /// Pushes the output of the decompressor.
   GstFlowReturn push_decompressed() {
     GstFlowReturn result = GST_FLOW_OK;
     while (result == GST_FLOW_OK) {

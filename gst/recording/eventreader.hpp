@@ -54,7 +54,7 @@ struct EventReaderFormat {
   bool has_triggers = false;  ///< announced to writers, although a file may have none
   void (*add_properties)(FormatProperties& properties) = nullptr;
 
-  /// Creates a reader for a file or a stream with these caps; `caps` is null if unknown. May throw.
+  /// Creates a reader for a file or a stream with these caps; `caps` is null if unknown.
   std::unique_ptr<eventcamera::Decoder> (*make_decoder)(const GstCaps* caps,
                                                         const FormatSettings& settings);
 };

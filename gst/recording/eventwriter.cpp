@@ -345,7 +345,7 @@ static GstFlowReturn reported(GstEventWriter* self, const Work& work) {
 
 /* negotiation */
 
-/// Begins a file. May throw.
+/// Begins a file.
 static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, OwnedCaps caps) {
   auto& priv = priv_of(self);
   auto encoder =

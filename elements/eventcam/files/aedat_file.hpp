@@ -57,7 +57,6 @@ class AedatFile {
   bool has_begun() const { return encoder_ != nullptr; }
 
   /// Returns the header. `settings` has the compression, and whether there are frames and a table.
-  /// May throw.
   Bytes begin(eventcamera::Aedat4Settings settings) {
     settings.size = size_;
     if (!has_sensor() && video_)
@@ -77,7 +76,7 @@ class AedatFile {
     return header;
   }
 
-  /// Encodes the items that wait. May throw.
+  /// Encodes the items that wait.
   Bytes write_items() {
     Bytes out;
     const auto triggers = encode(triggers_, "triggers", out);
@@ -89,7 +88,7 @@ class AedatFile {
   }
 
   /// Encodes the items that wait and a buffer of time `t`: events, a frame, or neither if it is
-  /// empty. May throw.
+  /// empty.
   Bytes write(GstBuffer* buffer, Microseconds t, bool has_events) {
     Bytes out = write_items();
     const bool is_silent = gst_buffer_get_size(buffer) == 0;
@@ -104,14 +103,14 @@ class AedatFile {
     return out;
   }
 
-  /// Ends incomplete packets. May throw.
+  /// Ends incomplete packets.
   Bytes flush() {
     Bytes out = write_items();
     encoder_->flush(out);
     return out;
   }
 
-  /// Returns the end of the file. May throw.
+  /// Returns the end of the file.
   Bytes finish() {
     writable_.end_file();
     Bytes bytes = write_items();
@@ -173,7 +172,7 @@ class AedatFile {
     return true;
   }
 
-  /// Encodes the waiting items of a stream, and returns how many were written. May throw.
+  /// Encodes the waiting items of a stream, and returns how many were written.
   template <class Item>
   std::size_t encode(Waiting<Item>& waiting, const char* name, Bytes& out) {
     const std::span<const Item> items =
@@ -185,7 +184,7 @@ class AedatFile {
     return count;
   }
 
-  /// Encodes the events of a buffer. May throw.
+  /// Encodes the events of a buffer.
   void write_events(GstBuffer* buffer, Bytes& out) {
     const MappedEvents mapped(buffer);
     if (!mapped)
@@ -196,7 +195,7 @@ class AedatFile {
     encoder_->encode(writable_.pick(mapped.events(), time_of(GST_BUFFER_PTS(buffer))), out);
   }
 
-  /// Encodes a frame. May throw.
+  /// Encodes a frame.
   void write_frame(GstBuffer* buffer, Microseconds t, Bytes& out) {
     GST_CAT_LOG_OBJECT(category_, element_, "frame at %" G_GINT64_FORMAT " us", gint64{t});
     const auto reject = [&](const char* cause) {

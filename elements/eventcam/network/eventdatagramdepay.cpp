@@ -170,7 +170,7 @@ static bool push_caps(GstEventDatagramDepay* self) {
   return state.has_caps;
 }
 
-/// Buffer of the events of the interval from start to end. May throw.
+/// Buffer of the events of the interval from start to end.
 static GstBuffer* buffer_of(std::span<const AbsoluteEvent> events, Microseconds start,
                             Microseconds end) {
   std::vector<Event> stream;
@@ -183,7 +183,7 @@ static GstBuffer* buffer_of(std::span<const AbsoluteEvent> events, Microseconds 
   return buffer;
 }
 
-/// Pushes the events of a datagram. May throw.
+/// Pushes the events of a datagram.
 static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& reception,
                           GstClockTime arrival) {
   auto& priv = *self->priv;
@@ -256,7 +256,7 @@ static void log_late(GstEventDatagramDepay* self, GstClockTime arrival) {
                     GST_TIME_ARGS(arrival));
 }
 
-/// Receives a datagram with these bytes. May throw.
+/// Receives a datagram with these bytes.
 static GstFlowReturn receive(GstEventDatagramDepay* self, GstBuffer* datagram,
                              std::span<const std::uint8_t> bytes, GstClockTime arrival) {
   auto& priv = *self->priv;

@@ -102,7 +102,7 @@ static Report report_of(const std::exception& error) {
   return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to send the events."};
 }
 
-/// Keeps a datagram until push(). May throw.
+/// Keeps a datagram until push().
 static void keep(Private& priv, const Datagram& datagram) {
   OwnedBuffer buffer(copied_buffer(std::as_bytes(datagram.bytes)));
   GST_BUFFER_PTS(buffer.get()) = static_cast<GstClockTime>(datagram.first) * GST_USECOND;
@@ -132,7 +132,7 @@ static GstFlowReturn push(Private& priv) {
 
 static void flush_late(GstObject* element);
 
-/// Limits the time that a new incomplete datagram waits. May throw.
+/// Limits the time that a new incomplete datagram waits.
 static void set_timer(Private& priv) {
   const auto since = priv.stream->packer ? priv.stream->packer->waiting_since() : std::nullopt;
   if (since == priv.stream->timed) return;

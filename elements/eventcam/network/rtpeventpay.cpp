@@ -202,7 +202,7 @@ static GstBuffer* make_packet(GstRtpEventPay* self, std::span<const std::uint8_t
   return packet;
 }
 
-/// Sends the pending interval. May throw.
+/// Sends the pending interval.
 static void send(GstRtpEventPay* self) {
   auto& priv = *self->priv;
   if (!priv.stream->state || priv.stream->state->pending.empty()) return;
@@ -275,7 +275,7 @@ static bool is_due(GstRtpEventPay* self, Nanoseconds last_duration) {
 }
 
 /// Adds an interval, and sends the pending events if they are due. Returns the events that cannot
-/// be sent. May throw.
+/// be sent.
 static InvalidEvents add_interval(GstRtpEventPay* self, EventInterval interval,
                                   std::span<const Event> events) {
   auto& priv = *self->priv;
