@@ -4,7 +4,8 @@
 
   plots.py BENCHMARKS.json DIRECTORY
 
-DIRECTORY/runtimes.png: the runtimes of the paper, beside ours here and on a GPU, the latter from the table of DIRECTORY/benchmarks.md.
+DIRECTORY/runtimes.png: the runtimes of the paper, beside ours here and on a GPU; the latter are read from
+DIRECTORY/benchmarks.md.
 DIRECTORY/growth.png: how the methods' cost grows."""
 import json
 import os

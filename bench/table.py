@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Prints the tables of a benchmark run: a summary; milliseconds per frame, a row per method and a
-column per scene; the same for dense flow alone, with its speed relative to OpenCV's; and the sizes that each method sustains in real time.
+column per scene; the same for dense flow alone, with its speed relative to OpenCV's; and the sizes that
+each method sustains in real time.
 
   table.py BENCHMARKS.json [PAGE.md]
 

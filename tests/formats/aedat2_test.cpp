@@ -96,7 +96,7 @@ TEST(Aedat2, WrapsAreFollowedThroughSilenceAndDisorder) {
     for (const int j : {0, 3})  // a wrap takes 71.6 minutes
       silence.push_back(AbsoluteEvent::at(i, i, 70LL * 60 * 1'000'000 * i + j, Polarity::on));
   Events disorder;
-  for (const auto t : {wrap / 2 - 2, wrap / 2 + 1, wrap / 2 - 1, wrap / 2 + 2, wrap / 2 - 500})
+  for (const auto t : {wrap / 2 - 2, wrap / 2 - 3, wrap / 2 + 1, wrap / 2 - 1, wrap / 2 - 500})
     disorder.push_back(AbsoluteEvent::at(1, 1, t, Polarity::on));
   for (const auto& events : {silence, disorder})
     expect_events(aedat_files::aedat2_dvs128(events), events, dvs128);

@@ -134,15 +134,6 @@ TEST(Chunker, KeepsEveryEventOfATimeInTheirOwnOrder) {
   }
 }
 
-TEST(Chunker, DropsWhatComesTooLate) {
-  Chunker chunker(length);
-  auto events = steady(0, 50'000);
-  events.push_back(at(100, 3));
-  const auto cuts = slice(chunker, events);
-  EXPECT_EQ(chunker.dropped().late, 1U);
-  EXPECT_EQ(joined(cuts).size(), events.size() - 1);
-}
-
 TEST(Chunker, DropsTheSameEventsHoweverTheyAreDivided) {
   std::mt19937_64 random(5);
   auto events = recordings::random_events(random, {640, 480}, 2'000, 30'000);
@@ -235,7 +226,7 @@ TEST(Chunker, RefusesImpossibleTimes) {
       2U);
 }
 
-/// Events in the order of their numbers, their times and classes as told; labelled if asked for.
+/// Expects intervals of limited size that have `count` events, event i at `time_of(i)`, in order.
 template <class TimeOf>
 void expect_bounded(std::size_t count, std::size_t at_once, bool is_labelled,
                     const TimeOf& time_of) {

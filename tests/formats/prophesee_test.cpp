@@ -215,9 +215,9 @@ struct Words {
   Bytes bytes;
   Events events = {};
   std::vector<Trigger> triggers = {};
-  std::uint64_t places = 0;  ///< of corruption
-  std::uint64_t first_at = 0;
-  std::uint64_t outside = 0;
+  struct {
+    std::uint64_t places, first_at, outside;
+  } corruption = {};
 };
 
 constexpr Microseconds lap34 = Microseconds{1} << 34;
@@ -246,16 +246,13 @@ const Words all_words[] = {
               0x10000000 | 640 << 11, 0x10000000 | 480}),
      {on(0, 0, 6400), on(1, 0, 6336), on(0, 0, 6464)},
      {},
-     1,
-     8,
-     2},
+     {1, 8, 2}},
     {"Evt2CountsBrokenWordsByPlaces",
      EvtFormat::evt2,
      words32({0x80000000, 0x10000000, 0x20000000, 0x30000000, 0x10000000, 0x90000000, 0x10000000}),
      {on(0, 0, 0), on(0, 0, 0), on(0, 0, 0)},
      {},
-     2,
-     8},
+     {2, 8, 0}},
     {"Evt3HasEventsVectorsAndTriggers",
      EvtFormat::evt3,
      evt3({0x2001,                          // before any time and row
@@ -283,8 +280,7 @@ const Words all_words[] = {
      evt3({0x8000, 0x6000, 0x0000, 0x9998}),
      {},
      {},
-     1,
-     6},
+     {1, 6, 0}},
     // After EM_ADDR_Y, events are not contrast changes until the next row.
     {"Evt3HasEventsThatAreNoChanges",
      EvtFormat::evt3,
@@ -304,16 +300,13 @@ const Words all_words[] = {
            0x5003}),
      {off(638, 0, 0), off(639, 0, 0)},
      {},
-     0,
-     0,
-     1 + 22 + 1 + 2},
+     {0, 0, 1 + 22 + 1 + 2}},
     {"Evt3NotesWhatIsNoWord",
      EvtFormat::evt3,
      evt3({0x8000, 0x6000, 0x0000, 0x4001, 0x9000, 0xb000, 0x2000, 0xc000}),
      {off(0, 0, 0)},
      {},
-     2,
-     6},
+     {2, 6, 0}},
     {"Evt4HasEventsVectorsAndTriggers",
      EvtFormat::evt4,
      words32({0xb0000000, 0xc0000000, 0xe0000009,              // before any time; a mask of one
@@ -329,8 +322,7 @@ const Words all_words[] = {
      words32({0xe0000000, 0xc0000000}),
      {},
      {},
-     1,
-     4},
+     {1, 4, 0}},
 };
 
 class ReadWords : public testing::TestWithParam<Words> {};
@@ -342,9 +334,9 @@ TEST_P(ReadWords, AreRead) {
   const auto decoded = decode(*decoder, GetParam().bytes);
   EXPECT_EQ(decoded.events, GetParam().events);
   EXPECT_EQ(decoded.triggers, GetParam().triggers);
-  EXPECT_EQ(decoder->corruption().places, GetParam().places);
-  EXPECT_EQ(decoder->corruption().first_at, GetParam().first_at);
-  EXPECT_EQ(decoder->corruption().outside, GetParam().outside);
+  EXPECT_EQ(decoder->corruption().places, GetParam().corruption.places);
+  EXPECT_EQ(decoder->corruption().first_at, GetParam().corruption.first_at);
+  EXPECT_EQ(decoder->corruption().outside, GetParam().corruption.outside);
 }
 
 TEST(Evt2, KnowsNoBoundsWhereItKnowsNoSize) {

@@ -131,7 +131,7 @@ inline Bytes deflated(const Bytes& bytes) {
   return packed;
 }
 
-/// For hdf5_chunk_fuzz: layout, filters, and the bytes of a chunk.
+/// For chunks of HDF5: layout, filters, and the bytes of a chunk.
 inline std::vector<Seed> hdf5_chunk_seeds() {
   auto seeds = ecf_seeds();
   for (auto& seed : seeds) seed.bytes.insert(seed.bytes.begin(), {2, 0, 200, 250, 0});
