@@ -15,8 +15,6 @@ HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-constexpr int kernel_radius = 2;
-
 /// Sums over the cells of a square around a pixel, without the pixel itself.
 template <int radius>
 class Neighbours {
@@ -102,9 +100,9 @@ void neighbour_support(const StampedBatch<Stamp>& batch, Stamp correlation_time,
 /// the sum must fit into 31 bits.
 void kernel_support(const StampedBatch<Stamp>& batch, Stamp correlation_time,
                     std::uint32_t needed) {
-  find_support<kernel_radius>(batch, correlation_time, needed, [&](auto left) HWY_ATTR {
-    return hn::AndNot(hn::ShiftRight<31>(left), left);
-  });
+  find_support<DenoiseFilter::kernel_radius>(
+      batch, correlation_time, needed,
+      [&](auto left) HWY_ATTR { return hn::AndNot(hn::ShiftRight<31>(left), left); });
 }
 
 int nearest(const DoubleWindow::Window& signal, const DoubleWindow::Window& noise, int x, int y) {
@@ -131,7 +129,6 @@ namespace {
 HWY_EXPORT(neighbour_support);
 HWY_EXPORT(kernel_support);
 HWY_EXPORT(nearest);
-constexpr int kernel_radius = 2;
 }  // namespace
 
 void DoubleWindow::clear() {

@@ -77,6 +77,9 @@ class DenoiseFilter {
   /// Keeps the sum of time_kernel within 32 bits.
   static constexpr Nanoseconds max_correlation_time = 50'000'000'000;
 
+  /// Reach of the neighbours of time_kernel, in pixels.
+  static constexpr int kernel_radius = 2;
+
   static Nanoseconds default_correlation_time(DenoiseMethod method);
 
   explicit DenoiseFilter(SensorSize sensor) : sensor_(sensor) {}
