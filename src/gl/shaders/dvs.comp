@@ -42,7 +42,7 @@ layout(location = 9) uniform int plans;      // first word of the plan of each t
 layout(location = 10) uniform int moves;     // scene: this frame, the last one, flow
 layout(location = 11) uniform int max_events;
 layout(location = 12) uniform int end_time;  // of the interval, whole microseconds
-layout(location = 13) uniform int end_rest;  // eighths of a microsecond, about the precision of floats
+layout(location = 13) uniform int end_rest;  // eighths of a microsecond
 
 // Planes of the state.
 const int target_plane = 0;
