@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <random>
 #include <span>
 #include <string>
 #include <variant>
@@ -17,7 +18,6 @@
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
 #include "tests/formats/aedat_files.hpp"
-#include "tests/formats/random_events.hpp"
 
 namespace {
 
@@ -26,8 +26,26 @@ using namespace eventcamera;
 constexpr SensorSize size{346, 260};
 constexpr std::size_t count = 2'000'000;
 
+/// Noise, many events of which have the same time.
+std::vector<AbsoluteEvent> make_events() {
+  std::mt19937 random(1);
+  const auto below = [&](int limit) {
+    return std::uniform_int_distribution<std::int64_t>(0, limit - 1)(random);
+  };
+  std::vector<AbsoluteEvent> events;
+  Microseconds t = 0;
+  while (events.size() < count) {
+    const auto pause = below(200);
+    t += pause == 0 ? below(1000) : pause < 4 ? below(10'000) : below(4) == 0 ? below(20) : 0;
+    events.push_back(AbsoluteEvent::at(static_cast<int>(below(size.width)),
+                                       static_cast<int>(below(size.height)), t,
+                                       below(2) == 1 ? Polarity::on : Polarity::off));
+  }
+  return events;
+}
+
 const std::vector<AbsoluteEvent>& events() {
-  static const auto made = random_events::make(size, count, 1, 0, {1000});
+  static const auto made = make_events();
   return made;
 }
 

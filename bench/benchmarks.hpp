@@ -5,7 +5,7 @@
 
 namespace bench {
 
-/// All methods on a scene, naive and optimized: SCENE/METHOD/FORMULATION/threads:N.
+/// All methods on a scene: SCENE/METHOD/ours/threads:N.
 void register_simulators(const Scene& scene);
 
 /// Dense flow alone, of whole frames, and OpenCV's with the same parameters:
@@ -16,11 +16,11 @@ void register_flows(const Scene& scene);
 /// SCENE/STEP/FORMULATION/threads:1.
 void register_events(const Scene& scene);
 
-/// All optimized methods on growing frames of the driving scene, two threads, until one takes
+/// All methods on growing frames of the driving scene, two threads, until one takes
 /// longer than a thirtieth of a second: sizes/METHOD/SIZE.
 void register_sizes(bool few_frames);
 
-/// Scaling of the methods: growth/AXIS/METHOD/FORMULATION/VALUE.
+/// Scaling of the methods: growth/AXIS/METHOD/VALUE.
 void register_growth(bool few_frames);
 
 }  // namespace bench

@@ -24,7 +24,7 @@ Intervals intervals_of(const Scene& scene) {
   Intervals intervals;
   for (const auto& clip : scene.clips) {
     const LumaFormat format{clip[0].width(), clip[0].height(), 8};
-    const auto simulator = dis_hq_method.ours(format);
+    const auto simulator = dis_hq_method.make(format);
     const auto push = [&](const Frame& frame, Nanoseconds time) {
       return simulator->push({format, frame.row(0), frame.stride()}, time, settings);
     };

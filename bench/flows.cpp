@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
+#include <opencv2/video/tracking.hpp>
+
 #include "bench/benchmarks.hpp"
 #include "bench/playback.hpp"
+#include "src/flow/dis/dis.hpp"
+#include "src/flow/opencv.hpp"
 
 namespace bench {
 namespace {
@@ -21,15 +25,38 @@ class OurFlow {
   ThreadPool threads_;
 };
 
+/// OpenCV's implementation, with the parameters of ours.
 class OpenCvFlow {
  public:
   OpenCvFlow(FlowMethod method, const Frame& first, int threads)
-      : flow_(method, first.width(), first.height()), threads_(threads) {}
-  void find(const Frame& last, const Frame& now) { flow_.find(last.view(), now.view(), threads_); }
+      : farneback_(method == FlowMethod::farneback) {
+    cv::setNumThreads(threads);
+    const auto& quality = method == FlowMethod::dis_hq ? DisFlow::high : DisFlow::low;
+    dis_->setPatchSize(quality.patch);
+    dis_->setPatchStride(quality.stride);
+    dis_->setGradientDescentIterations(quality.iterations);
+    dis_->setFinestScale(quality.finest_scale(first.width(), first.height()));
+    dis_->setUseSpatialPropagation(false);
+  }
+  void find(const Frame& last, const Frame& now) {
+    if (farneback_) {
+      cv::calcOpticalFlowFarneback(opencv_image(last.view()), opencv_image(now.view()), flow_, 0.5,
+                                   3, 15, 3, 5, 1.2, 0);
+      return;
+    }
+    flow_.release();  // otherwise the search would start from the last flow
+    // OpenCV's DIS requires contiguous rows.
+    opencv_image(last.view()).copyTo(last_);
+    opencv_image(now.view()).copyTo(now_);
+    dis_->calc(last_, now_, flow_);
+  }
 
  private:
-  naive::OpenCvFlow flow_;
-  int threads_;
+  bool farneback_;
+  cv::Ptr<cv::DISOpticalFlow> dis_ = cv::DISOpticalFlow::create();
+  cv::Mat last_;
+  cv::Mat now_;
+  cv::Mat flow_;
 };
 
 /// Times the flow of whole frames, all frames of all clips equally often.

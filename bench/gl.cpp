@@ -248,7 +248,7 @@ Costs costs_of(gl::Context& context, const Method& method, const Clip& clip,
 
 /// Milliseconds per frame on the CPU.
 double cpu_cost_of(const Method& method, const Clip& clip, const Settings& settings) {
-  const auto simulator = method.cpu.ours({clip[0].width(), clip[0].height(), 8});
+  const auto simulator = method.cpu.make({clip[0].width(), clip[0].height(), 8});
   const auto play = [&](std::int64_t i) {
     return time_of([&] {
       simulator->push(scene::luma(bench::back_and_forth(clip, i)), i * bench::frame_time, settings);

@@ -29,27 +29,20 @@ void add(const std::string& axis, const std::string& value, const Setup& setup) 
   const auto clips = std::make_shared<std::vector<Clip>>();  // drawn on first use
   for (const auto& method : all_methods(setup.threshold_factor)) {
     if (axis == "n" && method.name.starts_with("dvs")) continue;  // it does not have n
-    const auto add_formulation = [&](const char* formulation, const MakeSimulator& make) {
-      std::string name = "growth";
-      for (const auto& part : {axis, method.name, std::string(formulation), value})
-        name.append("/").append(part);
-      benchmark::RegisterBenchmark(
-          name.c_str(),
-          [=](benchmark::State& state) {
-            if (clips->empty())
-              clips->push_back(moving_patch(setup.width, setup.height, setup.share, frame_count));
-            time_simulator(state, *clips, make,
-                           {method.threshold, method.threshold, setup.interpolated_frames, 0});
-            state.counters["pixels"] = setup.width * setup.height;
-            state.counters["n"] = setup.interpolated_frames;
-            state.counters["changed"] = changed_share(clips->front()[0], clips->front()[1]);
-          })
-          ->Unit(benchmark::kMillisecond)
-          ->MinTime(0.03)  // for a plot
-          ->UseRealTime();
-    };
-    if (method.naive) add_formulation("naive", method.naive);
-    add_formulation("ours", method.ours);
+    benchmark::RegisterBenchmark(
+        ("growth/" + axis + "/" + method.name + "/" + value).c_str(),
+        [=](benchmark::State& state) {
+          if (clips->empty())
+            clips->push_back(moving_patch(setup.width, setup.height, setup.share, frame_count));
+          time_simulator(state, *clips, method.make,
+                         {method.threshold, method.threshold, setup.interpolated_frames, 0});
+          state.counters["pixels"] = setup.width * setup.height;
+          state.counters["n"] = setup.interpolated_frames;
+          state.counters["changed"] = changed_share(clips->front()[0], clips->front()[1]);
+        })
+        ->Unit(benchmark::kMillisecond)
+        ->MinTime(0.03)  // for a plot
+        ->UseRealTime();
   }
 }
 

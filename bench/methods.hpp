@@ -7,11 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "bench/naive/dense.hpp"
-#include "bench/naive/diff.hpp"
-#include "bench/naive/dvs.hpp"
-#include "bench/naive/frame.hpp"
-#include "bench/naive/sparse.hpp"
 #include "src/dvs/dvs_simulator.hpp"
 #include "src/simulate/dense_simulator.hpp"
 #include "src/simulate/diff_simulator.hpp"
@@ -24,48 +19,36 @@ using namespace eventcamera;
 
 using MakeSimulator = std::function<std::unique_ptr<Simulator>(const LumaFormat&)>;
 
-/// A method in both formulations, naive and optimized.
 struct Method {
   std::string name;
   double threshold;
-  MakeSimulator naive;  ///< may be empty
-  MakeSimulator ours;
+  MakeSimulator make;
 };
 
-template <class NaiveSimulator, class... Arguments>
-MakeSimulator make_naive(const Arguments&... arguments) {
-  return [=](const LumaFormat& format) {
-    return std::make_unique<NaiveSimulator>(format, arguments...);
-  };
-}
-
 inline Method dense_method(const std::string& name, FlowMethod flow) {
-  return {name, 3, make_naive<naive::DenseSimulator>(flow), [flow](const LumaFormat& format) {
+  return {name, 3, [flow](const LumaFormat& format) {
             auto simulator = make_dense_simulator(format);
             simulator->set_flow(flow);
             return simulator;
           }};
 }
 
-/// Thresholds are those of the settings.
+/// The settings have the thresholds.
 inline Method dvs_method(const std::string& name, const DvsSettings& settings) {
-  return {name, 0, make_naive<naive::DvsSimulator>(settings), [settings](const auto& format) {
+  return {name, 0, [settings](const auto& format) {
             auto simulator = make_dvs_simulator(format);
             simulator->set(settings);
             return simulator;
           }};
 }
 
-inline const Method frame_method{"frame", 20, make_naive<naive::FrameSimulator>(),
-                                 make_frame_simulator};
+inline const Method frame_method{"frame", 20, make_frame_simulator};
 inline const Method dis_lq_method = dense_method("dense-dis-lq", FlowMethod::dis_lq);
 inline const Method dis_hq_method = dense_method("dense-dis-hq", FlowMethod::dis_hq);
 inline const Method opencv_dis_method = dense_method("dense-opencv-dis", FlowMethod::opencv_dis);
 inline const Method farneback_method = dense_method("dense-farneback", FlowMethod::farneback);
-inline const Method sparse_method{"sparse", 6, make_naive<naive::SparseSimulator>(),
-                                  make_sparse_simulator};
-inline const Method diff_method{"diff", 19, make_naive<naive::DiffSimulator>(),
-                                make_diff_simulator};
+inline const Method sparse_method{"sparse", 6, make_sparse_simulator};
+inline const Method diff_method{"diff", 19, make_diff_simulator};
 
 /// All methods, with multiples of their usual thresholds.
 inline std::vector<Method> all_methods(double threshold_factor = 1) {
@@ -77,17 +60,13 @@ inline std::vector<Method> all_methods(double threshold_factor = 1) {
       {"dvs-denoised", {.denoise = 8}},
       {"dvs-v2e-noisy", settings_of(DvsPreset::v2e_noisy)},
       {"dvs-motion", {.upsampling = Upsampling::motion}},
+      {"dvs", settings_of(DvsPreset::standard)},
   };
   for (auto [name, settings] : arrays) {
     settings.positive_threshold *= threshold_factor;
     settings.negative_threshold *= threshold_factor;
     methods.push_back(dvs_method(name, settings));
   }
-  auto settings = settings_of(DvsPreset::standard);
-  settings.positive_threshold *= threshold_factor;
-  settings.negative_threshold *= threshold_factor;
-  methods.push_back(dvs_method("dvs", settings));
-  methods.back().naive = nullptr;  // which has neither adaptation nor automatic denoising
   return methods;
 }
 

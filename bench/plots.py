@@ -4,8 +4,8 @@
 
   plots.py BENCHMARKS.json DIRECTORY
 
-DIRECTORY/runtimes.png: the runtimes of the paper, beside the naive implementation and ours here, and
-ours on a GPU, from the table of DIRECTORY/benchmarks.md.
+DIRECTORY/runtimes.png: the runtimes of the paper, beside ours here and on a GPU; the latter are read from
+DIRECTORY/benchmarks.md.
 DIRECTORY/growth.png: how the methods' cost grows."""
 import json
 import os
@@ -21,7 +21,6 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLoca
 
 INK = "#262b36"
 PAPER = "#b9bec9"
-NAIVE = "#e0a458"
 OURS = "#2f6fb5"
 OURS_ON_GPU = "#3a9a68"
 EVENTCV = "#dfe2e8"
@@ -137,10 +136,8 @@ def draw_runtimes(runs, on_gpu, path):
 
     def bars_of(row, scene, column):
         bars = [(row[column], EVENTCV if row is EVENTCV_RUNTIMES else PAPER)] if row[column] else []
-        for formulation, colour in (("naive", NAIVE), ("ours", OURS)):
-            run = runs.get(f"{scene}/{row[1]}/{formulation}/threads:2")
-            if run:
-                bars.append((run["real_time"], colour))
+        if run := runs.get(f"{scene}/{row[1]}/ours/threads:2"):
+            bars.append((run["real_time"], OURS))
         if f"{scene}/{row[1]}" in on_gpu:
             bars.append((on_gpu[f"{scene}/{row[1]}"], OURS_ON_GPU))
         return bars
@@ -181,14 +178,13 @@ def draw_runtimes(runs, on_gpu, path):
         axes.set_axisbelow(True)
         axes.set_xlabel("milliseconds per frame")
         axes.set_title(title, pad=14)
-    handles = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in (PAPER, NAIVE, EVENTCV, OURS, OURS_ON_GPU)]
+    handles = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in (PAPER, EVENTCV, OURS, OURS_ON_GPU)]
     figure.legend(
         handles,
         [
             "the paper's figures: its footage, measured on its machine (i7-9700, RTX 2080 Ti)",
-            "naive implementation: our footage, our machine, two threads",
             "EventCV's figures: a moving edge, on its machine (12 cores)",
-            "ours: the same footage, machine and threads",
+            "ours: our footage, our machine, two threads",
             "ours on an NVIDIA H200: the same footage, with uploading and reading back",
         ],
         loc="lower center",
@@ -201,8 +197,8 @@ def draw_runtimes(runs, on_gpu, path):
     figure.savefig(path, dpi=110)
 
 
-def points_of(runs, axis, counter, method, formulation):
-    prefix = f"growth/{axis}/{method}/{formulation}/"
+def points_of(runs, axis, counter, method):
+    prefix = f"growth/{axis}/{method}/"
     return sorted((run[counter], run["real_time"]) for name, run in runs.items() if name.startswith(prefix))
 
 
@@ -239,25 +235,16 @@ def draw_growth(runs, path):
     for row, (methods, row_axes) in enumerate(zip(GROWTH, all_axes)):
         for axes, (axis, counter, label, title) in zip(row_axes, columns):
             lines = [
-                (points, method, formulation)
-                for method in methods
-                for formulation in ("naive", "ours")
-                if (points := points_of(runs, axis, counter, method, formulation))
+                (points, colour)
+                for method, (_, colour) in methods.items()
+                if (points := points_of(runs, axis, counter, method))
             ]
             if not lines:
                 axes.text(0.5, 0.5, "eventsim-dvs does not have n", transform=axes.transAxes, ha="center")
                 axes.set_axis_off()
                 continue
-            for points, method, formulation in lines:
-                ours = formulation == "ours"
-                axes.plot(
-                    *zip(*points),
-                    "-" if ours else ":",
-                    color=methods[method][1],
-                    linewidth=1.9 if ours else 1.4,
-                    marker="o" if ours else None,
-                    markersize=4,
-                )
+            for points, colour in lines:
+                axes.plot(*zip(*points), "-", color=colour, linewidth=1.9, marker="o", markersize=4)
             scale_growth(axes, runs, axis)
             axes.tick_params(labelleft=True)
             axes.set_xlabel(label)
@@ -266,12 +253,7 @@ def draw_growth(runs, path):
         row_axes[0].set_ylabel("milliseconds per frame")
         lines = [plt.Line2D([], [], color=colour, linewidth=2) for _, colour in methods.values()]
         row_axes[0].legend(lines, [label for label, _ in methods.values()], frameon=False, fontsize=9)
-    lines = [
-        plt.Line2D([], [], color=INK, linewidth=1.9, marker="o", markersize=4),
-        plt.Line2D([], [], color=INK, linewidth=1.4, linestyle=":"),
-    ]
-    figure.legend(lines, ["ours", "naive implementation"], loc="lower center", ncol=2, frameon=False)
-    figure.tight_layout(rect=(0, 0.03, 1, 1), h_pad=2, w_pad=1.5)
+    figure.tight_layout(h_pad=2, w_pad=1.5)
     figure.savefig(path, dpi=100)
 
 

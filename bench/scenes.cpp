@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "bench/scenes.hpp"
 
+#include <gst/app/gstappsink.h>
+#include <gst/gst.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,7 +13,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "tests/pipelines/video_frames.hpp"
 #include "tests/simulate/scene.hpp"
 
 namespace bench {
@@ -40,6 +42,34 @@ Video driving_video(int width, int height) {
           20};
 }
 
+/// Visits the first `count` frames of a file, in grey, scaled to a width (a multiple of 4) and
+/// height. Returns how many there were.
+template <class Visit>
+int for_each_frame(const std::string& path, int count, int width, int height, const Visit& visit) {
+  gst_init(nullptr, nullptr);
+  const auto launch =
+      "filesrc location=\"" + path + "\" ! decodebin ! videoconvert ! videoscale ! " +
+      "video/x-raw,format=GRAY8,pixel-aspect-ratio=1/1,width=" + std::to_string(width) +
+      ",height=" + std::to_string(height) + " ! appsink name=sink sync=false max-buffers=4";
+  GstElement* pipeline = gst_parse_launch(launch.c_str(), nullptr);
+  GstElement* sink = gst_bin_get_by_name(GST_BIN(pipeline), "sink");
+  gst_element_set_state(pipeline, GST_STATE_PLAYING);
+  int frames = 0;
+  while (frames < count) {
+    GstSample* sample = gst_app_sink_pull_sample(GST_APP_SINK(sink));
+    if (sample == nullptr) break;
+    GstMapInfo map;
+    gst_buffer_map(gst_sample_get_buffer(sample), &map, GST_MAP_READ);
+    visit(frames++, eventcamera::ImageView<std::uint8_t>{map.data, width, width, height});
+    gst_buffer_unmap(gst_sample_get_buffer(sample), &map);
+    gst_sample_unref(sample);
+  }
+  gst_element_set_state(pipeline, GST_STATE_NULL);
+  gst_object_unref(sink);
+  gst_object_unref(pipeline);
+  return frames;
+}
+
 /// The video's clips; nothing, and a note, if $SHARED_DATA does not have it. With `few_frames` one
 /// clip of three frames.
 std::optional<Scene> read(Video video, bool few_frames) {
@@ -52,16 +82,15 @@ std::optional<Scene> read(Video video, bool few_frames) {
   if (few_frames) video.spans = {{video.spans.front().first, 3}};
   Scene scene{video.name, std::vector<Clip>(video.spans.size()), video.interpolated_frames};
   const int end = video.spans.back().first + video.spans.back().count;
-  int i = 0;
-  video_frames::for_each_frame(path, end, video.width, video.height, [&](const auto& frame) {
+  const auto visit = [&](int i, const auto& frame) {
     for (std::size_t clip = 0; clip < video.spans.size(); ++clip) {
       const auto& [first, count] = video.spans[clip];
       if (i < first || i >= first + count) continue;
       scene.clips[clip].emplace_back(video.width, video.height).assign(frame);
     }
-    ++i;
-  });
-  if (i < end) throw std::runtime_error(path + " is too short");
+  };
+  if (for_each_frame(path, end, video.width, video.height, visit) < end)
+    throw std::runtime_error(path + " cannot be read, or is too short");
   return scene;
 }
 

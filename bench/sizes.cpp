@@ -40,7 +40,7 @@ void register_sizes(bool few_frames) {
             if (!scene) scene = driving(size.width, size.height, few_frames);
             if (!scene) return state.SkipWithError("no video");
             const double seconds =
-                time_simulator(state, scene->clips, method.ours,
+                time_simulator(state, scene->clips, method.make,
                                {method.threshold, method.threshold, scene->interpolated_frames, 2});
             if (seconds > 1.0 / 30) *too_slow_at = name;
           })

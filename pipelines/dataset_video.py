@@ -110,7 +110,7 @@ def state_of(path):
 
 
 def making_of(video):
-    """All that determines the output besides the input."""
+    """Everything besides the input that determines the output."""
     recipe = video.recipe
     making = {"line": video.line, "outputs": list(recipe.outputs)}
     if TENSORS in recipe.outputs:

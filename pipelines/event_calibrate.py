@@ -62,7 +62,7 @@ MAX_BALANCE = 1.1
 PROFILED = "eventsim-dvs"
 # Frames explain the events in blocks of this size, and next to them, where even this threshold is reached.
 BLOCK, LOW_THRESHOLD = 8, 0.1
-# Largest share of pixels without events among those of which so many neighbours have events, and so many of them.
+# Largest share of silent pixels among the pixels with this many active neighbours, which have this many events in all.
 MAX_SILENT, BUSY_NEIGHBOURS, BUSY_EVENTS = 0.05, 5, 24
 # Seconds between two lines of progress where there is no terminal.
 PROGRESS_INTERVAL = 60
@@ -165,7 +165,7 @@ class Search:
         return compare(self.video, self.recorded, self.simulated_by(element), window)
 
     def ratings(self, element, windows):
-        """Of each window."""
+        """The ratings of each window."""
         return np.array([ratings_of(self.figures(element, window)) for window in windows])
 
     def balanced(self, setting):
@@ -192,7 +192,7 @@ def is_better(gains):
 
 
 def changes_of(video, recorded, span, element):
-    """The changes to try: those of properties that the element does not set."""
+    """The changes to try: of properties that the element does not set."""
     if element.split()[0] != PROFILED:
         return []
     changes = [{"exposure-time": exposure_of(video)}, *CHANGES]
@@ -211,8 +211,8 @@ def changed(element, change):
 
 
 def calibrate(search, element):
-    """The element with calibrated thresholds, and with those of its changes that gain on every second window, if they
-    gain on the others, too."""
+    """The element with calibrated thresholds, and with the changes that gain on every second window, if they gain on
+    the others, too."""
     progress = search.progress
     fitted = search.fit(Setting(element))
     progress.print(describe(f"calibrated thresholds: {fitted}", search.figures(fitted, search.span)))

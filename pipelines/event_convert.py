@@ -37,7 +37,7 @@ FILMS = {
     ".png": (30, "video/x-raw,format=RGB ! appsink name=file sync=false"),
 }
 # Events and frames may be apart by half a second, and a muxer waits for the later of both, for a silent stream until
-# it lags by half a second or more. Only files whose times do not go on reach the limit of bytes.
+# it lags by half a second or more. Only files whose times stop advancing reach the limit of bytes.
 BOTH = "max-size-buffers=0 max-size-bytes=1073741824 max-size-time=2000000000"
 
 
@@ -78,8 +78,8 @@ def pictures_of(path, options):
 
 
 def feed(pipeline, caps, buffers, seconds):
-    """Makes the appsrc `source` push buffers of so many seconds when it needs data; an exception ends the pipeline with
-    an error. Returns a list of the seconds pushed, which changes, and of all."""
+    """Makes the appsrc `source` push buffers, `seconds` long in all, when it needs data; an exception ends the pipeline
+    with an error. Returns a list that is updated: the seconds pushed so far, and all seconds."""
     source = pipeline.get_by_name("source")
     source.set_property("caps", caps)
     place, first = [0, seconds], None
@@ -198,7 +198,7 @@ class Pictures:
         self._kept, self._spacing, self._count = [], 1, 0
 
     def add(self, sink):
-        """Keeps a picture; of those for a sheet, a few evenly spaced ones."""
+        """Keeps a picture; for a sheet, only a few evenly spaced ones."""
         sample = sink.emit("pull-sample")
         caps = sample.get_caps().get_structure(0)
         size = caps.get_value("width"), caps.get_value("height")
@@ -239,7 +239,7 @@ def at_rate(rate):
 
 
 def set_size(pad, info, scale):
-    """Sets the size of the pictures, once that of the drawn ones is known; H.264 in 4:2:0 has even sides."""
+    """Sets the size of the output, once the size of the drawn pictures is known; H.264 in 4:2:0 has even sides."""
     caps = info.get_event().parse_caps() if info.get_event().type == Gst.EventType.CAPS else None
     if caps:
         # Halves are rounded up.
@@ -422,7 +422,7 @@ class Conversion:
     # running
 
     def run(self, path):
-        """Writes the file, and returns what was written. Raises Failure."""
+        """Writes the file, and returns a summary. Raises Failure."""
         options, pipeline = self._options, self._pipeline
         if not self._pictures:
             sink = pipeline.get_by_name("file") or pipeline.get_by_name("writer")
@@ -444,7 +444,7 @@ class Conversion:
             pipeline.set_state(Gst.State.NULL)
 
     def _seek(self):
-        """Plays only a part. Pictures are drawn at least as often as the sheet needs."""
+        """Plays only the selected part. Draws pictures at least as often as the sheet needs."""
         options, pipeline = self._options, self._pipeline
         known, duration = pipeline.query_duration(Gst.Format.TIME)
         end = Gst.SECOND * options.to if options.to is not None else None
@@ -696,7 +696,7 @@ def parse_options():
         " elements may follow (default: %(default)s)")
     add("--framerate", type=positive, metavar="RATE", help="of a pattern of pictures, a second")
     add("--speed", type=positive, default=Fraction(1), metavar="FACTOR",
-        help="OUT is so many times as fast as IN: 0.1 for a film in slow motion, 8 for the events of a video that was"
+        help="speed of OUT relative to IN: 0.1 for a film in slow motion, 8 for the events of a video that was"
         " recorded at 240 frames/s and plays at 30")
     add("--scale", type=positive, default=Fraction(1), metavar="FACTOR", help="size of a drawn pixel")
     add("--render", metavar="ELEMENT", help='what draws, such as "eventrender mode=decay palette=light"')
@@ -707,7 +707,7 @@ def parse_options():
     add("--merge", action="store_true", help="several IN: superimposed, by their timestamps")
     add("--reverse", action="store_true", help="time backwards, polarity inverted")
     add("--output-directory", metavar="DIRECTORY", help="convert each IN to a file of the same name in this folder")
-    add("--extension", metavar="NAME", help="of the files in the output directory, by default that of IN")
+    add("--extension", metavar="NAME", help="extension of the files in the output directory (default: the extension of IN)")
     add("--version", action="version", version="%(prog)s @VERSION@", help="print the version and exit")
     # parse_intermixed_args() of Python 3.11 refuses names after "--".
     words = sys.argv[1:]

@@ -6,8 +6,8 @@
     event-dataset verify recipe.yaml
 
 Events, a manifest with all hashes, lists of the parts, statistics and a page of pictures go to a folder beside
-the recipe, with the same name. A second call makes only what is missing or has changed. "verify" simulates the
-events again without keeping them, and compares their hashes, and those of the files in data/, with the
+the recipe, with the same name. A second call makes only missing and changed files. "verify" simulates the
+events again without keeping them, and compares their hashes and the hashes of the files in data/ with the
 manifest."""
 import argparse
 import collections
@@ -44,7 +44,7 @@ def options():
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("words", nargs="+", metavar="[verify] RECIPE", help="a file of YAML")
     parser.add_argument("-o", "--output", metavar="FOLDER",
-                        help="folder of the data set (default: that of the recipe's name, beside it)")
+                        help="folder of the data set (default: beside the recipe, with its name)")
     parser.add_argument("--cores", type=int, default=os.cpu_count(), metavar="N",
                         help="videos at a time on this machine (default: one for each processor)")
     parser.add_argument("--retries", type=int, default=2, metavar="N",
@@ -57,7 +57,7 @@ def options():
     parser.add_argument("--dry-run", action="store_true",
                         help="print the videos, their parts and drawn parameters, and which would be made")
     parser.add_argument("--manifest", metavar="FILE",
-                        help="the manifest that verify compares with (default: that of the folder)")
+                        help="the manifest that verify compares with (default: the folder's manifest)")
     parser.add_argument("--video", metavar="NAME", help="make one video only, as the jobs do; needs --file")
     parser.add_argument("--file", help="the file of that video")
     parser.add_argument("--trust", action="store_true",
@@ -185,7 +185,7 @@ def expect_slurm(folder):
     try:
         with open(os.path.join(folder, "config.yaml"), encoding="utf-8") as file:
             words = shlex.split((yaml.safe_load(file) or {}).get("cluster", ""))
-    except (FileNotFoundError, NotADirectoryError, yaml.YAMLError):  # Snakemake tells, or looks elsewhere
+    except (FileNotFoundError, NotADirectoryError, yaml.YAMLError):  # Snakemake reports it, or looks elsewhere
         return
     if words[:1] != ["sbatch"]:
         return
@@ -270,7 +270,7 @@ def selected(args, videos):
 
 
 def expect_own_folder(output, videos):
-    """The folder of a data set is written to and cleaned up, so that of its videos must be another."""
+    """Raises RuntimeError if a video is in the folder of the data set, which is written to and cleaned up."""
     folder = os.path.realpath(output)
     for video in videos:
         if os.path.commonpath([folder, os.path.realpath(video.path)]) == folder:
@@ -340,7 +340,7 @@ def verify_all(args, recipe):
             differences.append(f"{name}: {difference}")
     with concurrent.futures.ThreadPoolExecutor(args.cores) as pool:
         found = pool.map(lambda video: is_damaged(expected[video.name]["written"], args.output), present)
-        differences += [f"{video.name}: its file of events is not that of the manifest"
+        differences += [f"{video.name}: its file of events differs from the manifest"
                         for video, damaged in zip(present, found) if damaged]
     print_lines("different", differences)
     print(f"{len(present)} videos of the manifest compared, {len(differences)} differences")

@@ -132,7 +132,7 @@ def events_pad(reader):
         post_error(reader, "The file has no events to convert.", f"no stream of events among {len(names)} streams")
     elif count > 1:
         post_error(reader, f"Only the first of {count} streams of events is converted.",
-                   "the others are those of the pads events_1 and on", Gst.Message.new_warning)
+                   "the others are on the pads events_1 and on", Gst.Message.new_warning)
     return reader.get_static_pad("events_0")
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3 -B
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Says what is in recordings of event cameras.
+"""Describes recordings of event cameras.
 
     event-info recording.raw
     event-info recording.raw --plot rate.png
@@ -16,7 +16,7 @@ import numpy as np
 
 BIN = 10_000  # of the event rate, in microseconds
 MAX_BINS = 1 << 24
-# A hot pixel fires so many times, so often a second, and so many times as often as all of its neighbours but one.
+# Minimum events of a hot pixel, in all, per second, and relative to all of its neighbours but one.
 HOT_EVENTS, HOT_RATE, HOT_RATIO = 10, 10, 5
 SHOWN_PIXELS = 8
 XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
@@ -71,7 +71,7 @@ def tagged(tags, name):
 
 
 def read(path, progress, interrupt):
-    """Reads a whole recording. Returns its counts and a description, as for JSON."""
+    """Reads a whole recording. Returns its counts, and a description for JSON."""
     _, caps = content_of(path)
     reader = reader_of(path, caps)
     if not reader:

@@ -10,6 +10,7 @@ All files are event files that this project reads, of the same pixels and with t
 beyond the noise ceiling are marked with *."""
 import argparse
 import base64
+import functools
 import html
 import os
 import sys
@@ -92,37 +93,37 @@ def table_of(sensor, real, simulated, span):
                         [f"{stream.figures['candidate'][field]:.4g} ({100 * each:+.0f} %)"
                          for stream, each in zip(simulated, off)],
                         [abs(each) > chance for each in off]))
+
+    def add(title, goal, values, digits=3, is_beyond=lambda value: False):
+        rows.append(Row(title, goal if goal == "—" else f"{goal:.{digits}f}", [f"{value:.{digits}f}" for value in values],
+                        [is_beyond(value) for value in values]))
+
+    def of_all(*keys):
+        return [functools.reduce(dict.get, keys, stream.figures) for stream in simulated]
+
     for field, title in (("on-share", "share of ON events"), ("active-share", "share of active pixels"),
                          ("distinct-share", "distinct times per event")):
-        rows.append(Row(title, f"{first['reference'][field]:.3f}",
-                        [f"{stream.figures['candidate'][field]:.3f}" for stream in simulated],
-                        [False] * len(simulated)))
-    rows.append(Row("map correlation", "—", [f"{stream.figures['map-correlation']:.3f}" for stream in simulated],
-                    [False] * len(simulated)))
+        add(title, first["reference"][field], of_all("candidate", field))
+    add("map correlation", "—", of_all("map-correlation"))
     if min(sensor.width, sensor.height) >= 8:
         pictures = reconstruct(sensor, real.events, span)
-        rows.append(Row("similarity of reconstructions", "—",
-                        [f"{similarity(pictures, reconstruct(sensor, stream.events, span)):.3f}" for stream in simulated],
-                        [False] * len(simulated)))
-    values = [stream.figures["rate-correlation"] for stream in simulated]
-    rows.append(Row("rate correlation, 1 ms", f"{ceiling['rate-correlation']:.3f}",
-                    [f"{value:.3f}" for value in values],
-                    [value < ceiling["rate-correlation"] - TOLERANCE for value in values]))
-    values = [stream.figures["interval-distance"] for stream in simulated]
-    rows.append(Row("interval distance, decades", f"{ceiling['interval-distance']:.3f}",
-                    [f"{value:.3f}" for value in values],
-                    [value > ceiling["interval-distance"] + TOLERANCE for value in values]))
+        add("similarity of reconstructions", "—",
+            [similarity(pictures, reconstruct(sensor, stream.events, span)) for stream in simulated])
+    goal = ceiling["rate-correlation"]
+    add("rate correlation, 1 ms", goal, of_all("rate-correlation"), is_beyond=lambda value: value < goal - TOLERANCE)
+    goal = ceiling["interval-distance"]
+    add("interval distance, decades", goal, of_all("interval-distance"),
+        is_beyond=lambda value: value > goal + TOLERANCE)
     for side, title in (("reference", "real"), ("candidate", "simulated")):
         for limit in LIMITS:
             field = f"within-{limit}ms"
-            values = [stream.figures[f"{side}-matches"][field] for stream in simulated]
             goal = ceiling["matches"][field]
-            rows.append(Row(f"{title} events matched within {limit} ms", f"{goal:.3f}",
-                            [f"{value:.3f}" for value in values], [value < goal - TOLERANCE for value in values]))
-        values = [stream.figures[f"{side}-matches"]["nearest-distance"] / 1e6 for stream in simulated]
+            add(f"{title} events matched within {limit} ms", goal, of_all(f"{side}-matches", field),
+                is_beyond=lambda value: value < goal - TOLERANCE)
         goal = ceiling["matches"]["nearest-distance"] / 1e6
-        rows.append(Row(f"nearest match of {title} events, ms", f"{goal:.2f}", [f"{value:.2f}" for value in values],
-                        [value > goal * (1 + 2 * TOLERANCE) for value in values]))
+        add(f"nearest match of {title} events, ms", goal,
+            [value / 1e6 for value in of_all(f"{side}-matches", "nearest-distance")], digits=2,
+            is_beyond=lambda value: value > goal * (1 + 2 * TOLERANCE))
     return rows
 
 
@@ -147,8 +148,8 @@ def map_of(counts, max_count):
 
 
 def ticks_of(low, high, is_log):
-    """Round values from `low` to `high`, about five: 1, 2 and 5 times powers of ten. A logarithmic axis has those of
-    its values, and only the powers if these suffice."""
+    """Round values from `low` to `high`, about five: 1, 2 and 5 times powers of ten. A logarithmic axis has
+    only the powers if these suffice."""
     if is_log:
         powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.log10(high) + 1)
         shown = powers[::-(-len(powers) // 8)] if len(powers) > 4 else np.outer(powers, (1, 2, 5)).ravel()

@@ -48,7 +48,7 @@ class Frame:
 
 @dataclass
 class Sensor:
-    width: int = 0  # 0 = that of the first recording
+    width: int = 0  # 0 = as in the first recording
     height: int = 0
     mask: np.ndarray = None  # by row and column: whether a pixel of the camera can fire
 

@@ -37,23 +37,21 @@ using eventcamera::FlowMethod;
 
 using Settings = DenseSettings<FlowMethod::dis_lq>;
 
-static GType flow_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(FlowMethod::dis_lq),
-       "DIS, low quality: fast, misses small objects that move far", "dis-lq"},
-      {static_cast<int>(FlowMethod::dis_hq), "DIS, high quality", "dis-hq"},
-      farneback_flow,
-#ifdef HAVE_OPENCV
-      {static_cast<int>(FlowMethod::opencv_dis),
-       "OpenCV's DIS with the parameters of dis-hq, for comparison: slower", "opencv-dis"},
-#endif
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventSimFlowMethod", values);
-}
-
 static void install_properties(GObjectClass* klass) {
-  Settings::install(klass, flow_type());
+  Settings::install(
+      klass,
+      enum_type<FlowMethod>(
+          "GstEventSimFlowMethod",
+          {
+              {FlowMethod::dis_lq, "DIS, low quality: fast, misses small objects that move far",
+               "dis-lq"},
+              {FlowMethod::dis_hq, "DIS, high quality", "dis-hq"},
+              farneback_flow,
+#ifdef HAVE_OPENCV
+              {FlowMethod::opencv_dis,
+               "OpenCV's DIS with the parameters of dis-hq, for comparison: slower", "opencv-dis"},
+#endif
+          }));
 }
 
 static void configure(eventcamera::IntervalSimulator& simulator, GObject* object) {

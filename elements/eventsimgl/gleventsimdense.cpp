@@ -27,13 +27,8 @@ using eventcamera::gl::DenseSimulator;
 
 using Settings = DenseSettings<FlowMethod::farneback>;
 
-static GType flow_type() {
-  static const GEnumValue values[] = {farneback_flow, {0, nullptr, nullptr}};
-  return enum_type("GstGLEventSimFlowMethod", values);
-}
-
 static void install_properties(GObjectClass* klass) {
-  Settings::install(klass, flow_type());
+  Settings::install(klass, enum_type<FlowMethod>("GstGLEventSimFlowMethod", {farneback_flow}));
 }
 
 static void configure(eventcamera::IntervalSimulator& simulator, GObject* object) {

@@ -147,7 +147,7 @@ struct EventAggregatorFunctions {
     }
   }
 
-  /// Forwards an event, once the segment is sent. May throw.
+  /// Forwards an event, once the segment is sent.
   static gboolean pass_on(EventAggregator& self, OwnedEvent event) {
     if (self.segment_sent_)
       return gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self.element_), event.release());
@@ -171,7 +171,7 @@ struct EventAggregatorFunctions {
   }
 
   /// At the end of the output: EOS, or SEGMENT_DONE once all pads have reached the end of their
-  /// segments. May throw.
+  /// segments.
   static GstFlowReturn end(EventAggregator& self) {
     const auto pads = sink_pads(self.element_);
     OwnedEvent done;

@@ -38,25 +38,25 @@ class EventAggregator {
   EventAggregator(const EventAggregator&) = delete;
   EventAggregator& operator=(const EventAggregator&) = delete;
 
-  /// False, after reporting why, if the element cannot start. May throw.
+  /// False, after reporting why, if the element cannot start.
   virtual bool start() { return true; }
-  /// Drops all state. May throw.
+  /// Drops all state.
   virtual void stop() = 0;
-  /// Drops all pending events, because the next input is discontinuous. May throw.
+  /// Drops all pending events, because the next input is discontinuous.
   virtual void flush() = 0;
   /// Frees as much memory as possible, after an allocation failed.
   virtual void release_memory() noexcept = 0;
 
-  /// Returns false to reject `caps`. May throw.
+  /// Returns false to reject `caps`.
   virtual bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) = 0;
-  /// Caps that the output has if the main pad, whose buffers pass through, has `input`. May throw.
+  /// Caps that the output has if the main pad, whose buffers pass through, has `input`.
   virtual OwnedCaps output_caps(GstCaps* input) { return OwnedCaps(gst_caps_ref(input)); }
   /// Caps of the main pad, whose buffers pass through, for which the output can have `output`.
   virtual OwnedCaps input_caps(OwnedCaps output) const { return output; }
-  /// Handles a new segment of the main pad, before the pad stores it. May throw.
+  /// Handles a new segment of the main pad, before the pad stores it.
   virtual void handle_segment(const GstSegment&) {}
   /// Like GstAggregatorClass::aggregate. Returns GST_FLOW_EOS once no more output follows because a
-  /// pad has_ended(). May throw.
+  /// pad has_ended().
   virtual GstFlowReturn aggregate(bool timed_out) = 0;
   /// Like GstAggregatorClass::get_next_time: when to continue without further input from live
   /// sources.

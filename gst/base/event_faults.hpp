@@ -12,9 +12,11 @@
 /// Reason for skipping events of a buffer.
 enum class EventFault { no_pts, pts_too_large, partial_event, beyond_sensor, unsorted };
 
-/// Reason for a missing interval, or for one past the supported times.
-inline EventFault interval_fault(GstBuffer* buffer) {
-  return GST_BUFFER_PTS_IS_VALID(buffer) ? EventFault::pts_too_large : EventFault::no_pts;
+/// Reason why the events of a buffer cannot be read, or are past the supported times.
+inline EventFault event_fault(GstBuffer* buffer) {
+  if (!GST_BUFFER_PTS_IS_VALID(buffer)) return EventFault::no_pts;
+  return gst_buffer_get_size(buffer) % sizeof(eventcamera::Event) != 0 ? EventFault::partial_event
+                                                                       : EventFault::pts_too_large;
 }
 
 /// Posts warnings about events that an element skips, once per fault and stream.

@@ -18,6 +18,9 @@ inline constexpr auto mutable_ready_flags =
 /// Flags of properties that may change at any time.
 inline constexpr auto mutable_playing_flags = static_cast<GParamFlags>(
     G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+/// Flags of properties that a GstController may change over time.
+inline constexpr auto controllable_flags =
+    static_cast<GParamFlags>(mutable_playing_flags | GST_PARAM_CONTROLLABLE);
 
 // Types of properties besides strings: numbers, enums and booleans.
 #define FOR_EACH_PROPERTY_TYPE(X) \
@@ -116,7 +119,8 @@ inline const char* nick_of(const char* name) {
 }
 
 /// Specification of a property of the type of `value`, its default. `limits` are the minimum and
-/// the maximum of a number, or the type of an enum.
+/// the maximum of a number, or the type of an enum. Integers are unsigned unless the minimum is
+/// negative.
 template <class Value, class... Limits>
 GParamSpec* new_spec(const char* name, const char* blurb, const Value& value, GParamFlags flags,
                      Limits... limits) {
@@ -129,6 +133,9 @@ GParamSpec* new_spec(const char* name, const char* blurb, const Value& value, GP
     return g_param_spec_enum(name, nick, blurb, limits..., static_cast<gint>(value), flags);
   else if constexpr (std::is_floating_point_v<Value>)
     return g_param_spec_double(name, nick, blurb, static_cast<gdouble>(limits)..., value, flags);
+  else if (((static_cast<gdouble>(limits) < 0) || ...))
+    return g_param_spec_int64(name, nick, blurb, static_cast<gint64>(limits)...,
+                              static_cast<gint64>(value), flags);
   else if constexpr (sizeof(Value) == sizeof(guint64))
     return g_param_spec_uint64(name, nick, blurb, static_cast<guint64>(limits)...,
                                static_cast<guint64>(value), flags);
@@ -137,42 +144,35 @@ GParamSpec* new_spec(const char* name, const char* blurb, const Value& value, GP
                              static_cast<guint>(value), flags);
 }
 
-/// For class_init: installs properties that are fields of the settings. `settings_of` returns the
-/// Guarded settings of an object. A class may have properties in several settings.
+/// For class_init: installs properties stored in fields of the settings: numbers, enums, booleans
+/// or strings. A field is a pointer to a member of Settings, or a function that returns a reference
+/// into it. `settings_of` returns the Guarded settings of an object. A class may have properties in
+/// several settings.
 template <auto settings_of>
 class Properties {
  public:
   using Settings =
       typename std::remove_reference_t<decltype(settings_of(static_cast<GObject*>(nullptr)))>::Type;
 
-  explicit Properties(GObjectClass* klass) : klass_(klass) {}
+  explicit Properties(GObjectClass* klass, Settings defaults = {})
+      : klass_(klass), defaults_(std::move(defaults)) {}
 
-  /// Adds a property that may change at any time, with the default of its field. Limits as for
-  /// new_spec().
+  /// Adds a property that may change at any time. Limits as for new_spec().
   template <class Field, class... Limits>
   void add(Field field, const char* name, const char* blurb, Limits... limits) {
-    Settings defaults{};
-    add(field,
-        new_spec(name, blurb, std::invoke(field, defaults), mutable_playing_flags, limits...));
+    add_with_flags(mutable_playing_flags, field, name, blurb, limits...);
+  }
+
+  /// Adds a property that a GstController may change over time.
+  template <class Field, class... Limits>
+  void add_controllable(Field field, const char* name, const char* blurb, Limits... limits) {
+    add_with_flags(controllable_flags, field, name, blurb, limits...);
   }
 
   /// Adds a property that may change in the states NULL and READY.
   template <class Field, class... Limits>
   void add_fixed(Field field, const char* name, const char* blurb, Limits... limits) {
-    Settings defaults{};
-    add(field, new_spec(name, blurb, std::invoke(field, defaults), mutable_ready_flags, limits...));
-  }
-
-  /// Adds a property stored in `field`: a pointer to a member of Settings, or a function that
-  /// returns a reference into it. Fields are numbers, enums, booleans or strings.
-  template <class Field>
-  void add(Field field, GParamSpec* spec) {
-    add([field](Settings& settings,
-                const GValue* value) { read_value(value, std::invoke(field, settings)); },
-        [field](Settings& settings, GValue* value) {
-          write_value(std::invoke(field, settings), value);
-        },
-        spec);
+    add_with_flags(mutable_ready_flags, field, name, blurb, limits...);
   }
 
   /// Adds a property with a custom setter and getter.
@@ -186,5 +186,17 @@ class Properties {
   }
 
  private:
+  template <class Field, class... Limits>
+  void add_with_flags(GParamFlags flags, Field field, const char* name, const char* blurb,
+                      Limits... limits) {
+    add([field](Settings& settings,
+                const GValue* value) { read_value(value, std::invoke(field, settings)); },
+        [field](Settings& settings, GValue* value) {
+          write_value(std::invoke(field, settings), value);
+        },
+        new_spec(name, blurb, std::invoke(field, defaults_), flags, limits...));
+  }
+
   GObjectClass* klass_;
+  Settings defaults_;
 };

@@ -91,9 +91,9 @@ static auto reported(gpointer self, const Work& work) {
 /* events */
 
 /// Skips a buffer that cannot be filtered.
-static GstFlowReturn reject(gpointer self, EventFault fault, GstBuffer* buffer) {
+static GstFlowReturn reject(gpointer self, GstBuffer* buffer) {
   auto& priv = priv_of(self);
-  priv.stream->faults.warn(self, fault, buffer);
+  priv.stream->faults.warn(self, event_fault(buffer), buffer);
   const auto events = gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent);
   const auto counters = priv.counters.lock();
   counters->received += events;
@@ -139,9 +139,8 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
   auto& priv = priv_of(transform);
   if (!priv.stream->state) return GST_FLOW_NOT_NEGOTIATED;
   const auto interval = interval_of(buffer);
-  if (!interval) return reject(transform, interval_fault(buffer), buffer);
-  if (gst_buffer_get_size(buffer) % sizeof(GstEventCameraEvent) != 0)
-    return reject(transform, EventFault::partial_event, buffer);
+  if (!interval || gst_buffer_get_size(buffer) % sizeof(GstEventCameraEvent) != 0)
+    return reject(transform, buffer);
 
   return reported(transform, [&] {
     align_events(buffer);

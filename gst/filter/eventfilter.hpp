@@ -17,7 +17,6 @@
 /// one, which lives as long as the element.
 ///
 /// Called under the stream lock of the sink pad, or in a state change after streaming has stopped.
-/// Any call may throw.
 class EventFilter {
  public:
   virtual ~EventFilter() = default;
@@ -26,12 +25,12 @@ class EventFilter {
   /// output caps, which differs from `in` only if the subclass overrides transform_caps.
   virtual void start(eventcamera::SensorSize in, eventcamera::SensorSize out) = 0;
   /// Drops all state.
-  virtual void stop() = 0;
+  virtual void stop() {}
   /// Like the member function of eventcamera::Filter. May change x and y, too.
   virtual eventcamera::LabelledEvents filter(eventcamera::LabelledEvents events,
                                              eventcamera::Microseconds start) = 0;
   /// Forgets the past, because of a flush or because time starts over.
-  virtual void forget() = 0;
+  virtual void forget() {}
 };
 
 /// Settings of an element, derived from the settings of an eventcamera::Filter, and the filter,

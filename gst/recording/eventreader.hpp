@@ -8,7 +8,6 @@
 
 #include "gst/base/properties.hpp"
 #include "src/formats/decoder.hpp"
-#include "src/formats/event_table.hpp"
 
 /// User-settable values of a recording format, read at the start of a file. A reader has only the
 /// properties that its format adds.
@@ -19,27 +18,12 @@ struct FormatSettings {
   std::string column_order;        ///< empty: detect
   std::string topics;              ///< of a bag, separated by commas; empty: the usual ones
   std::string events_path;         ///< in an HDF5 file; empty: the first events
-
-  /// Time unit and columns of a table. Throws UnsupportedFormat.
-  eventcamera::TableSettings table() const;
 };
 
 /// Settings of a reader element.
 Guarded<FormatSettings>& format_settings_of(GObject* reader);
 
 using FormatProperties = Properties<format_settings_of>;
-
-/// Adds `width` and `height`, for formats whose files may not state the sensor size.
-void add_sensor_size(FormatProperties& properties);
-
-/// Adds `topics`, for bags.
-void add_topics(FormatProperties& properties);
-
-/// Adds `events-path`, for HDF5.
-void add_events_path(FormatProperties& properties);
-
-/// Adds `width`, `height`, `time-unit` and `column-order`, for tables.
-void add_table_properties(FormatProperties& properties);
 
 /// A recording format, and the element that reads it: bytes in, streams of events and video out.
 ///
@@ -70,7 +54,7 @@ struct EventReaderFormat {
   bool has_triggers = false;  ///< announced to writers, although a file may have none
   void (*add_properties)(FormatProperties& properties) = nullptr;
 
-  /// Creates a reader for a file or a stream with these caps; `caps` is null if unknown. May throw.
+  /// Creates a reader for a file or a stream with these caps; `caps` is null if unknown.
   std::unique_ptr<eventcamera::Decoder> (*make_decoder)(const GstCaps* caps,
                                                         const FormatSettings& settings);
 };

@@ -345,7 +345,7 @@ static GstFlowReturn reported(GstEventWriter* self, const Work& work) {
 
 /* negotiation */
 
-/// Begins a file. May throw.
+/// Begins a file.
 static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, OwnedCaps caps) {
   auto& priv = priv_of(self);
   auto encoder =
@@ -563,23 +563,19 @@ static void gst_event_writer_class_init(GstEventWriterClass* klass) {
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_WRITER, static_cast<GstPluginAPIFlags>(0));
 }
 
-/// Specification of the enum property that selects a variant.
-static GParamSpec* spec_of(const EventWriterFormat::Variants& variants) {
-  return g_param_spec_enum(variants.property, nick_of(variants.property), variants.blurb,
-                           variants.type(), variants.default_value, mutable_ready_flags);
-}
-
 static void format_class_init(gpointer klass, gpointer data) {
   const auto& format = *static_cast<const EventWriterFormat*>(data);
   GST_EVENT_WRITER_CLASS(klass)->format = &format;
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  Properties<settings_of> properties(object_class);
-  if (format.variants != nullptr)
-    properties.add([](Settings& settings) -> int& { return settings.choice.variant; },
-                   spec_of(*format.variants));
-  if (format.compressions != nullptr)
-    properties.add([](Settings& settings) -> int& { return settings.choice.compression; },
-                   spec_of(*format.compressions));
+  Settings defaults;
+  defaults.choice = default_choice(format);
+  Properties<settings_of> properties(object_class, defaults);
+  if (const auto* variants = format.variants)
+    properties.add_fixed([](Settings& settings) -> int& { return settings.choice.variant; },
+                         variants->property, variants->blurb, variants->type());
+  if (const auto* compressions = format.compressions)
+    properties.add_fixed([](Settings& settings) -> int& { return settings.choice.compression; },
+                         compressions->property, compressions->blurb, compressions->type());
   if (format.has_words)
     properties.add(&Settings::mtu, "mtu",
                    "Maximum size of a buffer of words in bytes, such as the payload of a network "

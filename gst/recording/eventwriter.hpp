@@ -39,7 +39,7 @@ struct EventWriterFormat {
     int compression = 0;
   };
 
-  /// Creates the encoder for a stream with these output caps. May throw.
+  /// Creates the encoder for a stream with these output caps.
   std::unique_ptr<eventcamera::Encoder> (*create)(eventcamera::SensorSize size, Choice choice,
                                                   const GstCaps* caps);
   /// Fixates the caps (not empty) that the member `caps` and downstream have in common; caps of

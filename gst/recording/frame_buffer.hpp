@@ -21,6 +21,6 @@ bool frame_video_info(const eventcamera::Frame& frame, GstVideoInfo* info);
 /// its upper left corner on the sensor, x and y (gint).
 GstBuffer* frame_buffer(const eventcamera::Frame& frame, const GstVideoInfo* info);
 
-/// View of a mapped video frame of RECORDED_VIDEO_CAPS as a recording's frame at `t`, with what its
-/// GstEventCameraFrame says, if it has one.
+/// View of a mapped video frame of RECORDED_VIDEO_CAPS as a recording's frame at `t`, with the
+/// metadata of its GstEventCameraFrame, if any.
 eventcamera::Frame recorded_frame(const GstVideoFrame* video, eventcamera::Microseconds t);

@@ -10,22 +10,8 @@
 
 /// Properties of the simulators that interpolate frames with dense optical flow.
 
-inline constexpr GEnumValue farneback_flow = {static_cast<int>(eventcamera::FlowMethod::farneback),
-                                              "Farneback", "farneback"};
-
-inline GParamSpec* interpolation_property(eventcamera::Interpolation interpolation) {
-  using eventcamera::Interpolation;
-  static const GEnumValue values[] = {
-      {static_cast<int>(Interpolation::forward), "The earlier frame, moved along the flow",
-       "forward"},
-      {static_cast<int>(Interpolation::blend),
-       "The earlier frame moved forward and the later frame moved back, blended", "blend"},
-      {0, nullptr, nullptr},
-  };
-  return g_param_spec_enum("interpolation", "Interpolation", "Frame interpolation method",
-                           enum_type("GstEventSimInterpolation", values),
-                           static_cast<int>(interpolation), mutable_playing_flags);
-}
+inline constexpr Choice<eventcamera::FlowMethod> farneback_flow = {
+    eventcamera::FlowMethod::farneback, "Farneback", "farneback"};
 
 /// Settings of such a simulator. `method` is the default.
 template <eventcamera::FlowMethod method>
@@ -41,12 +27,17 @@ struct DenseSettings {
 
   /// `flows` is the enum type of the methods that the element supports.
   static void install(GObjectClass* klass, GType flows) {
-    const DenseSettings defaults;
+    using eventcamera::Interpolation;
     Properties<of> properties(klass);
+    properties.add(&DenseSettings::flow, "flow",
+                   "Optical flow method, for the motion between frames", flows);
     properties.add(
-        &DenseSettings::flow,
-        g_param_spec_enum("flow", "Flow", "Optical flow method, for the motion between frames",
-                          flows, static_cast<int>(defaults.flow), mutable_playing_flags));
-    properties.add(&DenseSettings::interpolation, interpolation_property(defaults.interpolation));
+        &DenseSettings::interpolation, "interpolation", "Frame interpolation method",
+        enum_type<Interpolation>(
+            "GstEventSimInterpolation",
+            {{Interpolation::forward, "The earlier frame, moved along the flow", "forward"},
+             {Interpolation::blend,
+              "The earlier frame moved forward and the later frame moved back, blended",
+              "blend"}}));
   }
 };

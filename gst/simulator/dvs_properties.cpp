@@ -22,73 +22,64 @@ using eventcamera::Response;
 using eventcamera::Upsampling;
 
 static GType response_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(Response::log), "ln(log-eps + light)", "log"},
-      {static_cast<int>(Response::lin_log), "Linear up to grey level 20, ln(light) above (v2e)",
-       "lin-log"},
-      {static_cast<int>(Response::linear),
-       "ln(255) light: for video that is nearly logarithmic due to its gamma", "linear"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventSimDvsResponse", values);
+  return enum_type<Response>(
+      "GstEventSimDvsResponse",
+      {
+          {Response::log, "ln(log-eps + light)", "log"},
+          {Response::lin_log, "Linear up to grey level 20, ln(light) above (v2e)", "lin-log"},
+          {Response::linear, "ln(255) light: for video that is nearly logarithmic due to its gamma",
+           "linear"},
+      });
 }
 
 static GType upsampling_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(Upsampling::linear),
-       "Linear interpolation per pixel, in units of the response", "linear"},
-      {static_cast<int>(Upsampling::motion),
-       "Motion along dense optical flow, in steps of a pixel, or more if it is fast", "motion"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventSimDvsUpsampling", values);
+  return enum_type<Upsampling>(
+      "GstEventSimDvsUpsampling",
+      {
+          {Upsampling::linear, "Linear interpolation per pixel, in units of the response",
+           "linear"},
+          {Upsampling::motion,
+           "Motion along dense optical flow, in steps of a pixel, or more if it is fast", "motion"},
+      });
 }
 
 static GType refractory_reset_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(RefractoryReset::level),
-       "The level that was crossed; crossings within the refractory period are lost", "level"},
-      {static_cast<int>(RefractoryReset::signal), "The signal at the end of the refractory period",
-       "signal"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventSimDvsRefractoryReset", values);
+  return enum_type<RefractoryReset>(
+      "GstEventSimDvsRefractoryReset",
+      {
+          {RefractoryReset::level,
+           "The level that was crossed; crossings within the refractory period are lost", "level"},
+          {RefractoryReset::signal, "The signal at the end of the refractory period", "signal"},
+      });
 }
 
 static GType preset_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(DvsPreset::standard),
-       "A typical event camera: logarithmic, with motion between frames, for any frame camera",
-       "standard"},
-      {static_cast<int>(DvsPreset::ideal), "No noise, no delay; lin-log", "ideal"},
-      {static_cast<int>(DvsPreset::esim), "ESIM: like ideal, with a logarithmic response", "esim"},
-      {static_cast<int>(DvsPreset::v2e_clean), "v2e, clean: threshold mismatch only", "v2e-clean"},
-      {static_cast<int>(DvsPreset::v2e_noisy), "v2e, noisy: dim light", "v2e-noisy"},
-      {static_cast<int>(DvsPreset::icns), "IEBCS, the simulator of the ICNS", "icns"},
-      {static_cast<int>(DvsPreset::davis240c), "iniVation DAVIS240C, fitted to a recording",
-       "davis240c"},
-      {static_cast<int>(DvsPreset::davis346), "iniVation DAVIS346, fitted to a recording",
-       "davis346"},
-      {static_cast<int>(DvsPreset::gen4), "Prophesee Gen4, IMX636; thresholds are a guess", "gen4"},
-      {static_cast<int>(DvsPreset::hs_ergb),
-       "Event camera of TimeLens' HS-ERGB, fitted to a recording", "hs-ergb"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventSimDvsPreset", values);
+  return enum_type<DvsPreset>(
+      "GstEventSimDvsPreset",
+      {
+          {DvsPreset::standard,
+           "A typical event camera: logarithmic, with motion between frames, for any frame camera",
+           "standard"},
+          {DvsPreset::ideal, "No noise, no delay; lin-log", "ideal"},
+          {DvsPreset::esim, "ESIM: like ideal, with a logarithmic response", "esim"},
+          {DvsPreset::v2e_clean, "v2e, clean: threshold mismatch only", "v2e-clean"},
+          {DvsPreset::v2e_noisy, "v2e, noisy: dim light", "v2e-noisy"},
+          {DvsPreset::icns, "IEBCS, the simulator of the ICNS", "icns"},
+          {DvsPreset::davis240c, "iniVation DAVIS240C, fitted to a recording", "davis240c"},
+          {DvsPreset::davis346, "iniVation DAVIS346, fitted to a recording", "davis346"},
+          {DvsPreset::gen4, "Prophesee Gen4, IMX636; thresholds are a guess", "gen4"},
+          {DvsPreset::hs_ergb, "Event camera of TimeLens' HS-ERGB, fitted to a recording",
+           "hs-ergb"},
+      });
 }
 
 namespace {
-
-/// Flags of properties that a GstController can change over time, and of sensor traits.
-constexpr auto controllable = static_cast<GParamFlags>(GST_PARAM_CONTROLLABLE);
-constexpr GParamFlags fixed = {};
 
 constexpr double max_time = GST_SECOND;
 
 /// A property stored in a member of DvsSettings.
 struct PixelProperty {
   const char* name;
-  const char* nick;
   const char* blurb;
   std::variant<double DvsSettings::*, int DvsSettings::*, bool DvsSettings::*,
                std::uint64_t DvsSettings::*, Nanoseconds DvsSettings::*, Response DvsSettings::*,
@@ -96,114 +87,108 @@ struct PixelProperty {
       member;
   double min = 0;
   double max = 0;
-  GParamFlags over_time = fixed;
+  GParamFlags flags = mutable_playing_flags;
   GType (*type)() = nullptr;  ///< for enums
 };
 
 const PixelProperty pixel_properties[] = {
-    {"denoise", "Denoise", denoise_blurb, &DvsSettings::denoise, -1, 255, controllable},
-    {"linear-light", "Linear light",
+    {"denoise", denoise_blurb, &DvsSettings::denoise, -1, 255, controllable_flags},
+    {"linear-light",
      "Invert the sRGB transfer function (IEC 61966-2-1) first, to recover the light that reached "
      "the camera; otherwise luma is used as light",
      &DvsSettings::linear_light},
-    {"exposure-compensation", "Exposure compensation",
+    {"exposure-compensation",
      "Divide out changes of the frame camera's automatic exposure, which an event camera does not "
      "see: gains of 1 % to 25 % from one frame to the next (share of the light) that three "
      "quarters of the image agree on. A lamp that lights all of it evenly and gradually looks the "
      "same, and does not fire",
      &DvsSettings::exposure_compensation},
-    {"response", "Response", "Response of the photoreceptor to light", &DvsSettings::response, 0, 0,
-     fixed, response_type},
-    {"log-eps", "Offset of the logarithm",
+    {"response", "Response of the photoreceptor to light", &DvsSettings::response, 0, 0,
+     mutable_playing_flags, response_type},
+    {"log-eps",
      "Light that response=log adds before the logarithm, which limits the response to dark pixels "
      "(white is 1)",
      &DvsSettings::log_eps, 1e-6, 1},
-    {"overexposed-light", "Overexposed light",
+    {"overexposed-light",
      "Light of pixels that are white in the frame, which does not show how bright they are (white "
      "is 1). Light rises to it over the 20 of 255 grey levels below white",
      &DvsSettings::overexposed_light, 1, 1000},
-    {"upsampling", "Upsampling", "Model of light between two frames", &DvsSettings::upsampling, 0,
-     0, fixed, upsampling_type},
-    {"max-interpolated-frames", "Maximum interpolated frames",
+    {"upsampling", "Model of light between two frames", &DvsSettings::upsampling, 0, 0,
+     mutable_playing_flags, upsampling_type},
+    {"max-interpolated-frames",
      "Maximum number of frames interpolated between two frames with upsampling=motion. Without "
      "this limit, steps are a pixel for motion of up to 4 pixels, and longer for more",
      &DvsSettings::max_interpolated_frames, 0, 254},
-    {"exposure-time", "Exposure time",
+    {"exposure-time",
      "Exposure of the frames (ns); 0: short or unknown. The motion blur of long exposures is "
      "removed along the optical flow with upsampling=motion, where the timestamp of a frame must "
-     "be "
-     "the middle of its exposure. Short exposures are more realistic with 0",
-     &DvsSettings::exposure_time, 0, max_time, controllable},
-    {"cutoff-frequency", "Cutoff frequency",
+     "be the middle of its exposure. Short exposures are more realistic with 0",
+     &DvsSettings::exposure_time, 0, max_time, controllable_flags},
+    {"cutoff-frequency",
      "Bandwidth of the photoreceptor at white; darker pixels are slower (Hz; 0 = no limit)",
-     &DvsSettings::cutoff_frequency, 0, 1e6, controllable},
-    {"dark-light", "Dark light",
-     "Background illuminance, which limits how slow and noisy dark pixels get (fraction of "
-     "white): the "
-     "bandwidth of a pixel is cutoff-frequency times its brightness, (light + dark-light) / (1 + "
-     "dark-light), and its shot noise falls from all of shot-noise-rate at brightness 0 to a "
+     &DvsSettings::cutoff_frequency, 0, 1e6, controllable_flags},
+    {"dark-light",
+     "Background illuminance, which limits how slow and noisy dark pixels get (fraction of white): "
+     "the bandwidth of a pixel is cutoff-frequency times its brightness, (light + dark-light) / (1 "
+     "+ dark-light), and its shot noise falls from all of shot-noise-rate at brightness 0 to a "
      "quarter at 1",
-     &DvsSettings::dark_light, 1e-6, 1, controllable},
-    {"positive-threshold", "Positive threshold",
+     &DvsSettings::dark_light, 1e-6, 1, controllable_flags},
+    {"positive-threshold",
      "Contrast threshold of ON events: rise above the reference level (units of the response)",
-     &DvsSettings::positive_threshold, 1e-3, 10, controllable},
-    {"negative-threshold", "Negative threshold",
+     &DvsSettings::positive_threshold, 1e-3, 10, controllable_flags},
+    {"negative-threshold",
      "Contrast threshold of OFF events: fall below the reference level (units of the response, a "
      "magnitude)",
-     &DvsSettings::negative_threshold, 1e-3, 10, controllable},
-    {"threshold-sigma", "Threshold mismatch",
+     &DvsSettings::negative_threshold, 1e-3, 10, controllable_flags},
+    {"threshold-sigma",
      "Standard deviation of the contrast thresholds between pixels (units of the response)",
      &DvsSettings::threshold_sigma, 0, 10},
-    {"threshold-jitter", "Threshold jitter",
+    {"threshold-jitter",
      "Standard deviation of the contrast thresholds between events (units of the response)",
-     &DvsSettings::threshold_jitter, 0, 10, controllable},
-    {"leak-rate", "Leak rate",
+     &DvsSettings::threshold_jitter, 0, 10, controllable_flags},
+    {"leak-rate",
      "Mean rate of ON events of a pixel in constant light, due to the leak of its reference level "
      "(Hz)",
-     &DvsSettings::leak_rate, 0, 1e4, controllable},
-    {"leak-spread", "Leak spread", "Standard deviation of the leak rate between pixels (decades)",
+     &DvsSettings::leak_rate, 0, 1e4, controllable_flags},
+    {"leak-spread", "Standard deviation of the leak rate between pixels (decades)",
      &DvsSettings::leak_spread, 0, 1},
-    {"shot-noise-rate", "Shot-noise rate", "Rate of noise events of a dark pixel, ON plus OFF (Hz)",
-     &DvsSettings::shot_noise_rate, 0, 1e4, controllable},
-    {"hot-pixels", "Hot pixels",
+    {"shot-noise-rate", "Rate of noise events of a dark pixel, ON plus OFF (Hz)",
+     &DvsSettings::shot_noise_rate, 0, 1e4, controllable_flags},
+    {"hot-pixels",
      "Fraction of pixels whose leak fires 10 to 1000 ON events per second, regardless of light",
      &DvsSettings::hot_pixels, 0, 1},
-    {"dead-pixels", "Dead pixels", "Fraction of pixels that never fire", &DvsSettings::dead_pixels,
-     0, 1},
-    {"adaptation", "Adaptation",
+    {"dead-pixels", "Fraction of pixels that never fire", &DvsSettings::dead_pixels, 0, 1},
+    {"adaptation",
      "Growth of a pixel's contrast thresholds by each of its events, as a fraction of them; pixels "
      "of real cameras saturate in this way at strong edges",
-     &DvsSettings::adaptation, 0, 10, controllable},
-    {"adaptation-time", "Adaptation time",
+     &DvsSettings::adaptation, 0, 10, controllable_flags},
+    {"adaptation-time",
      "Time in which the growth by one event decays to 0, at a constant rate (ns)",
-     &DvsSettings::adaptation_time, 1000, max_time, controllable},
-    {"refractory-period", "Refractory period",
-     "Time after an event during which the pixel cannot fire (ns)", &DvsSettings::refractory_period,
-     0, max_time, controllable},
-    {"refractory-reset", "Refractory reset", "Reference level of a pixel after an event",
-     &DvsSettings::refractory_reset, 0, 0, fixed, refractory_reset_type},
-    {"exposure-pulse", "Exposure pulse",
+     &DvsSettings::adaptation_time, 1000, max_time, controllable_flags},
+    {"refractory-period", "Time after an event during which the pixel cannot fire (ns)",
+     &DvsSettings::refractory_period, 0, max_time, controllable_flags},
+    {"refractory-reset", "Reference level of a pixel after an event",
+     &DvsSettings::refractory_reset, 0, 0, mutable_playing_flags, refractory_reset_type},
+    {"exposure-pulse",
      "Rise of all signals for a millisecond when an exposure begins, in cameras that also capture "
      "frames (units of the response)",
-     &DvsSettings::exposure_pulse, 0, 10, controllable},
-    {"exposure-lead", "Exposure lead",
-     "Time from the start of a frame's exposure, and of exposure-pulse, to the frame's timestamp "
-     "(ns); less than 100000 counts as that; if longer than the time between frames, there is no "
-     "pulse",
-     &DvsSettings::exposure_lead, 0, max_time, controllable},
-    {"pixel-latency", "Pixel latency",
+     &DvsSettings::exposure_pulse, 0, 10, controllable_flags},
+    {"exposure-lead",
+     "Time from the start of a frame's exposure, where exposure-pulse begins, to the frame's "
+     "timestamp (ns). At least 100000 is assumed; there is no pulse if it is longer than the time "
+     "between frames",
+     &DvsSettings::exposure_lead, 0, max_time, controllable_flags},
+    {"pixel-latency",
      "Time from the threshold crossing to the event, when the refractory period begins (ns). "
-     "Events "
-     "after the last frame are not sent",
-     &DvsSettings::pixel_latency, 0, max_time, controllable},
-    {"pixel-latency-jitter", "Pixel latency jitter", "Standard deviation of pixel-latency (ns)",
-     &DvsSettings::pixel_latency_jitter, 0, max_time, controllable},
-    {"max-rate", "Maximum rate",
+     "Events after the last frame are not sent",
+     &DvsSettings::pixel_latency, 0, max_time, controllable_flags},
+    {"pixel-latency-jitter", "Standard deviation of pixel-latency (ns)",
+     &DvsSettings::pixel_latency_jitter, 0, max_time, controllable_flags},
+    {"max-rate",
      "Capacity of the readout: further events wait, row by row, and a waiting pixel cannot fire "
      "again (events/s; 0 = no limit)",
-     &DvsSettings::max_rate, 0, 1e12, controllable},
-    {"seed", "Seed", "Seed of all random numbers: the same seed gives the same events",
-     &DvsSettings::seed},
+     &DvsSettings::max_rate, 0, 1e12, controllable_flags},
+    {"seed", "Seed of all random numbers: the same seed gives the same events", &DvsSettings::seed},
 };
 
 /// Settings that come from one source.
@@ -292,41 +277,29 @@ static Guarded<Settings>& settings_of(GObject* object) {
 }
 
 template <class Value>
-static GParamSpec* spec_of(const PixelProperty& s, Value value) {
-  const auto flags = static_cast<GParamFlags>(mutable_playing_flags | s.over_time);
-  if constexpr (std::is_same_v<Value, double>)
-    return g_param_spec_double(s.name, s.nick, s.blurb, s.min, s.max, value, flags);
-  else if constexpr (std::is_same_v<Value, int>)
-    return g_param_spec_uint(s.name, s.nick, s.blurb, static_cast<guint>(s.min),
-                             static_cast<guint>(s.max), static_cast<guint>(value), flags);
-  else if constexpr (std::is_same_v<Value, bool>)
-    return g_param_spec_boolean(s.name, s.nick, s.blurb, value, flags);
+static GParamSpec* spec_of(const PixelProperty& row, const Value& value) {
+  if constexpr (std::is_enum_v<Value>)
+    return new_spec(row.name, row.blurb, value, row.flags, row.type());
   else if constexpr (std::is_same_v<Value, std::uint64_t>)
-    return g_param_spec_uint64(s.name, s.nick, s.blurb, 0, G_MAXUINT64, value, flags);
-  else if constexpr (std::is_same_v<Value, Nanoseconds>)
-    return g_param_spec_uint64(s.name, s.nick, s.blurb, 0, static_cast<guint64>(s.max),
-                               static_cast<guint64>(value), flags);
+    return new_spec(row.name, row.blurb, value, row.flags, 0, G_MAXUINT64);
   else
-    return g_param_spec_enum(s.name, s.nick, s.blurb, s.type(), static_cast<int>(value), flags);
+    return new_spec(row.name, row.blurb, value, row.flags, row.min, row.max);
 }
 
 void install_dvs_properties(GObjectClass* klass) {
-  const Settings defaults;
   Properties<settings_of> properties(klass);
-  properties.add(&Settings::preset,
-                 g_param_spec_enum(
-                     "preset", "Preset",
-                     "Camera model: sets all properties of the pixel that are not set explicitly, "
-                     "before or after",
-                     preset_type(), static_cast<int>(defaults.preset), mutable_playing_flags));
+  properties.add(
+      &Settings::preset, "preset",
+      "Camera model: sets all properties of the pixel that are not set explicitly, before or after",
+      preset_type());
   properties.add(
       [klass](Settings& settings, const GValue* value) { settings.set_profile(value, klass); },
       [](Settings& settings, GValue* value) { write_value(settings.profile, value); },
-      g_param_spec_string(
-          "profile", "Camera profile",
-          "File of settings that event-calibrate fitted to a camera. They override the preset, but "
-          "not properties that are set explicitly, before or after",
-          "", mutable_ready_flags));
+      new_spec("profile",
+               "File of settings that event-calibrate fitted to a camera. They override the "
+               "preset, but not properties that are set explicitly, before or after",
+               std::string(), mutable_ready_flags));
+  const DvsSettings defaults = Settings().dvs_settings();
   for (std::size_t i = 0; i < std::size(pixel_properties); ++i) {
     const auto add = [&](auto member) {
       properties.add(
@@ -334,7 +307,7 @@ void install_dvs_properties(GObjectClass* klass) {
           [member](Settings& settings, GValue* value) {
             write_value(settings.dvs_settings().*member, value);
           },
-          spec_of(pixel_properties[i], defaults.dvs_settings().*member));
+          spec_of(pixel_properties[i], defaults.*member));
     };
     std::visit(add, pixel_properties[i].member);
   }

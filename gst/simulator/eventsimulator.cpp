@@ -281,26 +281,19 @@ static Guarded<SimulatorSettings>& settings_of(GObject* object) {
   return simulation_of(object).settings;
 }
 
-static constexpr guint max_interpolated_frames = 255;
+static SimulatorSettings defaults_of(const EventSimulatorMethod& method) {
+  SimulatorSettings defaults;
+  if (method.threshold) {
+    defaults.simulation.positive_threshold = *method.threshold;
+    defaults.simulation.negative_threshold = *method.threshold;
+  }
+  return defaults;
+}
 
-static constexpr auto controllable_flags =
-    static_cast<GParamFlags>(mutable_playing_flags | GST_PARAM_CONTROLLABLE);
-
-/// `grey_levels` is the default of both thresholds.
-static void install_thresholds(GObjectClass* klass, double grey_levels) {
-  Properties<settings_of> properties(klass);
-  properties.add(
-      [](SimulatorSettings& settings) -> double& { return settings.simulation.positive_threshold; },
-      g_param_spec_double("positive-threshold", "Positive threshold",
-                          "Contrast threshold of ON events: brightness must rise by more than "
-                          "this (8-bit grey levels at any bit depth)",
-                          0, 255, grey_levels, controllable_flags));
-  properties.add(
-      [](SimulatorSettings& settings) -> double& { return settings.simulation.negative_threshold; },
-      g_param_spec_double("negative-threshold", "Negative threshold",
-                          "Contrast threshold of OFF events: brightness must fall by more than "
-                          "this (8-bit grey levels at any bit depth, a magnitude)",
-                          0, 255, grey_levels, controllable_flags));
+/// A member of SimulatorSettings::simulation.
+template <auto member>
+static auto& simulation(SimulatorSettings& settings) {
+  return settings.simulation.*member;
 }
 
 const char* const denoise_blurb =
@@ -309,78 +302,39 @@ const char* const denoise_blurb =
     "-1 = automatic: four standard deviations of the noise, found where successive frames differ "
     "least)";
 
-static void install_denoise(GObjectClass* klass) {
-  Properties<settings_of>(klass).add(
-      [](SimulatorSettings& settings) -> double& { return settings.simulation.denoise; },
-      g_param_spec_double("denoise", "Denoise", denoise_blurb, eventcamera::automatic_denoise, 255,
-                          eventcamera::Settings().denoise, controllable_flags));
-}
-
-static void install_interpolated_frames(GObjectClass* klass) {
-  Properties<settings_of>(klass).add(
-      [](SimulatorSettings& settings) -> int& { return settings.simulation.interpolated_frames; },
-      g_param_spec_uint("interpolated-frames", "Interpolated frames",
-                        "Number of frames to interpolate between two frames of the video; "
-                        "events take those frames' timestamps (at most one frame per microsecond)",
-                        0, max_interpolated_frames,
-                        static_cast<guint>(eventcamera::Settings().interpolated_frames),
-                        mutable_playing_flags));
-}
-
-static void install_label(GObjectClass* klass) {
-  Properties<settings_of>(klass).add(
-      [](SimulatorSettings& settings) -> bool& { return settings.simulation.labels; },
-      g_param_spec_boolean("label", "Label",
-                           "Label each event with its cause: light, leak, shot noise, hot pixel or "
-                           "exposure pulse. Events drawn as video have no labels",
-                           FALSE, mutable_playing_flags));
-}
-
-static void install_settings(GObjectClass* klass) {
-  Properties<settings_of> properties(klass);
-  properties.add([](SimulatorSettings& settings) -> int& { return settings.simulation.threads; },
-                 g_param_spec_uint("n-threads", "Threads",
-                                   "Maximum number of threads (0 = one per processor); the events "
-                                   "do not depend on it",
-                                   0, G_MAXINT, 0, mutable_playing_flags));
-  properties.add(
-      &SimulatorSettings::palette,
-      g_param_spec_enum("palette", "Palette", "Colours of event frames (accumulated-event video)",
-                        palette_type(), static_cast<int>(SimulatorSettings().palette),
-                        mutable_playing_flags));
-  properties.add(
-      &SimulatorSettings::skip_repeated,
-      g_param_spec_boolean("skip-repeated", "Skip repeated",
-                           "Compare frames, and treat one that equals the last, changed one as a "
-                           "repetition: its interval continues, and the last picture is drawn "
-                           "again. For webcams and editors that repeat frames to raise the "
-                           "framerate. Frames that are flagged GAP or have the memory of the last "
-                           "one are always repetitions",
-                           FALSE, mutable_playing_flags));
-}
-
-static void install_rolling_shutter(GObjectClass* klass) {
-  constexpr auto max_time = gint64{GST_SECOND};
-  Properties<settings_of>(klass).add(
-      [](SimulatorSettings& settings) -> eventcamera::Nanoseconds& {
-        return settings.simulation.rolling_shutter;
-      },
-      g_param_spec_int64("rolling-shutter", "Rolling shutter",
-                         "Time that the camera needs to read a frame, from its first row to its "
-                         "last one, which is later by that time (ns; negative if it reads the "
-                         "bottom row first; 0 = all rows at once). The PTS of a frame is the time "
-                         "of the row read first. Events drawn as video have the rows of the frames",
-                         -max_time, max_time, 0, mutable_playing_flags));
-}
-
-static void install_write_flow(GObjectClass* klass) {
-  Properties<settings_of>(klass).add(
-      &SimulatorSettings::write_flow,
-      g_param_spec_boolean("write-flow", "Write flow",
-                           "Add the optical flow of each interval to its buffer of events, as a "
-                           "GstEventCameraFlowMeta: the motion of each pixel from the start of the "
-                           "buffer to its end. Events drawn as video have none",
-                           FALSE, mutable_playing_flags));
+/// Installs the properties that not all methods have.
+static void install_method_properties(GObjectClass* klass, const EventSimulatorMethod& method) {
+  Properties<settings_of> properties(klass, defaults_of(method));
+  if (method.threshold) {
+    properties.add_controllable(simulation<&eventcamera::Settings::positive_threshold>,
+                                "positive-threshold",
+                                "Contrast threshold of ON events: brightness must rise by more "
+                                "than this (8-bit grey levels at any bit depth)",
+                                0, 255);
+    properties.add_controllable(simulation<&eventcamera::Settings::negative_threshold>,
+                                "negative-threshold",
+                                "Contrast threshold of OFF events: brightness must fall by more "
+                                "than this (8-bit grey levels at any bit depth, a magnitude)",
+                                0, 255);
+  }
+  if (method.denoises)
+    properties.add_controllable(simulation<&eventcamera::Settings::denoise>, "denoise",
+                                denoise_blurb, eventcamera::automatic_denoise, 255);
+  if (method.interpolates)
+    properties.add(simulation<&eventcamera::Settings::interpolated_frames>, "interpolated-frames",
+                   "Number of frames to interpolate between two frames of the video; events take "
+                   "those frames' timestamps (at most one frame per microsecond)",
+                   0, 255);
+  if (method.labels)
+    properties.add(simulation<&eventcamera::Settings::labels>, "label",
+                   "Label each event with its cause: light, leak, shot noise, hot pixel or "
+                   "exposure pulse. Events drawn as video have no labels");
+  if (method.has_flow)
+    properties.add(&SimulatorSettings::write_flow, "write-flow",
+                   "Add the optical flow of each interval to its buffer of events, as a "
+                   "GstEventCameraFlowMeta: the motion of each pixel from the start of the buffer "
+                   "to its end. Events drawn as video have none");
+  if (method.install_properties != nullptr) method.install_properties(klass);
 }
 
 static void set_qos(GObject* object, const GValue* value) {
@@ -400,8 +354,26 @@ static GstStructure* stats_of(GObject* object) {
                            "processing-time", G_TYPE_UINT64, stats.processing_time, nullptr);
 }
 
-/// Overrides the property `qos` of GstBaseTransform, which is off by default.
-static void install_qos_properties(GObjectClass* klass) {
+static void install_base_properties(GObjectClass* klass) {
+  Properties<settings_of> properties(klass);
+  properties.add(simulation<&eventcamera::Settings::threads>, "n-threads",
+                 "Maximum number of threads (0 = one per processor); the events do not depend on "
+                 "it",
+                 0, G_MAXINT);
+  properties.add(&SimulatorSettings::palette, "palette",
+                 "Colours of event frames (accumulated-event video)", palette_type());
+  properties.add(&SimulatorSettings::skip_repeated, "skip-repeated",
+                 "Treat a frame that equals the last changed one as a repetition: its interval "
+                 "continues, and the last picture is drawn again. For webcams and editors that "
+                 "repeat frames to raise the framerate. Frames that are flagged GAP or have the "
+                 "memory of the last one are always repetitions");
+  constexpr auto max_time = gint64{GST_SECOND};
+  properties.add(simulation<&eventcamera::Settings::rolling_shutter>, "rolling-shutter",
+                 "Time from the readout of the first row of a frame to the last (ns; negative if "
+                 "the bottom row is read first; 0 = all rows at once). The PTS of a frame is the "
+                 "time of the row read first. Events drawn as video have the rows of the frames",
+                 -max_time, max_time);
+  // Overrides GstBaseTransform's, which is off by default.
   install_property(
       klass, {set_qos, get_qos},
       g_param_spec_boolean("qos", "QoS",
@@ -414,22 +386,12 @@ static void install_qos_properties(GObjectClass* klass) {
                 "repeated-frames (by upstream), processing-time (of all processed frames, ns)");
 }
 
-static void install_base_properties(GObjectClass* klass) {
-  install_settings(klass);
-  install_rolling_shutter(klass);
-  install_qos_properties(klass);
-}
-
 /* type */
 
 /// Makes the method's settings here, because the method is not yet known in init.
 static void constructed(GObject* object) {
   const auto& method = method_of(object);
-  if (method.threshold) {
-    const auto settings = simulation_of(object).settings.lock();
-    settings->simulation.positive_threshold = *method.threshold;
-    settings->simulation.negative_threshold = *method.threshold;
-  }
+  *simulation_of(object).settings.lock() = defaults_of(method);
   if (method.make_settings != nullptr) priv_of(object).method_settings = method.make_settings();
   G_OBJECT_CLASS(parent_class)->constructed(object);
 }
@@ -485,15 +447,9 @@ GType gst_event_simulator_get_type() {
 
 static void method_class_init(gpointer klass, gpointer row) {
   const auto& method = *static_cast<const EventSimulatorMethod*>(row);
-  auto* object_class = G_OBJECT_CLASS(klass);
   GST_EVENT_SIMULATOR_CLASS(klass)->method = &method;
   method.video.install_pads(GST_ELEMENT_CLASS(klass));
-  if (method.threshold) install_thresholds(object_class, *method.threshold);
-  if (method.denoises) install_denoise(object_class);
-  if (method.interpolates) install_interpolated_frames(object_class);
-  if (method.labels) install_label(object_class);
-  if (method.has_flow) install_write_flow(object_class);
-  if (method.install_properties != nullptr) method.install_properties(object_class);
+  install_method_properties(G_OBJECT_CLASS(klass), method);
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), method.long_name,
                                         "Filter/Effect/Converter/Video", method.description,
                                         EVENTSIM_AUTHORS);

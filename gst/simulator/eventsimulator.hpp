@@ -17,13 +17,12 @@
 ///
 /// N frames give N - 1 intervals; the first frame after start, flush or a discontinuity only serves
 /// as reference for the next one. An interval has the PTS of its first frame and is pushed when its
-/// last frame arrives, so the latency is one frame plus the processing time. A GPU may still work
-/// on the last interval of a stream that is not live; then it is pushed with the next frame, or
-/// before any serialized event or query is handled. With a rolling shutter, late rows of a last
-/// frame give another interval. In an event stream, an interval without events is a GAP. In drawn
-/// video, an interval is a picture that replaces its last frame, with that frame's timestamps and
-/// its metas that remain valid, so the latency is the processing time. A first frame gives an empty
-/// picture.
+/// last frame arrives, so the latency is one frame plus the processing time. While a GPU works on
+/// an interval of a stream that is not live, it is pushed with the next frame, or before any
+/// serialized event or query. With a rolling shutter, late rows of a last frame give another
+/// interval. In an event stream, an interval without events is a GAP. In drawn video, an interval
+/// is a picture that replaces its last frame, with that frame's timestamps and its metas that
+/// remain valid, so the latency is the processing time. A first frame gives an empty picture.
 struct EventSimulatorMethod {
   const char* type_name;
   const char* long_name;
@@ -36,7 +35,7 @@ struct EventSimulatorMethod {
   bool labels = false;        ///< has the property label
   bool has_flow = false;      ///< reads the flow of frames, and has the property write-flow
 
-  /// Creates the simulator of an element for frames of this format. May throw.
+  /// Creates the simulator of an element for frames of this format.
   std::unique_ptr<VideoSimulator> (*create)(GObject* element, const GstVideoInfo& video);
 
   /// Input video and drawn video.

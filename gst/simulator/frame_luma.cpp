@@ -44,11 +44,6 @@ bool has_rgb_words(const GstVideoInfo& video) {
   return GST_VIDEO_INFO_IS_RGB(&video) && GST_VIDEO_INFO_COMP_DEPTH(&video, 0) < 8;
 }
 
-template <class Pixel>
-LumaView view_of(const Image<Pixel>& luma, const LumaFormat& format, bool is_narrow) {
-  return {format, luma.view().data, luma.stride(), is_narrow};
-}
-
 }  // namespace
 
 LumaFormat FrameLuma::format_of(const GstVideoInfo& video) {
@@ -108,38 +103,38 @@ AlphaView FrameLuma::alpha_of(const VideoFrame& frame) const {
           GST_VIDEO_INFO_COMP_PSTRIDE(&video_, GST_VIDEO_COMP_A) / sample};
 }
 
+/// Calls fill(image) with the buffer for copied luma. Returns its view.
+template <class Fill>
+LumaView FrameLuma::filled(const Fill& fill) {
+  const auto view = [&](auto& image) {
+    fill(image);
+    return LumaView{format_, image.row(0), image.stride(), is_narrow_};
+  };
+  return format_.bits == 8 ? view(bytes_) : view(words_);
+}
+
 LumaView FrameLuma::of(const VideoFrame& frame, ThreadPool& threads) {
   const LumaView opaque = opaque_luma_of(frame, threads);
   if (!has_alpha_) return opaque;
-  if (format_.bits == 8) {
-    composite_on_black(opaque, alpha_of(frame), threads, bytes_);
-    return view_of(bytes_, format_, is_narrow_);
-  }
-  composite_on_black(opaque, alpha_of(frame), threads, words_);
-  return view_of(words_, format_, is_narrow_);
+  return filled([&](auto& out) { composite_on_black(opaque, alpha_of(frame), threads, out); });
 }
 
 LumaView FrameLuma::opaque_luma_of(const VideoFrame& frame, ThreadPool& threads) {
   switch (layout_) {
     case Layout::plane:
-      break;
+      return {format_, frame.first_component(), frame.stride(), is_narrow_};
     case Layout::interleaved:
       eventcamera::gather_luma(reinterpret_cast<const guint8*>(frame.first_component()),
                                frame.stride(), GST_VIDEO_INFO_COMP_PSTRIDE(&video_, 0), bytes_);
-      return view_of(bytes_, format_, is_narrow_);
+      break;
     case Layout::swapped:
       eventcamera::swap_luma(frame.first_component(), frame.stride(), words_);
-      return view_of(words_, format_, is_narrow_);
+      break;
     case Layout::rgb_words:
       luma_of_rgb(rgb_words_of(frame), weights_, threads, bytes_);
-      return view_of(bytes_, format_, is_narrow_);
+      break;
     case Layout::rgb:
-      if (format_.bits == 8) {
-        luma_of_rgb(rgb_of(frame), weights_, threads, bytes_);
-        return view_of(bytes_, format_, is_narrow_);
-      }
-      luma_of_rgb(rgb_of(frame), weights_, threads, words_);
-      return view_of(words_, format_, is_narrow_);
+      return filled([&](auto& out) { luma_of_rgb(rgb_of(frame), weights_, threads, out); });
   }
-  return {format_, frame.first_component(), frame.stride(), is_narrow_};
+  return filled([](auto&) {});
 }

@@ -4,7 +4,6 @@
 #include <gst/video/video.h>
 
 #include "gst/base/video_frame.hpp"
-#include "src/core/alpha.hpp"
 #include "src/core/luma.hpp"
 #include "src/core/rgb_luma.hpp"
 #include "src/core/thread_pool.hpp"
@@ -21,7 +20,7 @@ bool has_narrow_luma(const GstVideoInfo& video);
 /// on black.
 class FrameLuma {
  public:
-  /// Allocates the buffer for copied luma, if any. May throw.
+  /// Allocates the buffer for copied luma, if any.
   explicit FrameLuma(const GstVideoInfo& video);
 
   static eventcamera::LumaFormat format_of(const GstVideoInfo& video);
@@ -33,6 +32,8 @@ class FrameLuma {
   enum class Layout { plane, interleaved, swapped, rgb, rgb_words };
 
   static Layout layout_of(const GstVideoInfo& video);
+  template <class Fill>
+  eventcamera::LumaView filled(const Fill& fill);
   eventcamera::LumaView opaque_luma_of(const VideoFrame& frame, eventcamera::ThreadPool& threads);
   eventcamera::AlphaView alpha_of(const VideoFrame& frame) const;
   eventcamera::RgbView rgb_of(const VideoFrame& frame) const;

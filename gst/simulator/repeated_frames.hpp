@@ -9,7 +9,7 @@
 #include "src/core/event.hpp"
 
 /// Finds the frames that upstream repeats to raise the framerate, as videorate, imagefreeze and
-/// webcams do. Such a frame tells nothing about the scene at its time.
+/// webcams do. Such a frame does not show the scene at its time.
 class RepeatedFrames {
  public:
   using Nanoseconds = eventcamera::Nanoseconds;

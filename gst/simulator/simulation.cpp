@@ -98,7 +98,7 @@ bool Simulation::set_caps(GstCaps* in, GstCaps* out) {
   return true;
 }
 
-/// Warns of a file that gets the events without the times of their buffers.
+/// Warns about a sink that writes events to a file without the times of their buffers.
 void Simulation::check_sink() {
   const OwnedPad peer(gst_pad_get_peer(GST_BASE_TRANSFORM_SRC_PAD(element_)));
   const OwnedElement sink(peer ? gst_pad_get_parent_element(peer.get()) : nullptr);
@@ -292,8 +292,7 @@ static OwnedPad source_of(GstPad* sink) {
   return peer;
 }
 
-/// True if an element upstream turns or flips the video. The tags do not tell: videoflip 1.22
-/// leaves them unchanged.
+/// True if an element upstream turns or flips the video. videoflip 1.22 leaves the tags unchanged.
 static bool is_turned_before(GstPad* sink) {
   constexpr int max_elements = 64;
   OwnedPad source = source_of(sink);
@@ -329,7 +328,7 @@ void Simulation::check_orientation(GstEvent* tags) {
 
 /* discontinuities */
 
-/// Makes the next frame, at `next` if that is known, a first frame. May throw.
+/// Makes the next frame, at `next` if that is known, a first frame.
 void Simulation::forget_frames(GstClockTime next) {
   stream_.gap.reset();
   stream_.motion.reset();
@@ -344,7 +343,7 @@ void Simulation::forget_frames(GstClockTime next) {
   stream_.discontinuous = true;
 }
 
-/// Restarts at a first frame, for a new timeline. May throw.
+/// Restarts at a first frame, for a new timeline.
 void Simulation::start_over(GstClockTime next) {
   forget_frames(next);
   stream_.pushed_until.reset();
@@ -387,7 +386,7 @@ void Simulation::sync_controlled_properties(GstClockTime time) {
     gst_object_sync_values(GST_OBJECT(element_), stream_time);
 }
 
-/// Configures the simulator for the next interval, and returns the settings of that.
+/// Configures the simulator for the next interval, and returns its settings.
 SimulatorSettings Simulation::begin_interval() {
   if (const auto configure = method().configure) configure(state_->simulator(), G_OBJECT(element_));
   SimulatorSettings current = settings.copy();
@@ -408,7 +407,7 @@ static Flow limited(const Flow& motion) {
   return {limit(motion.x), limit(motion.y)};
 }
 
-/// Returns the motion since the last frame, if its meta told it and the simulator needs it.
+/// Returns the motion since the last frame if its meta states it and the simulator needs it.
 KnownFlow Simulation::known_flow() {
   auto& simulator = state_->simulator();
   const auto motion = std::move(stream_.motion);
@@ -423,8 +422,8 @@ KnownFlow Simulation::known_flow() {
   return flow.view();
 }
 
-/// Keeps the motion to the next frame that the meta of a frame tells. Throws VideoSimulatorError
-/// unless it has the size of the video.
+/// Stores the motion to the next frame from the meta of a frame. Throws VideoSimulatorError unless
+/// it has the size of the video.
 void Simulation::keep_flow(GstBuffer* frame) {
   const auto* meta = gst_buffer_get_event_camera_flow_meta(frame);
   if (meta == nullptr) return;
@@ -466,7 +465,7 @@ GstFlowReturn Simulation::push_frame(OwnedBuffer frame) {
   return std::exchange(flow, GST_FLOW_OK);
 }
 
-/// Simulates the interval that a frame with a PTS ends, if any. May throw.
+/// Simulates the interval that a frame with a PTS ends, if any.
 void Simulation::simulate(OwnedBuffer frame) {
   const GstClockTime pts = GST_BUFFER_PTS(frame.get());
   check_interlacing(frame.get());
@@ -517,7 +516,6 @@ void Simulation::simulate(OwnedBuffer frame) {
 }
 
 /// Draws the events since the last frame (none for a first frame). The picture replaces the frame.
-/// May throw.
 void Simulation::draw_frame(const SimulatorSettings& current, const KnownFlow& flow,
                             OwnedBuffer frame) {
   const GstClockTime pts = GST_BUFFER_PTS(frame.get());
@@ -539,7 +537,6 @@ void Simulation::draw_frame(const SimulatorSettings& current, const KnownFlow& f
 }
 
 /// Continues the interval in a frame that repeats the last one, or draws the last picture again.
-/// May throw.
 void Simulation::repeat(GstBuffer* frame, Nanoseconds time) {
   ++stats.lock()->repeated_frames;
   keep_flow(frame);
@@ -564,8 +561,8 @@ bool Simulation::hold_through(GstEvent* gap) {
   return true;
 }
 
-/// Holds the last frame through a gap, if the next frame is not earlier than its end; until one
-/// frame duration before that, where the interval of the next frame begins. May throw.
+/// Holds the last frame through a gap that ends no later than the next frame, until one frame
+/// duration before its end, where the interval of the next frame begins.
 void Simulation::hold_last_frame(GstClockTime next) {
   if (!stream_.gap || next <= stream_.gap->start) return;  // the frame was overtaken by the gap
   const Gap gap = *std::exchange(stream_.gap, std::nullopt);
@@ -577,9 +574,9 @@ void Simulation::hold_last_frame(GstClockTime next) {
   if (last && *last < end) hold_until(end, gap.seqnum);
 }
 
-/// Holds the last frame until `end` and pushes the events of that time, and GAPs where there are
-/// none. In parts, as a pixel has a maximum number of events in each. Noise ends after a minute:
-/// the source has been away, and hours of noise would fill the disk. May throw.
+/// Holds the last frame until `end`, and pushes the events of that time, and GAPs where there are
+/// none, in parts, because a pixel has a maximum number of events in each. Noise ends after a
+/// minute: hours of it would fill the disk.
 void Simulation::hold_until(Nanoseconds end, guint32 seqnum) {
   constexpr auto max_part = Nanoseconds{250 * GST_MSECOND};
   constexpr auto max_noise = Nanoseconds{60 * GST_SECOND};
@@ -638,8 +635,7 @@ void Simulation::end() {
   });
 }
 
-/// Releases the frame of a finished interval, and pushes the events: a GAP if there are none. May
-/// throw.
+/// Releases the frame of a finished interval, and pushes the events: a GAP if there are none.
 void Simulation::push_interval(std::optional<Interval> interval) {
   if (!interval) return;
   auto& [frame, start, end, events] = *interval;
@@ -661,9 +657,8 @@ void Simulation::push_interval(std::optional<Interval> interval) {
                        static_cast<GstClockTime>(end - start));
 }
 
-/// Pushes the events of rows that a rolling shutter read after the last frame's timestamp. An
-/// interval of their own ends at the `next` frame at the latest; later events are dropped. May
-/// throw.
+/// Pushes the events of rows that a rolling shutter read after the last frame's timestamp, in an
+/// interval that ends at the `next` frame at the latest; later events are dropped.
 void Simulation::push_late_events(GstClockTime next) {
   if (!state_) return;
   auto& simulator = state_->simulator();
@@ -678,7 +673,7 @@ void Simulation::push_late_events(GstClockTime next) {
 }
 
 /// Writes the events of an interval, at least one, with their labels and their flow to a new
-/// buffer. `frame` ends the interval. May throw.
+/// buffer. `frame` ends the interval.
 GstFlowReturn Simulation::write_events(const EventBuckets& events, GstBuffer* frame,
                                        OwnedBuffer& out) {
   GstBuffer* prepared = nullptr;

@@ -37,7 +37,8 @@ struct SimulatorStats {
 
 /// Duration of the intervals of a stream, which is the latency of their events. Starts with the
 /// caps' duration. Rises to the second longest of the last intervals, so that one pause does not
-/// delay all that follows; falls once all of them are clearly shorter. Jitter does not change it.
+/// delay the rest of the stream; falls once all of the last intervals are clearly shorter. Ignores
+/// jitter.
 class IntervalDuration {
  public:
   using Nanoseconds = eventcamera::Nanoseconds;
@@ -71,7 +72,7 @@ class Simulation {
   /// message, if there is none.
   bool set_caps(GstCaps* in, GstCaps* out);
 
-  /// Simulates the interval that a frame ends, if any, and pushes what is finished.
+  /// Simulates the interval that a frame ends, if any, and pushes the finished intervals.
   GstFlowReturn push_frame(OwnedBuffer frame);
   /// The next interval is longer, because the frame at `pts` was skipped.
   void skip_frame(GstClockTime pts);
@@ -81,11 +82,11 @@ class Simulation {
   /// earlier than its end, because a GAP can overtake frames that a decoder still holds. Returns
   /// false if the event must be forwarded instead: for drawn video, and before a first frame.
   bool hold_through(GstEvent* gap);
-  /// Warns about rotated video, which its tags tell.
+  /// Warns if tags say that the video is rotated.
   void check_orientation(GstEvent* tags);
   /// Finishes and pushes the pending interval.
   void finish();
-  /// Finishes, with the events of the last gap and of late rows: no frames follow.
+  /// Finishes the stream, with the events of the last gap and of late rows.
   void end();
 
   /// Starts a new timeline, discontinuous with the previous one.

@@ -27,7 +27,7 @@ struct Interval {
 using KnownFlow = std::optional<eventcamera::ImageView<eventcamera::Flow>>;
 
 /// Simulator of frames in buffers of any kind of memory. push(), draw() and finish() throw
-/// VideoSimulatorError as well as what the simulator throws.
+/// VideoSimulatorError and the exceptions of the simulator.
 class VideoSimulator {
  public:
   virtual ~VideoSimulator() = default;

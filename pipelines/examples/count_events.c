@@ -52,7 +52,7 @@ static gboolean failed(GstBus* bus) {
   return TRUE;
 }
 
-/* Prints the size of the sensor or, if the caps are not those of events, how to get events. */
+/* Prints the size of the sensor or, for caps of other streams, how to get events. */
 static gboolean check_caps(const GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) {

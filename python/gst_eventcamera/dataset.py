@@ -23,7 +23,7 @@ from .video import VideoFile, VideoPipeline
 
 @dataclasses.dataclass(frozen=True)
 class DatasetVideo:
-    """A video of a data set. Iterating over it simulates it, and yields what the recipe's first output holds: an
+    """A video of a data set. Iterating over it simulates it, and yields the recipe's first output: an
     Events array per pair of consecutive frames, or tensors of shape (channels, height, width). Raises
     PipelineError if the video cannot be read; at its end, also if it is corrupt or has fewer frames than the
     recipe asks for.
@@ -101,7 +101,7 @@ class DatasetVideo:
 
 
 class Dataset(Sequence[DatasetVideo]):
-    """The videos of a recipe, by name. Nothing is stored: iterating over one of them simulates it, with the
+    """The videos of a recipe, by name. Nothing is stored: iterating over a video simulates it, with the
     same events as event-dataset writes.
 
     split: only the videos of this part, such as "train".

@@ -40,7 +40,7 @@ DISTRIBUTIONS = {"uniform": "[minimum, maximum]", "log-uniform": "[minimum, maxi
 
 
 class RecipeError(ValueError):
-    """An error in a recipe; the text says where, what, and what is allowed."""
+    """An error in a recipe; the text says where and what it is, and what is allowed."""
 
 
 class _Loader(yaml.SafeLoader):
@@ -180,7 +180,7 @@ class Recipe:
 
     def _draw(self, name: str, parameter: str, distribution: Distribution, drawn: Mapping[str, Value],
               limits: Mapping[str, tuple[float, float]]) -> Value:
-        """Draws a value, again if it is outside the limits of the property, as of a normal distribution."""
+        """Draws a value, again if it is outside the limits of the property, as from a normal distribution."""
         low, high = limits[parameter]
         for attempt in range(MAX_DRAWS):
             value = distribution.at(uniform_number(self.seed, name, parameter, attempt))

@@ -79,17 +79,17 @@ class Stream:
 
     @property
     def width(self) -> int:
-        """Of the sensor, in pixels."""
+        """Width of the sensor, in pixels."""
         return self._size[0]
 
     @property
     def height(self) -> int:
-        """Of the sensor, in pixels."""
+        """Height of the sensor, in pixels."""
         return self._size[1]
 
     @property
     def duration(self) -> float:
-        """Of the part, in seconds."""
+        """Duration of the part, in seconds."""
         return self._length(self._whole)
 
     def _length(self, whole: float) -> float:

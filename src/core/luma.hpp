@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "src/core/image.hpp"
+#include "src/core/thread_pool.hpp"
 
 namespace eventcamera {
 
@@ -37,6 +38,20 @@ void gather_luma(const std::uint8_t* data, std::ptrdiff_t stride, int step,
 
 /// Copies big-endian 16-bit luma in native byte order.
 void swap_luma(const void* data, std::ptrdiff_t stride, Image<std::uint16_t>& out);
+
+/// Alpha of a frame, in samples of the size of its luma.
+struct AlphaView {
+  const void* data = nullptr;
+  std::ptrdiff_t stride = 0;  ///< bytes from one row to the next
+  int step = 1;               ///< samples from one pixel to the next, 1 or 4
+};
+
+/// Composites luma on black: (luma * alpha + black * (white - alpha)) / white, rounded. `out` has
+/// the size of the frame, and may be the image that `luma` views.
+void composite_on_black(const LumaView& luma, const AlphaView& alpha, ThreadPool& threads,
+                        Image<std::uint8_t>& out);
+void composite_on_black(const LumaView& luma, const AlphaView& alpha, ThreadPool& threads,
+                        Image<std::uint16_t>& out);
 
 /// Converts frames to the 8 bits that optical flow works on: 8-bit frames are passed through,
 /// deeper ones are reduced to their upper 8 bits.

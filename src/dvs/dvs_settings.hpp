@@ -43,7 +43,7 @@ struct DvsSettings {
 
   Upsampling upsampling = Upsampling::linear;
   int max_interpolated_frames = 31;  ///< between two frames, for Upsampling::motion
-  Nanoseconds exposure_time = 0;     ///< of frames, if long; their times are its middle; for motion
+  Nanoseconds exposure_time = 0;  ///< of frames if long, for motion; a frame's time is its middle
 
   double cutoff_frequency = 0;       ///< cutoff of the photoreceptor at white
   double dark_light = 20.0 / 255.0;  ///< background illuminance; white is 1

@@ -16,7 +16,7 @@
 //                         pixels at each step
 //   sub_intervals.cpp     timeline: divides the interval into sub-intervals at steps and exposure
 //                         pulses, with tables of bandwidth and noise, which depend on the light
-// pixel_model.cpp       parameters shared by all pixels, and their mismatch
+//   pixel_model.cpp       parameters shared by all pixels, and their mismatch
 //   pixel_array.cpp       state of all pixels
 //   row_filter.cpp        advances pixels that cannot fire, usually most of them; the others,
 //                         candidates, are solved: they get the exact times of their events

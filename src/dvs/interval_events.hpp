@@ -115,7 +115,8 @@ class IntervalEvents {
       added_.insert(added_.end(), events.begin(), events.end());
     }
 
-    /// Adds an event `t` microseconds after the start of the interval, instead of its own time.
+    /// Adds an event with the time `t`, microseconds after the start of the interval, in place of
+    /// its own.
     void add(double t, const Event& event) {
       if (t > duration_)
         deferred_->push_back({t - duration_, event});

@@ -72,7 +72,7 @@ class Pixels {
     store(row, exist(), lanes, values);
   }
 
-  /// Stores the values of some of them.
+  /// Stores the values of some candidates.
   void store(const RowToSolve& row, Mask some, Values stored, float* values) const {
     HWY_ALIGN float lanes[max_lanes];
     hn::Store(hn::DemoteTo(Floats(), stored), Floats(), lanes);
@@ -195,7 +195,7 @@ HWY_INLINE Values wait(Values value, Values slope, Values threshold, Values left
   return hn::IfThenElse(hn::Or(is_beyond, meets), found, hn::Inf(Doubles()));
 }
 
-/// The same for grown thresholds, which fall.
+/// Time until signals reach grown thresholds, which fall.
 HWY_INLINE Values wait(Values value, Values slope, Values threshold, const Growth& growth) {
   const auto one = all(1);
   const auto margin = all(rounding);

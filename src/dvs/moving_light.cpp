@@ -76,7 +76,7 @@ struct BlockMotions {
   AxisMotion x;
   AxisMotion y;
 
-  /// Of `count` pixels of a row, from `left` on; the others move like the first.
+  /// Motion of `count` pixels of a row, from `left` on; the others move like the first.
   BlockMotions(const Flow* flow, int left, int row, int count, int blocks, int steps) {
     const hn::CappedTag<float, block> floats;
     const hn::RebindToSigned<decltype(floats)> words;

@@ -14,20 +14,21 @@ using enum RefractoryReset;
 // Settings that are not listed have the defaults of DvsSettings. Sources:
 //
 // standard: docs/realism.md. Thresholds of cameras differ by a factor of 2.7; these are in the
-// middle. esim: Rebecq et al., ESIM, CoRL 2018; thresholds of rpg_vid2e, offset of esim_py. v2e:
-// Hu, Liu, Delbruck, CVPRW 2021; set_dvs_params("clean") and, for dim light, ("noisy"). icns:
-// Joubert et al., Event camera simulator improvements via characterized parameters, Front.
+//   middle.
+// esim: Rebecq et al., ESIM, CoRL 2018; thresholds of rpg_vid2e, offset of esim_py.
+// v2e: Hu, Liu, Delbruck, CVPRW 2021; set_dvs_params("clean") and, for dim light, ("noisy").
+// icns: Joubert et al., Event camera simulator improvements via characterized parameters, Front.
 //   Neurosci. 2021, with the parameters of its example. White is 10 klux; the response ln(lux + 1)
 //   is ln(1e-4 + I) plus a constant. The time constant is 40 us at 1 klux and proportional to
 //   1 / (lux + 1), so 4 us at white. Noise of 0.1 Hz ON and 0.01 Hz OFF is a single rate here.
 // davis240c, davis346, hs-ergb: fitted by event-calibrate to recordings of docs/realism.md. The
-//   leak of 0.1 Hz is what DVS-Voltmeter was fitted with on recordings of a DAVIS346, whose readout
-//   does 12 million events per second according to the data sheet.
+//   leak of 0.1 Hz is from DVS-Voltmeter's fit to recordings of a DAVIS346, whose readout does 12
+//   million events per second according to the data sheet.
 // gen4: response and thresholds of standard: a guess, as no recording with frames was fitted. The
-//   rest are the middles, on a suitable scale, of the ranges from which OpenEB's own simulator
+//   other values are the middles, on a suitable scale, of the ranges from which OpenEB's simulator
 //   samples: refractory period 10 to 1000 us, leak and shot noise up to 1 Hz, cutoff up to 900 Hz.
-//   Its thresholds, 0.15 and 0.1, fire two to eight times too much. Finateu et al., ISSCC 2020:
-//   1.066 Gev/s of readout, latency below 220 us at 5 lux and about 100 us in office light.
+//   Its thresholds, 0.15 and 0.1, fire two to eight times too many events. Finateu et al., ISSCC
+//   2020: 1.066 Gev/s of readout, latency below 220 us at 5 lux and about 100 us in office light.
 //
 // The fractions of hot pixels are guesses.
 constexpr DvsSettings standard = {.denoise = automatic_denoise,

@@ -42,12 +42,12 @@ class Random {
     return (bits(pixel, purpose, counter) >> 63) != 0;
   }
 
-  /// In (0, 1).
+  /// Uniform in (0, 1).
   double uniform(std::uint64_t pixel, Purpose purpose, std::uint64_t counter = 0) const {
     return to_uniform(bits(pixel, purpose, counter));
   }
 
-  /// With mean and standard deviation 1.
+  /// Exponentially distributed, with mean 1.
   double exponential(std::uint64_t pixel, Purpose purpose, std::uint64_t counter = 0) const {
     return -logarithm(uniform(pixel, purpose, counter));
   }

@@ -30,7 +30,7 @@ class Readout {
   void read(std::span<const Event> in, double duration, double events_per_second, StepBuckets& out);
 
  private:
-  /// Event of a pixel that waits; 0 if none. It has no time, but gets the time of its readout.
+  /// Waiting event of a pixel, without its time, which will be the time of its readout; 0 if none.
   using Waiting = std::uint8_t;
   static constexpr Waiting waits_bit = 1;
   static constexpr Waiting on_bit = 2;

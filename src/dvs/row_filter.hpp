@@ -18,7 +18,7 @@ inline constexpr int max_lanes = 16;
 /// Pixels of a row in which an event may fire or a refractory period end.
 class Candidates {
  public:
-  /// Values of each of them, at the start of the sub-interval unless noted.
+  /// Values of each candidate, at the start of the sub-interval unless noted.
   enum Column : std::size_t {
     target,  ///< at the end of the sub-interval
     signal,  ///< with bandwidth only, otherwise the target
@@ -60,8 +60,7 @@ class Candidates {
   std::vector<float> memory_;
 };
 
-/// Luma of a run of pixels, from the first of them on: std::uint8_t if it has 8 bits, std::uint16_t
-/// otherwise.
+/// Luma of a run of pixels: std::uint8_t if it has 8 bits, std::uint16_t otherwise.
 struct RunLuma {
   const void* target;  ///< towards which the light moves
   const void* shade;   ///< that bandwidth and noise depend on

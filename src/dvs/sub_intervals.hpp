@@ -59,7 +59,7 @@ struct ShadeTables {
 
   double duration;  ///< microseconds
 
-  /// Of a frame with `gain` times the exposure of the first one.
+  /// For a frame with `gain` times the exposure of the first one.
   ShadeTables(const DvsSettings& settings, double microseconds, double gain);
 };
 

@@ -91,7 +91,7 @@ Entries entries_of_yaml(std::string_view yaml) {
   }
 }
 
-/// The same of XML, as OpenCV's FileStorage writes it: without attributes, comments and entities.
+/// Entries of XML, as OpenCV's FileStorage writes it: without attributes, comments and entities.
 Entries entries_of_xml(std::string_view xml) {
   constexpr std::string_view space = " \t\r\n";
   Entries entries;

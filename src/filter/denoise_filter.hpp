@@ -52,8 +52,8 @@ enum class DenoiseMethod {
   baf,
   /// Spatio-temporal correlation filter (Guo and Delbruck 2022): at least min_neighbours fired.
   stcf,
-  /// The last events of equal polarity of 24 neighbours count from 1 if new down to 0 at the
-  /// correlation time; their sum reaches the threshold.
+  /// Each of 24 neighbours counts by the age of its last event of equal polarity, from 1 if new
+  /// down to 0 at the correlation time. The sum reaches the threshold.
   time_kernel,
   /// Double window filter (Guo and Delbruck 2022), see DoubleWindow.
   dwf,

@@ -13,11 +13,11 @@
 
 namespace eventcamera {
 
-/// One of the streams to merge: the events of one of its intervals that are not merged yet.
+/// A stream to merge: the events of an interval that are not merged yet.
 class MergeInput {
  public:
   /// Starts an interval of this length. Copies its valid events, and their labels, if there are
-  /// any. Throws std::bad_alloc.
+  /// any.
   InvalidEvents load(std::span<const Event> events, std::span<const Label> labels,
                      SensorSize sensor, Microseconds length);
 
@@ -68,16 +68,16 @@ struct MergedInterval {
 };
 
 /// Merges sorted streams into one, interval by interval. Intervals follow each other without
-/// overlap, and times do not change. Events of one microsecond are in the order of the inputs,
-/// those of one input in its order. Only events at the very end of an interval, as simulators write
-/// them, may precede events of the same microsecond of earlier inputs.
+/// overlap, and times do not change. Events of one microsecond are in the order of the inputs, and
+/// of each input in its order. Only events at the very end of an interval, as simulators write
+/// them, may precede events of earlier inputs in the same microsecond.
 class EventMerger {
  public:
   using Inputs = std::span<MergeInput* const>;
 
-  /// Returns the next interval, up to the earliest end of the inputs, of which there must be one;
-  /// all must be loaded. An interval without events ends at the next event or interval if 32-bit
-  /// times require it, or if nothing is known before. Unload the merged inputs afterwards.
+  /// Returns the next interval, up to the earliest end of the inputs; there must be at least one,
+  /// and all must be loaded. An interval without events ends at the next event or interval if
+  /// 32-bit times require it, or if nothing is known before. Unload the merged inputs afterwards.
   MergedInterval next(Inputs inputs);
 
   /// Writes the events of that interval, relative to its start, and their labels if it is labelled.

@@ -57,7 +57,7 @@ LabelledEvents keep_if_prefetched(LabelledEvents events, Prefetch prefetch, Keep
   constexpr std::size_t distance = 32;
   const Event* const data = events.events.data();
   const std::size_t last = std::max<std::size_t>(events.events.size(), 1) - 1;
-  // What the loop needs is captured by value: writing events cannot change it.
+  // Captures by value, so stores to events cannot alias the captures.
   return events.keep_if([=, next = distance](Event& event) mutable {
     prefetch(data[std::min(next++, last)]);
     return keep(event);

@@ -3,14 +3,30 @@
 
 #include <cstdint>
 #include <limits>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "src/core/image.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/filter/filter.hpp"
-#include "src/filter/pixel_list.hpp"
 
 namespace eventcamera {
+
+struct PixelPosition {
+  std::uint16_t x;  ///< column, from the left
+  std::uint16_t y;  ///< row, from the top
+
+  friend constexpr bool operator==(const PixelPosition&, const PixelPosition&) = default;
+};
+
+/// Parses a list of pixels, one per line: column and row, separated by blanks or a comma. Empty
+/// lines and lines that begin with # are skipped. Throws std::invalid_argument with the offending
+/// line.
+std::vector<PixelPosition> parse_pixel_list(std::string_view text);
+
+/// Writes a list that parse_pixel_list() reads.
+std::string pixel_list_text(const std::vector<PixelPosition>& pixels);
 
 /// Drops the events of hot pixels, which in the last learning period fired at `min_rate` or more
 /// and at least `ratio` times as often as the median of their neighbours. 4 bytes per pixel.
@@ -46,7 +62,7 @@ class HotPixelFilter {
 
   /// Events in the learning period, and whether the pixel is hot.
   Image<std::uint32_t> pixels_;
-  std::vector<PixelPosition> frequent_;  ///< that fired at the minimum rate or more
+  std::vector<PixelPosition> frequent_;  ///< pixels that fired at the minimum rate or more
   std::vector<PixelPosition> hot_;
   static constexpr Microseconds never = std::numeric_limits<Microseconds>::max();
   Microseconds learning_end_ = never;

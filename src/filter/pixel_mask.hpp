@@ -13,7 +13,7 @@ namespace eventcamera {
 /// Keeps the events of some pixels. One bit per pixel.
 class PixelMask {
  public:
-  /// Keeps no pixel. Throws std::bad_alloc.
+  /// Keeps no pixel.
   explicit PixelMask(SensorSize sensor);
 
   /// Keeps the pixels that are brighter than mid-grey in a PNG picture of the sensor's size, over a

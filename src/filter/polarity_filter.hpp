@@ -8,7 +8,7 @@
 
 namespace eventcamera {
 
-/// Keeps the events of one polarity, and exchanges ON and OFF of those kept.
+/// Keeps the events of one polarity, and swaps ON and OFF of the kept events.
 class PolarityFilter {
  public:
   enum class Kept { both, on, off };

@@ -17,12 +17,11 @@ namespace eventcamera {
 class ScaleFilter {
  public:
   struct Settings {
-    /// Number of events of which the last is kept; 1 to max_min_events.
+    /// Keeps the last of every min_events events; 1 to max_min_events.
     unsigned min_events = 1;
   };
   static constexpr unsigned max_min_events = 65535;
 
-  /// Throws std::bad_alloc.
   ScaleFilter(SensorSize in, SensorSize out);
 
   LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings);

@@ -61,7 +61,7 @@ class StampClock {
 /// Whether pixels have a cell for all their events, or one for each polarity.
 enum class CellsPerPixel { one, one_per_polarity };
 
-/// Where the cells of pixels are.
+/// Addresses of the cells of pixels.
 template <class Cell>
 struct StampedCells {
   Cell* first;            ///< of the pixel (0, 0)

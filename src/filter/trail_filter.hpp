@@ -27,7 +27,7 @@ class TrailFilter {
 
   LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings) {
     const Stamp threshold = in_stamps(settings.threshold);
-    // Value of `follows` of the events to keep, and whether all of these or only the second.
+    // Events to keep: the first of a burst or the others, and whether only the second of these.
     const int kept = settings.mode == TrailMode::trail ? 0 : 1;
     const int keeps_all = settings.mode == TrailMode::stc_cut_trail ? 0 : 1;
     return last_.keep_if(events, start, [=](const Event& event, Stamp now, LastEvent* last) {

@@ -15,7 +15,6 @@ namespace eventcamera {
 /// and drops events that leave the picture. A look-up table: 4 bytes per pixel.
 class UndistortFilter {
  public:
-  /// Throws std::bad_alloc.
   UndistortFilter(SensorSize sensor, const CameraCalibration& calibration);
 
   LabelledEvents filter(LabelledEvents events) const;

@@ -27,8 +27,7 @@
 //   farneback.cpp                 scales and iterations
 // lucas_kanade/: Lucas and Kanade, An iterative image registration technique, IJCAI 1981;
 // Bouguet, Pyramidal implementation of the Lucas Kanade feature tracker, Intel 2000
-//   pyramid.cpp                   scales
-//   scharr_gradients.cpp          image gradients g
+//   pyramid.cpp                   scales and image gradients g
 //   search.cpp                    sum(g g^T) d = sum(g (I - J)) over a window, iterated, where
 //                                 sum(g g^T) suffices
 //   point_tracker.cpp             scales and points
@@ -41,7 +40,7 @@ struct Flow {
   float y;
 };
 
-/// Dense-flow algorithms. The property `flow` has the values of those that it offers.
+/// Dense-flow algorithms, with the values of the property `flow`.
 enum class FlowMethod {
   dis_lq,      ///< DIS, low quality and fast: patches of 4 at strides of 3, 8 iterations, 3 scales
   dis_hq,      ///< DIS, high quality: patches of 8 at strides of 4, 32 iterations

@@ -5,7 +5,7 @@
 #include "src/flow/dis/dis.hpp"
 #include "src/flow/farneback/farneback.hpp"
 #if defined(HAVE_OPENCV) && !defined(OWN_METHODS)
-#include "src/flow/opencv_dis.hpp"
+#include "src/flow/opencv.hpp"
 #endif
 
 namespace eventcamera {

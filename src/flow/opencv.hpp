@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <memory>
 #include <opencv2/core.hpp>
 
 #include "src/core/image.hpp"
+#include "src/flow/dense_flow.hpp"
 
 namespace eventcamera {
 
@@ -25,5 +27,17 @@ class OpenCvThreads {
   OpenCvThreads(const OpenCvThreads&) = delete;
   OpenCvThreads& operator=(const OpenCvThreads&) = delete;
 };
+
+/// FlowMethod::opencv_dis, in builds with OpenCV.
+std::unique_ptr<DenseFlow> make_opencv_dis();
+
+/// Sets the regularisation of the variational refinement as published. Since OpenCV 4.10 it is a
+/// parameter of cv::DISOpticalFlow, with another default.
+template <class Dis>
+void regularise(Dis& dis) {
+  constexpr float epsilon = 0.001F;
+  if constexpr (requires { dis.setVariationalRefinementEpsilon(epsilon); })
+    dis.setVariationalRefinementEpsilon(epsilon);
+}
 
 }  // namespace eventcamera

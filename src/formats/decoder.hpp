@@ -187,7 +187,7 @@ class Decoder {
   /// Adds bytes, which must stay valid until next() returns nothing; only then more may be pushed.
   virtual void push(std::span<const std::uint8_t> piece) = 0;
 
-  /// Declares the end of the bytes: next() returns what is left.
+  /// Declares the end of the bytes: next() returns the rest.
   virtual void drain() = 0;
 
   /// Gives access to all bytes of the file; `source` must outlive the decoder. True if the decoder
@@ -251,7 +251,7 @@ class EventDecoder : public Decoder {
   /// Appends all events and triggers completed by `bytes`. Throws UnsupportedFormat.
   virtual void decode(std::span<const std::uint8_t> bytes, Decoded& out) = 0;
 
-  /// Declares the end of the bytes: appends what is complete and reports a partial rest as
+  /// Declares the end of the bytes: appends all complete items and reports a partial one as
   /// corruption. Throws UnsupportedFormat if the header is incomplete.
   virtual void finish(Decoded& out) = 0;
 
@@ -300,7 +300,7 @@ class EventDecoder : public Decoder {
   std::span<const std::uint8_t> pushed_;   ///< not decoded yet
   bool is_draining_ = false;               ///< finish() is due
   Decoded decoded_;
-  bool events_due_ = false;  ///< events in decoded_ are to be returned
+  bool events_due_ = false;  ///< next() returns the events in decoded_
   bool triggers_due_ = false;
 };
 

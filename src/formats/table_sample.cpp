@@ -73,7 +73,7 @@ bool are_frame_numbers(const std::vector<TableNumber>& times) {
   return times.back().value > times.front().value;
 }
 
-/// False if events in this unit are further apart than those of event cameras and simulators,
+/// False if events are further apart in this unit than event cameras and simulators write them,
 /// unless the table is our own, or if integer microseconds start at weeks without being a date.
 bool is_plausible(std::vector<TableNumber> times, TimeUnit unit, bool is_own) {
   constexpr std::size_t min_rows = 4;

@@ -29,7 +29,7 @@ class CauseCounts {
     return std::accumulate(counts_.begin(), counts_.end(), std::uint64_t{0});
   }
 
-  /// Events whose cause is known, and is not light.
+  /// Events of a known cause other than light.
   std::uint64_t noise() const { return all() - (*this)[Cause::unknown] - (*this)[Cause::light]; }
 
  private:

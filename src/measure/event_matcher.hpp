@@ -34,7 +34,6 @@ struct MatchFigures {
 /// or can no longer be added.
 class EventMatcher {
  public:
-  /// Throws std::bad_alloc, as does add().
   EventMatcher(int width, int height);
 
   /// Adds an event, which must lie inside the sensor and not be earlier than the last one of either

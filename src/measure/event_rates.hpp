@@ -64,7 +64,7 @@ class RateCorrelation {
   double value() const;
 
  private:
-  /// Of the counts in bins.
+  /// Sums over the counts in bins.
   struct Sums {
     double bins = 0;
     double product = 0;

@@ -13,8 +13,8 @@
 
 namespace eventcamera {
 
-/// Time of the last event of a pixel, or none, which is before all others. None is all zeros, so
-/// that memory for pixels without events need not be written.
+/// Time of the last event of a pixel, or none, which is earlier than any time. None is all zeros,
+/// so the memory of pixels without events is never written.
 class LastTime {
  public:
   constexpr LastTime() = default;
@@ -96,7 +96,6 @@ class IntervalHistogram {
 /// Times of the last event of each pixel.
 class LastTimes {
  public:
-  /// Throws std::bad_alloc.
   LastTimes(int width, int height) : last_(width, height) {}
 
   /// Records an event, which must lie inside the sensor and not be earlier than the last one.
@@ -117,7 +116,6 @@ class LastTimes {
 /// stream.
 class EventStatistics {
  public:
-  /// Throws std::bad_alloc.
   EventStatistics(int width, int height) : map_(width, height) {}
 
   /// Adds an event, which must lie inside the sensor and not be earlier than the last one, and the

@@ -108,11 +108,11 @@ void StreamComparison::move_until(Microseconds end) {
   PerRole<std::span<const AbsoluteEvent>> due;
   for (const auto role : both_roles) {
     const auto waiting =
-        std::span<const AbsoluteEvent>(arriving_[role].waiting).subspan(arriving_[role].taken);
+        std::span<const AbsoluteEvent>(arriving_[role].waiting).subspan(arriving_[role].processed);
     due[role] = waiting.first(static_cast<std::size_t>(
         std::ranges::upper_bound(waiting, end, {}, &AbsoluteEvent::t) - waiting.begin()));
   }
-  for (const auto role : both_roles) arriving_[role].taken += due[role].size();
+  for (const auto role : both_roles) arriving_[role].processed += due[role].size();
   auto& reference = due[StreamRole::reference];
   auto& candidate = due[StreamRole::candidate];
   while (!reference.empty() || !candidate.empty()) {
@@ -131,10 +131,10 @@ void StreamComparison::move_until(Microseconds end) {
   for (const auto role : both_roles) {
     // Not in every call, because a long buffer may be processed in many short pieces.
     auto& waiting = arriving_[role].waiting;
-    auto& taken = arriving_[role].taken;
-    if (2 * taken < waiting.size()) continue;
-    waiting.erase(waiting.begin(), waiting.begin() + static_cast<std::ptrdiff_t>(taken));
-    taken = 0;
+    auto& processed = arriving_[role].processed;
+    if (2 * processed < waiting.size()) continue;
+    waiting.erase(waiting.begin(), waiting.begin() + static_cast<std::ptrdiff_t>(processed));
+    processed = 0;
   }
   rates_.extend_to(end);
   similarity_.extend_to(end);

@@ -18,7 +18,7 @@
 
 namespace eventcamera {
 
-/// How similar two streams are.
+/// Similarity of two streams.
 struct SimilarityFigures {
   double map_correlation = 0;    ///< correlation of the event counts per pixel
   double rate_correlation = 0;   ///< correlation of the event counts per millisecond
@@ -26,10 +26,10 @@ struct SimilarityFigures {
   PerRole<MatchFigures> matches;
 };
 
-/// Measures how similar two streams of the same sensor are, as their events come in order of time.
+/// Measures the similarity of two streams of the same sensor, whose events are added in order of
+/// time.
 class StreamSimilarity {
  public:
-  /// Throws std::bad_alloc, as does add().
   StreamSimilarity(int width, int height);
 
   /// Sets the start of both streams. Required before the first add().
@@ -52,7 +52,7 @@ class StreamSimilarity {
   EventMatcher matcher_;
 };
 
-/// How similar a recording would be to another one of the same scene by the same camera.
+/// Similarity of two recordings of the same scene by the same camera.
 struct CeilingFigures {
   double rate_correlation = 0;
   double interval_distance = 0;  ///< decades
@@ -65,11 +65,10 @@ struct CeilingFigures {
 /// The correlation of rates is extrapolated from the halves to the whole by the Spearman-Brown
 /// formula, shares of matched events and nearest distances as if twice as many independent events
 /// had fired. Real events are more regular than chance, so a good simulator can exceed the ceiling
-/// slightly. The map has no ceiling: how much more regular the few events of a pixel are cannot be
-/// known from one recording.
+/// slightly. The map has no ceiling: one recording does not show how regular the few events of a
+/// pixel are.
 class NoiseCeiling {
  public:
-  /// Throws std::bad_alloc, as does add().
   NoiseCeiling(int width, int height) : halves_(width, height) {}
 
   /// As for StreamSimilarity.
@@ -98,7 +97,6 @@ struct ComparisonFigures {
 /// Compares two streams of the same sensor over the time that both cover.
 class StreamComparison {
  public:
-  /// Throws std::bad_alloc, as does add().
   StreamComparison(int width, int height);
 
   /// The stream that lags behind; its events are needed next.
@@ -122,7 +120,7 @@ class StreamComparison {
   struct Arriving {
     EventValidator validator;
     std::vector<AbsoluteEvent> waiting{};  ///< events waiting for the other stream
-    std::size_t taken = 0;  ///< number of events at the front of `waiting` already processed
+    std::size_t processed = 0;  ///< number of events at the front of `waiting` already processed
     bool is_labelled = false;
     std::optional<Nanoseconds> start{};
     Nanoseconds end = 0;

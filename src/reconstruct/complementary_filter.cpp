@@ -18,7 +18,7 @@ const auto responses = [] {
   return table;
 }();
 
-/// Fine enough to be within 0.05 grey levels.
+/// Accurate to 0.05 grey levels.
 constexpr int levels_per_unit = 4096;
 
 /// Grey levels by response, up to log(1 + 255 / offset).
@@ -31,7 +31,7 @@ const auto greys = [] {
   return table;
 }();
 
-/// Growth of later changes before all are scaled down: e to the power of this.
+/// Later changes are scaled up to e^max_exponent; then all differences are scaled down.
 constexpr double max_exponent = 16;
 
 }  // namespace

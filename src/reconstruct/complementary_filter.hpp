@@ -12,9 +12,9 @@
 
 namespace eventcamera {
 
-/// Complementary filter of events and grey frames: brightness at any time, whose fast changes are
-/// from the events and whose slow ones are from the frames (Scheerlinck, Barnes and Mahony, ACCV
-/// 2018). See docs/reconstruction.md. Events and frames must be passed in time order.
+/// Complementary filter of events and grey frames: brightness at any time, with fast changes from
+/// the events and slow changes from the frames (Scheerlinck, Barnes and Mahony, ACCV 2018). See
+/// docs/reconstruction.md. Events and frames must be passed in time order.
 class ComplementaryFilter {
  public:
   struct Settings {
@@ -25,7 +25,7 @@ class ComplementaryFilter {
     friend bool operator==(const Settings&, const Settings&) = default;
   };
 
-  /// Starts with a frame. Throws std::bad_alloc.
+  /// Starts with a frame.
   ComplementaryFilter(const ImageView<std::uint8_t>& frame, Microseconds t,
                       const Settings& settings);
 
@@ -46,11 +46,11 @@ class ComplementaryFilter {
   float on_ = 0;
   float off_ = 0;
   EventValidator validator_;
-  Microseconds last_ = 0;         ///< time that the steps below are for
+  Microseconds last_ = 0;         ///< time of steps_
   std::array<float, 2> steps_{};  ///< of an OFF and of an ON event
-  Microseconds origin_;           ///< time that differences_ are for
+  Microseconds origin_;           ///< time of differences_
   Image<float> frame_;            ///< response to the last frame
-  /// State minus frame_ at origin_. All decay alike: a later change is scaled to origin_ instead.
+  /// State minus frame_ at origin_. All pixels decay alike, so later changes are scaled up instead.
   Image<float> differences_;
 };
 

@@ -10,8 +10,8 @@
 namespace eventcamera {
 
 /// Brightness from events alone: a temporal high pass of each pixel, which counts events instead of
-/// time, and spatial low passes of the state and of the picture. See docs/reconstruction.md; the
-/// temporal filter is that of FIBAR (arXiv 2510.20071).
+/// time, and spatial low passes of the state and of the picture. The temporal filter is FIBAR's
+/// (arXiv 2510.20071). See docs/reconstruction.md.
 class Reconstruction {
  public:
   struct Settings {
@@ -23,7 +23,6 @@ class Reconstruction {
   static constexpr double min_cutoff = 5;
   static constexpr double max_smoothing = 5;
 
-  /// Throws std::bad_alloc.
   Reconstruction(int width, int height, const Settings& settings);
 
   /// Adds an event, which must lie inside the picture.
@@ -37,8 +36,8 @@ class Reconstruction {
     mean += mean_gain_ * (sign - mean);
   }
 
-  /// Smooths the picture, and finds its contrast. To be called before read_row(). On every
-  /// processor the result has the same bits.
+  /// Smooths the picture, and finds its contrast. Call before read_row(). The result is the same to
+  /// the bit on every processor.
   void finish_picture();
 
   /// Passes the brightness of the pixels of a row to `use`: 0 for the mean, and from -1 to 1 for

@@ -20,7 +20,7 @@ class RecentEvents {
   std::size_t size() const { return size_; }
   const AbsoluteEvent& front() const { return ring_[first_]; }
 
-  /// Must not be full(). Throws std::bad_alloc.
+  /// Must not be full().
   void push(const AbsoluteEvent& event) {
     if (size_ == ring_.size()) grow();
     ring_[(first_ + size_) & (ring_.size() - 1)] = event;

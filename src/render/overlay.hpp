@@ -19,7 +19,6 @@ namespace eventcamera {
 /// must be passed in time order.
 class Overlay {
  public:
-  /// Throws std::bad_alloc, like add().
   Overlay(SensorSize sensor, SensorSize picture);
 
   /// Like Renderer::add().

@@ -138,14 +138,13 @@ struct RenderSettings {
 
 /// Draws pictures of the events up to given times. Events and pictures must be in time order.
 ///
-/// A picture has a pixel for each sensor pixel, or, if these are more than max_pixels, as a hostile
-/// file may state, for each 2x2, 3x3, ... sensor pixels.
+/// A picture has a pixel for each sensor pixel. If that exceeds max_pixels, as a hostile file may
+/// state, it has one for each 2x2, 3x3, ... sensor pixels.
 class Renderer {
  public:
   static constexpr int max_pixels = 1 << 23;  ///< of a picture; 4K video fits
 
-  /// For a sensor of at most max_side x max_side pixels. Throws std::bad_alloc, as do configure()
-  /// and add().
+  /// For a sensor of at most max_side x max_side pixels.
   Renderer(int width, int height, const RenderSettings& settings);
 
   void configure(const RenderSettings& settings);

@@ -13,7 +13,6 @@ namespace eventcamera {
 /// 24-bit RGB image, initially black.
 class RgbPicture {
  public:
-  /// Throws std::bad_alloc.
   RgbPicture(int width, int height)
       : width_(width),
         height_(height),
@@ -40,11 +39,11 @@ class RgbPicture {
 };
 
 /// Draws the event count per pixel, from black (none) to light yellow (99.5 % quantile of the
-/// pixels with events), and below it a bar of these colours with that count. Throws std::bad_alloc.
+/// pixels with events), and below it a bar of these colours with that count.
 RgbPicture draw_map(const Image<std::uint32_t>& map);
 
 /// Draws the reference, the candidate and their difference side by side, on the same scale, with
-/// bars: blue if the candidate has more events, red if it has fewer. Throws std::bad_alloc.
+/// bars: blue if the candidate has more events, red if it has fewer.
 RgbPicture draw_maps(const Image<std::uint32_t>& reference, const Image<std::uint32_t>& candidate);
 
 }  // namespace eventcamera

@@ -8,7 +8,7 @@
 namespace eventcamera {
 namespace {
 
-/// Share of the pixels that shows a scene: outlines of what moves.
+/// Share of pixels that suffices to recognise a scene by the outlines of moving objects.
 constexpr double enough_pixels = 0.08;
 
 /// Side of a picture of the sensor whose longer side is scaled down to `max_size`.

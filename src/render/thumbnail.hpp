@@ -18,8 +18,7 @@ namespace eventcamera {
 /// The window ends when enough pixels have fired to see the scene.
 class Thumbnail {
  public:
-  /// At most `max_size` pixels wide and high, and not larger than the sensor. Throws
-  /// std::bad_alloc.
+  /// At most `max_size` pixels wide and high, and not larger than the sensor.
   Thumbnail(SensorSize sensor, int max_size);
 
   SensorSize sensor() const { return sensor_; }

@@ -23,8 +23,8 @@ struct Settings {
   int threads = 0;                 ///< thread limit for one frame; 0 = one per processor
   bool labels = false;             ///< label the events, if the simulator can
   double denoise = 0;  ///< largest noise in the frames, grey levels, or automatic_denoise
-  /// Time from the first row of a frame to the last, which the camera read later; negative if it
-  /// read the last one first. A frame has the time of the row read first.
+  /// Time in which the camera reads a frame, from its first row to its last; negative if it reads
+  /// the last row first. A frame's time is the time of the row read first.
   Nanoseconds rolling_shutter = 0;
 };
 
@@ -123,7 +123,7 @@ class IntervalSimulator {
   /// Fills `events` with noise events of an unchanged frame; false if the simulator has no noise.
   virtual bool hold(const StepTimes&, const Settings&, StepBuckets&) { return false; }
 
-  /// Events of the last interval, of `duration`, with those of late rows that are due.
+  /// Events of the last interval, of `duration`, and events of late rows that are due.
   virtual const EventBuckets& events(Nanoseconds duration, const Settings& settings);
 
   /// Time from the last frame to the last event of late rows, if any.

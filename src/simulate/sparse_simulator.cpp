@@ -125,7 +125,7 @@ class Painter {
     }
   }
 
-  /// Frames drawn at once, because a chunk of the moving pixels stays in the cache meanwhile.
+  /// Frames drawn at once, while a chunk of the moving pixels is in the cache.
   static constexpr int steps_at_once = 4;
 
   Image<Pixel> still_;  ///< the touched rows without the pixels that have left their start

@@ -18,7 +18,7 @@ std::size_t pixel_of(const AbsoluteEvent& event, const TensorShape& shape) {
   return static_cast<std::size_t>(event.y()) * static_cast<std::size_t>(shape.width) + event.x;
 }
 
-/// Of the channel of its polarity.
+/// Cell of an event in the channel of its polarity.
 std::size_t cell_of(const AbsoluteEvent& event, const TensorShape& shape) {
   return (event.polarity() == Polarity::on ? shape.plane() : 0) + pixel_of(event, shape);
 }

@@ -23,7 +23,6 @@ class EventTensor {
   /// Bytes of a tensor and its intermediate values: numbers before conversion, times of events.
   static std::size_t memory(const TensorShape& shape, const TensorSettings& settings);
 
-  /// Throws std::bad_alloc.
   EventTensor(int width, int height, const TensorSettings& settings);
 
   const TensorShape& shape() const { return shape_; }

@@ -19,7 +19,7 @@ void WindowQueue::reset() {
   intervals_.clear();
 }
 
-/// Moves events seldom enough that each is moved about once.
+/// Waits until enough events have returned, so that each is moved about once.
 void WindowQueue::drop_returned() {
   if (first_ < events_.size() - first_) return;
   events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(first_));

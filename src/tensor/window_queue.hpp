@@ -19,7 +19,7 @@ struct WindowSettings {
   std::size_t intervals = 1;  ///< of the source: buffers, such as the intervals between frames
   double overlap = 0;         ///< share of a window that the next one repeats, below 1
 
-  /// Where the next of windows of this length begins; at least 1 further on.
+  /// Start of the next window relative to one of this length; at least 1.
   template <class Length>
   Length hop(Length length) const {
     const auto repeated = static_cast<Length>(static_cast<double>(length) * overlap);
@@ -56,13 +56,13 @@ class WindowQueue {
   /// Adds an interval, and its events in [start, end]; their times are relative to `base`. Late
   /// events count as events of the end of the last window, or interval where windows consist of
   /// intervals. Afterwards, call next() until there is no more window, and add the events that are
-  /// waiting, if any, again. Throws std::bad_alloc.
+  /// waiting, if any, again.
   Added add(std::span<const Event> events, Microseconds base, Nanoseconds start, Nanoseconds end);
 
   /// Returns the next window if it is complete.
   std::optional<Window> next();
 
-  /// Returns the last window, shorter than the others, if it has an event that no other had.
+  /// Returns the last, shorter window if it has an event that was in no other.
   std::optional<Window> finish();
 
   /// True if an incomplete window has started.

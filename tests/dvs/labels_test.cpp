@@ -7,7 +7,6 @@
 #include <numeric>
 #include <vector>
 
-#include "tests/core/targets.hpp"
 #include "tests/dvs/playback.hpp"
 #include "tests/simulate/scene.hpp"
 
@@ -89,48 +88,6 @@ TEST(Labels, MeetTheRatesThatAreSet) {
   const double expected_leak = noise_rate * undisturbed / (1 - undisturbed) * pixels * seconds;
   EXPECT_NEAR(both[Cause::leak], expected_leak, 3 * std::sqrt(expected_leak));
   EXPECT_EQ(both[Cause::leak] + both[Cause::shot_noise], both.all());
-}
-
-/// A short video with labels, and the same without.
-struct Film {
-  std::vector<Event> events;
-  std::vector<Label> labels;
-
-  friend bool operator==(const Film&, const Film&) = default;
-};
-
-Film film(const DvsSettings& settings, const Settings& common) {
-  constexpr int width = 97;
-  constexpr int height = 61;
-  auto simulator = make_dvs_simulator({width, height, 8});
-  simulator->set(settings);
-  Film film;
-  for (int i = 0; i < 5; ++i) {
-    const auto frame = moving(width, height, i);
-    const auto* made = simulator->push(scene::luma(frame), i * 33'333'333LL, common);
-    if (made == nullptr) continue;
-    auto events = scene::copy(*made);
-    std::vector<Label> labels(events.size());
-    if (simulator->has_labels()) simulator->label({events, labels});
-    film.events.insert(film.events.end(), events.begin(), events.end());
-    film.labels.insert(film.labels.end(), labels.begin(), labels.end());
-  }
-  return film;
-}
-
-TEST(Labels, ChangeNoEventAndAreTheSameForAllThreadsAndTargets) {
-  auto along_motion = everything();
-  along_motion.upsampling = Upsampling::motion;
-  along_motion.max_interpolated_frames = 4;
-  for (const auto& settings : {everything(), along_motion, settings_of(DvsPreset::davis346),
-                               settings_of(DvsPreset::v2e_noisy), DvsSettings{.leak_rate = 5},
-                               DvsSettings{.leak_rate = 5, .adaptation = 0.3}}) {
-    const auto expected = film(settings, {.threads = 1, .labels = true});
-    ASSERT_GT(expected.events.size(), 5000U);
-    EXPECT_TRUE(film(settings, {.threads = 1}).events == expected.events);
-    targets::for_each(
-        [&](const char* target) { EXPECT_TRUE(film(settings, labelled) == expected) << target; });
-  }
 }
 
 TEST(Labels, MayBeginAndEndWithAnyFrame) {

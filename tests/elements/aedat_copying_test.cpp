@@ -115,25 +115,6 @@ TEST(AedatMux, KeepsTriggersAndImuSamples) {
   }
 }
 
-TEST(AedatMux, KeepsTriggersOfOtherFormats) {
-  const auto events = steady_events(300'000, 70);
-  const std::vector<Trigger> triggers{{200'000, 0, true}, {200'070, 1, true}, {250'000, 0, false}};
-  const auto encoder = make_prophesee_raw_encoder(EvtFormat::evt3, sensor);
-  Bytes bytes;
-  auto rest = std::span(events);
-  for (const auto& trigger : triggers) {
-    const auto end = std::ranges::upper_bound(rest, trigger.t, {}, &AbsoluteEvent::t);
-    encoder->encode(rest.first(static_cast<std::size_t>(end - rest.begin())), bytes);
-    encoder->encode_trigger(trigger, bytes);
-    rest = rest.subspan(static_cast<std::size_t>(end - rest.begin()));
-  }
-  encoder->encode_trigger({rest.front().t, 9, true}, bytes);  // AEDAT 4 has no such input
-  encoder->encode(rest, bytes);
-  const Content copy(copied(TemporaryFile(bytes), "evtdec ! aedatmux"));
-  EXPECT_EQ(copy.triggers, triggers);
-  EXPECT_TRUE(copy.events == events);
-}
-
 TEST(AedatMux, NeedsNoSeeking) {
   const auto events = steady_events(300'000, 70);
   // The branch of the tee continues as a stream.

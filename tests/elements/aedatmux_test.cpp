@@ -144,13 +144,6 @@ TEST(AedatMux, WritesEventsAfterAGapBeforeLaterFrames) {
   EXPECT_EQ(content.pictures[0].times[0], 50'000) << "the segment of the events after the gap";
 }
 
-TEST(AedatMux, RefusesToRunBackwards) {
-  Mux mux;
-  push_backwards_segment(mux.get());
-  mux.end();
-  EXPECT_EQ(mux.error(), "Cannot write events backwards; play at a positive rate.");
-}
-
 TEST(AedatMux, LeavesOutWhatDoesNotFit) {
   Mux mux;
   EXPECT_EQ(mux.push(GST_SECOND, {{0, 346, 2}, {1, 3, 260}, {5, 6, 7}, {4, 6, 7}}), GST_FLOW_OK);

@@ -137,22 +137,4 @@ TEST(EventBuffers, AreNotKeptWithoutBound) {
   EXPECT_LE(kept, 8);
 }
 
-TEST(EventBuffers, AreTheReadersOwnForAsLongAsItWants) {
-  Buffer kept;
-  {
-    Harness h("eventsim-frame");
-    h.caps(large_video);
-    Rows rows(h);
-    rows.change(0);
-    kept = rows.change(3);
-    const Buffer part(gst_buffer_copy_region(kept.get(), GST_BUFFER_COPY_MEMORY, 8, 16));
-    const auto whole = bytes_of(kept.get());
-    kept.reset();
-    for (int i = 0; i < 5; ++i) rows.change(100);
-    EXPECT_EQ(bytes_of(part.get()), whole.substr(8, 16));
-    kept = rows.change(2);
-  }
-  EXPECT_EQ(events_of(kept.get()).size(), 2000U);
-}
-
 }  // namespace

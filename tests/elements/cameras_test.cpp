@@ -256,15 +256,6 @@ TEST_F(EventCameras, AreListed) {
   gst_structure_free(properties);
 }
 
-TEST_F(EventCameras, AreFoundByADeviceMonitor) {
-  GstDeviceMonitor* const monitor = gst_device_monitor_new();
-  gst_device_monitor_add_filter(monitor, "EventCamera/Source", nullptr);
-  ASSERT_TRUE(gst_device_monitor_start(monitor));
-  EXPECT_EQ(devices_of(gst_device_monitor_get_devices(monitor)).size(), 2U);
-  gst_device_monitor_stop(monitor);
-  gst_object_unref(monitor);
-}
-
 TEST_F(EventCameras, CreateWhatReadsThem) {
   GstElementFactory* const source = gst_element_factory_find("v4l2src");
   if (source == nullptr) GTEST_SKIP() << "no v4l2src";

@@ -3,6 +3,7 @@
 // events and EOS.
 #include <gst/base/gstbasesink.h>
 
+#include <cstring>
 #include <functional>
 #include <mutex>
 #include <thread>
@@ -136,6 +137,9 @@ class Consumer {
   Consumer& operator=(const Consumer&) = delete;
 
   std::size_t inputs() const { return inputs_.size(); }
+  bool takes_events() const {
+    return std::ranges::any_of(inputs_, [](const Input& input) { return !input.takes_frames; });
+  }
   const std::vector<std::unique_ptr<Output>>& outputs() const { return outputs_; }
 
   /// Pushes an event from make() into each input.
@@ -144,12 +148,35 @@ class Consumer {
     steps_.emplace_back(
         [make](const Input& input) { gst_pad_push_event(input.pad.get(), make()); });
   }
-  void push_segment(GstClockTime base = 0, GstSegmentFlags flags = GST_SEGMENT_FLAG_NONE) {
+  void push_segment(GstClockTime base = 0, GstSegmentFlags flags = GST_SEGMENT_FLAG_NONE,
+                    GstFormat format = GST_FORMAT_TIME, double rate = 1) {
     GstSegment segment;
-    gst_segment_init(&segment, GST_FORMAT_TIME);
+    gst_segment_init(&segment, format);
     segment.base = base;
     segment.flags = flags;
+    segment.rate = rate;
+    if (rate < 0) segment.stop = GST_SECOND;
     push([segment] { return gst_event_new_segment(&segment); });
+  }
+  /// Pushes a buffer of 10 ms after the first 10 ms into each input: a frame, or these events.
+  void push_events(const std::vector<GstEventCameraEvent>& events,
+                   GstClockTime pts = 10 * GST_MSECOND, gsize extra_bytes = 0) {
+    steps_.emplace_back([=](const Input& input) {
+      if (!input.takes_frames && events.empty()) return;
+      std::vector<guint8> bytes(events.size() * sizeof(GstEventCameraEvent) + extra_bytes);
+      if (!events.empty()) std::memcpy(bytes.data(), events.data(), bytes.size() - extra_bytes);
+      GstBuffer* const buffer =
+          input.takes_frames ? frame(1) : gst_buffer_new_memdup(bytes.data(), bytes.size());
+      GST_BUFFER_PTS(buffer) = input.takes_frames ? 10 * GST_MSECOND : pts;
+      GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;
+      gst_pad_push(input.pad.get(), buffer);
+    });
+  }
+  void push_custom_event_and_tag() {
+    push([] {
+      return gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("custom"));
+    });
+    push([] { return gst_event_new_tag(gst_tag_list_new(GST_TAG_TITLE, "title", nullptr)); });
   }
   /// Pushes an interval of 10 ms into each input: a frame, or a trigger and three events.
   void push_interval(guint index, bool discontinuous = false) {
@@ -173,14 +200,33 @@ class Consumer {
     }
     steps_.clear();
   }
-  /// Ends all inputs, and waits for the end of the output.
-  void end() {
+  /// Ends all inputs, waits for the end of the output, and returns the warnings, or the error.
+  std::vector<std::string> faults() {
     push(gst_event_new_eos);
     play();
-    const auto message = wait_for(pipeline_.get(), GST_MESSAGE_EOS | GST_MESSAGE_ERROR);
-    ASSERT_TRUE(message);
-    EXPECT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_EOS) << text_of(message.get());
+    std::vector<std::string> texts;
+    while (const auto message = wait_for(
+               pipeline_.get(), GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING)) {
+      has_ended_ = GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_EOS;
+      if (has_ended_) break;
+      texts.push_back(text_of(message.get()));
+      if (GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_ERROR) break;
+    }
+    return texts;
+  }
+  void end() {
+    const auto texts = faults();
+    EXPECT_TRUE(has_ended_) << testing::PrintToString(texts);
     for (const auto& output : outputs_) EXPECT_EQ(output->named("eos").size(), 1U);
+  }
+  /// Expects the custom events and tags of the main input; where inputs are joined, the custom
+  /// events of each.
+  void expect_custom_events_and_tags() const {
+    const bool joins = kind_.name() == "eventmerge" || kind_.name() == "aedatmux";
+    for (const auto& output : outputs_) {
+      EXPECT_EQ(output->named("custom").size(), joins ? inputs_.size() : 1U);
+      EXPECT_TRUE(joins || output->named("buffer").empty() || !output->named("tag").empty());
+    }
   }
   /// Expects every buffer and GAP to follow a SEGMENT, also after a flush.
   void expect_segments() const {
@@ -217,6 +263,7 @@ class Consumer {
   std::vector<std::unique_ptr<Output>> outputs_;
   std::vector<Input> inputs_;
   std::vector<std::function<void(const Input&)>> steps_;
+  bool has_ended_ = false;
 };
 
 class EveryConsumer : public testing::TestWithParam<std::string> {};
@@ -241,10 +288,12 @@ TEST_P(EveryConsumer, EndsEachSegmentOnceAfterItsStart) {
   }
 }
 
-TEST_P(EveryConsumer, EndsWithoutData) {
+TEST_P(EveryConsumer, ForwardsCustomEventsAndTagsWithoutData) {
   Consumer it(GetParam());
   it.push_segment();
+  it.push_custom_event_and_tag();
   it.end();
+  it.expect_custom_events_and_tags();
 }
 
 TEST_P(EveryConsumer, EndsAfterGaps) {
@@ -256,46 +305,116 @@ TEST_P(EveryConsumer, EndsAfterGaps) {
   it.expect_segments();
 }
 
-TEST_P(EveryConsumer, ForwardsCustomEvents) {
+TEST_P(EveryConsumer, ForwardsCustomEventsAndTags) {
   Consumer it(GetParam());
   it.push_segment();
   for (guint i = 0; i < 3; ++i) it.push_interval(i);
-  it.push([] {
-    return gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("custom"));
-  });
+  it.push_custom_event_and_tag();
   it.end();
-  for (const auto& output : it.outputs()) EXPECT_GE(output->named("custom").size(), 1U);
+  it.expect_custom_events_and_tags();
 }
 
-/// The output after a flush is that of an element which receives nothing before.
+/// The output after a flush is that of an element which receives nothing before, also if a segment
+/// has ended.
 TEST_P(EveryConsumer, StartsOverAfterAFlush) {
-  Consumer it(GetParam());
-  Consumer fresh(GetParam());
-  it.push_segment();
-  // An input holds one interval while another has none.
-  const guint before = it.inputs() > 1 ? 1 : 3;
-  for (guint i = 0; i < before; ++i) it.push_interval(i);
-  it.play();
-  // A sequence number in common tells aggregators that all inputs are flushed together.
-  const auto seqnum = gst_util_seqnum_next();
-  for (const bool starts : {true, false}) {
-    it.push([=] {
-      GstEvent* const event = starts ? gst_event_new_flush_start() : gst_event_new_flush_stop(TRUE);
-      gst_event_set_seqnum(event, seqnum);
-      return event;
-    });
+  for (const bool ends_segment : {false, true}) {
+    Consumer it(GetParam());
+    Consumer fresh(GetParam());
+    it.push_segment();
+    // An input holds one interval while another has none.
+    const guint before = it.inputs() > 1 ? 1 : 3;
+    for (guint i = 0; i < before; ++i) it.push_interval(i);
+    if (ends_segment) it.push([] { return gst_event_new_segment_done(GST_FORMAT_TIME, 0); });
     it.play();
+    // A sequence number in common tells aggregators that all inputs are flushed together.
+    const auto seqnum = gst_util_seqnum_next();
+    for (const bool starts : {true, false}) {
+      it.push([=] {
+        GstEvent* const event =
+            starts ? gst_event_new_flush_start() : gst_event_new_flush_stop(TRUE);
+        gst_event_set_seqnum(event, seqnum);
+        return event;
+      });
+      it.play();
+    }
+    for (auto* consumer : {&it, &fresh}) {
+      consumer->push_segment(1 * GST_SECOND);
+      for (guint i = 0; i < 3; ++i) consumer->push_interval(before + i);
+      consumer->end();
+      consumer->expect_segments();
+    }
+    for (std::size_t i = 0; i < it.outputs().size(); ++i) {
+      EXPECT_EQ(it.outputs()[i]->buffers_after_flushes(),
+                fresh.outputs()[i]->buffers_after_flushes());
+    }
   }
-  for (auto* consumer : {&it, &fresh}) {
-    consumer->push_segment(1 * GST_SECOND);
-    for (guint i = 0; i < 3; ++i) consumer->push_interval(before + i);
-    consumer->end();
-    consumer->expect_segments();
+}
+
+/// Elements that write files; tests of these tell what they do with invalid events.
+bool is_writer(const std::string& name) {
+  return name.ends_with("enc") || name.ends_with("mux") || name == "eventhdf5sink";
+}
+
+/// Elements that pass all events, or those of the wrong time, unchanged.
+bool passes_invalid_events(const std::string& name) {
+  return name == "eventstats" || name == "eventcompare" || name == "eventlabel";
+}
+bool takes_late_events(const std::string& name) {
+  return is_writer(name) || name == "eventlabel" || name == "eventdatagrampay";
+}
+
+/// They warn once, and the output is that without these events.
+TEST_P(EveryConsumer, SkipsInvalidEvents) {
+  struct Fault {
+    const char* name;
+    GstEventCameraEvent event;  ///< the last one of the buffer
+    GstClockTime pts = 10 * GST_MSECOND;
+    gsize extra_bytes = 0;
+  };
+  std::vector<Fault> faults{{"outside", {2, 64, 5}}, {"outside", {2, 8, 48}}};
+  if (!takes_late_events(GetParam())) faults.push_back({"past the end", {900'000, 8, 4}});
+  if (!is_writer(GetParam())) {
+    faults.push_back({"no PTS", {2, 8, 5}, GST_CLOCK_TIME_NONE});
+    faults.push_back({"a partial event", {2, 8, 5}, 10 * GST_MSECOND, 5});
   }
-  for (std::size_t i = 0; i < it.outputs().size(); ++i) {
-    EXPECT_EQ(it.outputs()[i]->buffers_after_flushes(),
-              fresh.outputs()[i]->buffers_after_flushes());
+  for (const auto& fault : faults) {
+    Consumer it(GetParam());
+    if (!it.takes_events()) GTEST_SKIP();
+    Consumer reference(GetParam());
+    const bool skips_buffer = fault.extra_bytes > 0 || !GST_CLOCK_TIME_IS_VALID(fault.pts);
+    std::vector<GstEventCameraEvent> events{{0, 8, 4}, {1, 9, 4}};
+    for (auto* consumer : {&reference, &it}) {
+      consumer->push_segment();
+      consumer->push_interval(0);
+      if (consumer == &it) events.push_back(fault.event);
+      if (consumer == &it || !skips_buffer)
+        consumer->push_events(events, fault.pts, fault.extra_bytes);
+      else
+        consumer->push_events({});
+      consumer->push_interval(2);
+    }
+    const auto usual = reference.faults();
+    const auto found = it.faults();
+    EXPECT_EQ(found.size(), usual.size() + 1) << fault.name << testing::PrintToString(found);
+    if (passes_invalid_events(GetParam())) continue;
+    for (std::size_t i = 0; i < it.outputs().size(); ++i)
+      EXPECT_EQ(it.outputs()[i]->buffers_after_flushes(),
+                reference.outputs()[i]->buffers_after_flushes())
+          << fault.name;
   }
+}
+
+TEST_P(EveryConsumer, RefusesToRunBackwards) {
+  Consumer it(GetParam());
+  it.push_segment(0, GST_SEGMENT_FLAG_NONE, GST_FORMAT_TIME, -1);
+  EXPECT_NE(testing::PrintToString(it.faults()).find("backwards"), std::string::npos);
+}
+
+TEST_P(EveryConsumer, RefusesEventsWithoutTimes) {
+  Consumer it(GetParam());
+  if (!it.takes_events() || is_writer(GetParam())) GTEST_SKIP();
+  it.push_segment(0, GST_SEGMENT_FLAG_NONE, GST_FORMAT_BYTES);
+  EXPECT_NE(testing::PrintToString(it.faults()).find("no timestamps"), std::string::npos);
 }
 
 /// Elements whose output continues where their input does not: files and datagrams have no flags,
@@ -316,6 +435,36 @@ TEST_P(EveryConsumer, MarksADiscontinuity) {
     EXPECT_TRUE(std::ranges::any_of(output->named("buffer"), [](const Output::Item& item) {
       return GST_CLOCK_TIME_IS_VALID(item.discontinuity) && item.discontinuity >= 90 * GST_MSECOND;
     }));
+}
+
+/// An element that passes its main input on, and uses another one.
+struct Joiner {
+  const char* element;
+  const char* main_pad;
+};
+
+class EveryJoiner : public testing::TestWithParam<Joiner> {};
+INSTANTIATE_TEST_SUITE_P(, EveryJoiner,
+                         testing::Values(Joiner{"eventcompare", "candidate"},
+                                         Joiner{"eventfuse", "video_sink"},
+                                         Joiner{"eventlabel", "event_sink"},
+                                         Joiner{"eventoverlay", "video_sink"},
+                                         Joiner{"flowjoin", "video_sink"}),
+                         [](const auto& joiner) { return std::string(joiner.param.element); });
+
+TEST_P(EveryJoiner, AsksOnceForTheStreamThatIsMissing) {
+  const auto& [element, main_pad] = GetParam();
+  Harness h(element, main_pad, "src");
+  for (const char* framerate : {"25/1", "30/1"}) {
+    const std::string kind = main_pad == std::string("video_sink")
+                                 ? "video/x-raw, format=GRAY8"
+                                 : "application/x-event-camera, format=XYTP";
+    gst_harness_set_src_caps_str(h.get(),
+                                 (kind + ", width=8, height=4, framerate=" + framerate).c_str());
+  }
+  h.wait_for_events();
+  EXPECT_NE(h.warning().find("link a s"), std::string::npos);
+  EXPECT_EQ(h.warning(), "");
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// eventlabel: which event has which class, what it waits for, and classes in later elements.
-#include <sstream>
+// eventlabel: which event has which class, and what it waits for.
 #include <string>
 #include <vector>
 
@@ -197,17 +196,6 @@ TEST_F(EventLabel, KeepsCausesAndCompletesLabels) {
   expect({{50, GST_EVENT_CAMERA_CAUSE_UNKNOWN, 0}, {51, GST_EVENT_CAMERA_CAUSE_UNKNOWN, 0}});
 }
 
-TEST_F(EventLabel, ChangesNoEventAndNoBufferOfOthers) {
-  begin();
-  const Buffer in(buffer_of(0, {Event::at(1, 2, 3, Polarity::on)}, 40 * ms));
-  gst_harness_push_event(images.get(), gst_event_new_eos());
-  gst_harness_push(events.get(), gst_buffer_ref(in.get()));
-  const Buffer out(gst_harness_pull(events.get()));
-  EXPECT_EQ(bytes_of(out.get()), bytes_of(in.get()));
-  EXPECT_EQ(gst_buffer_get_event_camera_label_meta(in.get()), nullptr);
-  EXPECT_NE(gst_buffer_get_event_camera_label_meta(out.get()), nullptr);
-}
-
 TEST_F(EventLabel, NeedsImagesOfTheSizeOfTheSensor) {
   begin("GRAY8", "4, height=8");
   push_image(0, 1);
@@ -231,14 +219,6 @@ TEST_F(EventLabel, FollowsChangesOfTheSize) {
   gst_harness_push(events.get(), buffer_of(40 * ms, {Event::at(15, 1, 0, Polarity::on)}, 20 * ms));
   push_image(80 * ms, 4);
   EXPECT_EQ(classes(), Classes{3 + 31});
-}
-
-TEST_F(EventLabel, ReportsImagesWithoutTheirPixels) {
-  begin();
-  push_image(0, 1, 20);
-  push_events(0, {0});
-  gst_harness_push_event(images.get(), gst_event_new_eos());
-  EXPECT_TRUE(label.error().starts_with("Cannot read a class image: "));
 }
 
 TEST_F(EventLabel, SkipsEventsOutsideTheSensor) {
@@ -267,17 +247,6 @@ TEST_F(EventLabel, SkipsImagesWithoutATime) {
   EXPECT_EQ(label.text_of_next(GST_MESSAGE_WARNING), "");
 }
 
-TEST_F(EventLabel, SkipsEventsWithoutATime) {
-  begin();
-  push_image(0, 1);
-  push_events(GST_CLOCK_TIME_NONE, {0});
-  push_events(0, {0});
-  push_image(40 * ms, 2);
-  EXPECT_EQ(classes(), Classes{1});
-  EXPECT_EQ(label.text_of_next(GST_MESSAGE_WARNING),
-            "Cannot label all events: a buffer has no PTS; skipping them.");
-}
-
 TEST_F(EventLabel, StartsOverWithEventsThatAreFlushedAlone) {
   begin();
   push_image(0, 1);
@@ -301,94 +270,6 @@ TEST(LiveEventLabel, WaitsNoLongerThanTheLatency) {
       "format=GRAY8, width=64, height=48, framerate=50/1\" ! queue ! label.video_sink");
   EXPECT_TRUE(pipeline.play()) << pipeline.error;
   EXPECT_EQ(pipeline.stat("sink", "rendered"), 9U);
-}
-
-TEST(LiveEventLabel, SaysThatImagesAreMissing) {
-  Pipeline pipeline(
-      "videotestsrc is-live=true pattern=ball num-buffers=3 ! "
-      "video/x-raw,width=64,height=48,framerate=50/1 ! eventsim-diff ! eventlabel ! fakesink");
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-  ASSERT_EQ(pipeline.warnings.size(), 1U);
-  EXPECT_NE(pipeline.warnings[0].find("link a source of images"), std::string::npos);
-}
-
-const std::string moving_ball =
-    "videotestsrc pattern=ball num-buffers=20 ! video/x-raw,width=64,height=48 ! ";
-
-/// Lines of a CSV file of labelled events: the numbers of each. `source` outputs events of a sensor
-/// of 64x48 pixels, labelled here with their place: 1 + x + 64 y.
-std::vector<std::vector<int>> rows_of(const std::string& source, const std::string& launch,
-                                      const std::string& branch = "") {
-  std::vector<guint16> places(std::size_t{64} * 48);
-  for (std::size_t i = 0; i < places.size(); ++i) places[i] = static_cast<guint16>(i + 1);
-  const TemporaryFile file;
-  Pipeline pipeline("eventlabel name=label ! " + launch + " ! eventcsvenc format=labels" +
-                    file.sink() + "  " + source +
-                    " ! label.event_sink  appsrc name=images format=time caps=\"video/x-raw, "
-                    "format=GRAY16_LE, width=64, height=48, framerate=30/1\" ! label.video_sink  " +
-                    branch);
-  GstBuffer* image = gst_buffer_new_memdup(places.data(), places.size() * sizeof(guint16));
-  GST_BUFFER_PTS(image) = 0;
-  GstFlowReturn flow = GST_FLOW_ERROR;
-  g_signal_emit_by_name(pipeline["images"], "push-buffer", image, &flow);
-  gst_buffer_unref(image);
-  g_signal_emit_by_name(pipeline["images"], "end-of-stream", &flow);
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-  const auto bytes = file.bytes();
-  std::istringstream lines(std::string(bytes.begin(), bytes.end()));
-  std::string line;
-  std::getline(lines, line);
-  EXPECT_EQ(line, "t,x,y,p,cause,class");
-  std::vector<std::vector<int>> rows;
-  while (std::getline(lines, line)) {
-    rows.emplace_back();
-    std::istringstream numbers(line);
-    for (std::string number; std::getline(numbers, number, ',');)
-      rows.back().push_back(std::stoi(number));
-  }
-  EXPECT_GT(rows.size(), 100U) << launch;
-  return rows;
-}
-
-const std::string simulated =
-    moving_ball + "eventsim-dvs preset=davis346 shot-noise-rate=20 label=true";
-
-TEST(EventLabelInPipelines, KeepsTheCausesOfASimulator) {
-  int noise = 0;
-  for (const auto& row : rows_of(simulated, "identity")) {
-    ASSERT_EQ(row[5], 1 + row[1] + 64 * row[2]);
-    ASSERT_NE(row[4], 0);
-    noise += row[4] == GST_EVENT_CAMERA_CAUSE_SHOT_NOISE ? 1 : 0;
-  }
-  EXPECT_GT(noise, 0);
-}
-
-TEST(EventLabelInPipelines, ClassesStayWithTheirEventsInFilters) {
-  for (const char* filter : {"eventantiflicker", "eventdenoise", "eventhotpixel", "eventrefractory",
-                             "eventtrail", "eventratecontrol max-rate=2000", "eventpolarity"})
-    for (const auto& row : rows_of(simulated, filter))
-      ASSERT_EQ(row[5], 1 + row[1] + 64 * row[2]) << filter;
-}
-
-TEST(EventLabelInPipelines, ClassesStayWithEventsThatMove) {
-  for (const auto& row :
-       rows_of(simulated, "eventflip video-direction=180 ! eventcrop left=8 top=4"))
-    ASSERT_EQ(row[5], 1 + (63 - row[1] - 8) + 64 * (47 - row[2] - 4));
-  for (const auto& row :
-       rows_of(simulated, "eventscale ! application/x-event-camera,width=32,height=24")) {
-    ASSERT_EQ((row[5] - 1) % 64 / 2, row[1]);
-    ASSERT_EQ((row[5] - 1) / 64 / 2, row[2]);
-  }
-}
-
-TEST(EventLabelInPipelines, ClassesStayWithTheirEventsInMergedStreams) {
-  int without = 0;
-  for (const auto& row :
-       rows_of(simulated, "eventmerge name=m", moving_ball + "eventsim-dvs label=true ! m.")) {
-    without += row[5] == 0 ? 1 : 0;
-    ASSERT_TRUE(row[5] == 0 || row[5] == 1 + row[1] + 64 * row[2]);
-  }
-  EXPECT_GT(without, 0);
 }
 
 }  // namespace

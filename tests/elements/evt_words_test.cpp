@@ -197,30 +197,6 @@ TEST_P(EveryWord, FillBuffersOfALimitedSize) {
   EXPECT_EQ(pull_events(reader), expected);
 }
 
-TEST(EvtEnc, PutsManyEventsIntoABufferOfALimitedSize) {
-  Events events;
-  for (int i = 0; i < 10'000; ++i)
-    events.push_back(AbsoluteEvent::at(i % 320, i / 320, i / 100, Polarity::on));
-  for (const char* const limit : {"1400", "4294967295"}) {
-    Writer writer(std::string("evtenc mtu=") + limit, words_caps("EVT2"));
-    writer.write(events, 0);
-    const auto count = gst_harness_buffers_in_queue(writer.get());
-    if (std::string_view(limit) == "1400")
-      EXPECT_LE(count, 31U);  // 29 of them would be full
-    else
-      EXPECT_EQ(count, 1U);
-  }
-}
-
-TEST(EvtDec, NeedsNoFramerateInCaps) {
-  const auto file = file_of(format_of("evt3"), some_events());
-  const TemporaryFile words(file.substr(file.find("% end\n") + 6));
-  Player player(words.source() +
-                "application/x-event-camera,format=EVT3,width=320,height=240 ! evtdec");
-  EXPECT_TRUE(player.play()) << player.error;
-  EXPECT_EQ(player.events.size(), 20'000U);
-}
-
 TEST(EvtEnc, KeepsTriggers) {
   using eventcamera::Trigger;
   const auto events = some_events();
@@ -251,29 +227,6 @@ TEST(EvtEnc, KeepsTriggers) {
       EXPECT_EQ(decoded.events, events);
       EXPECT_EQ(decoder->corruption().places, 0U);
     }
-}
-
-TEST(EvtEnc, DoesNotCollectTriggersWithoutEvents) {
-  std::vector<eventcamera::Trigger> triggers;
-  Writer writer("evtenc", "application/x-prophesee-raw");
-  for (int i = 0; i < 20; ++i) {
-    for (int j = 0; j < 10'000; ++j)
-      triggers.push_back({10 * static_cast<Microseconds>(triggers.size()), 1, j % 2 == 0});
-    EXPECT_TRUE(gst_harness_push_event(writer.get(), event_of(std::span(triggers).last<10'000>())));
-  }
-  auto bytes = writer.pull_bytes();
-  EXPECT_GT(bytes.size(), 200'000U);
-  writer.write(AbsoluteEvent::at(1, 2, 1'000'000, Polarity::on), 1'000'000);  // too late
-  const auto event = AbsoluteEvent::at(1, 2, 3'000'000, Polarity::on);
-  writer.write(event, 3'000'000);
-  EXPECT_TRUE(writer.dropped().starts_with("Dropped 1 event earlier "));
-  bytes += writer.end();
-  const auto decoder = eventcamera::make_prophesee_raw_decoder();
-  eventcamera::Decoded decoded;
-  decoder->decode({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, decoded);
-  decoder->finish(decoded);
-  EXPECT_EQ(decoded.triggers, triggers);
-  EXPECT_EQ(decoded.events, std::vector{event});
 }
 
 TEST(EvtEnc, TakesTheFormatThatDownstreamLeaves) {

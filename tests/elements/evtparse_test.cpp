@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // evtparse: what V4L2 drivers, serial lines and sockets are described to deliver, made here; no
 // camera. tests/formats/word_scanner_test.cpp has the words, this the element.
-#include <gio/gio.h>
 #include <gst/app/gstappsrc.h>
-
-#include <thread>
 
 #include "src/formats/evt/raw.hpp"
 #include "tests/elements/pipeline.hpp"
@@ -104,24 +101,6 @@ TEST(EvtParse, ReadsPaddedBuffersOfV4l2) {
   EXPECT_EQ(reading.stat("decoder", "corrupt-places"), 0U);
 }
 
-TEST(EvtParse, ReadsTheTraceOfAV4l2Device) {
-  const auto sent = some_events(20'000);
-  Camera camera(EvtFormat::evt3);
-  const auto trace = recording_files::Folder::path("trace.bin");
-  {
-    std::ofstream file(trace, std::ios::binary);
-    for (int i = 0; i < 80; ++i)
-      file << bytes_of(Buffer(padded(camera.next(sent, 3'010'000 + 10'000 * i), 0, 0)).get());
-  }
-  Player player("filesrc location=" + in_quotes(trace) +
-                " blocksize=" + std::to_string(buffer_size) + " ! " + padded_caps +
-                " ! evtparse name=parse format=EVT3" + size + " ! evtdec name=decoder");
-  EXPECT_TRUE(player.play()) << player.error;
-  EXPECT_EQ(player.events, sent);
-  EXPECT_EQ(player.stat("parse", "lost-buffers"), 0U);
-  EXPECT_EQ(player.stat("parse", "gaps"), 0U);
-}
-
 TEST(EvtParse, SurvivesImpossibleTimes) {
   const auto sent = some_events(20'000);
   Camera camera(EvtFormat::evt3);
@@ -199,61 +178,25 @@ TEST(EvtParse, TakesFormatAndOrderFromTheFourcc) {
 
 TEST(EvtParse, ReadsASerialLine) {
   const auto sent = some_events(20'000);
-  for (const auto& [name, format] :
-       {std::pair{"EVT2", EvtFormat::evt2}, std::pair{"EVT3", EvtFormat::evt3}}) {
-    const TemporaryFile line(words_of(sent, format));
+  for (const auto& [name, format, missed] :
+       {std::tuple{"EVT2", EvtFormat::evt2, 0},
+        {"EVT3", EvtFormat::evt3, 0},
+        {"EVT3", EvtFormat::evt3, 1001}}) {  // joined amid a word
+    auto words = words_of(sent, format);
+    words.erase(words.begin(), words.begin() + missed);
+    const TemporaryFile line(words);
     Player player("filesrc blocksize=500 location=" + in_quotes(line.path()) +
                   " ! evtparse name=parse format=" + name + size + "! evtdec");
     EXPECT_TRUE(player.play()) << player.error;
-    EXPECT_EQ(player.events, sent);
-    EXPECT_EQ(player.stat("parse", "lost-bytes"), 0U);
-  }
-}
-
-/// Accepts one connection, and sends bytes.
-class Server {
- public:
-  explicit Server(Bytes bytes) : listener_(g_socket_listener_new()) {
-    port = g_socket_listener_add_any_inet_port(listener_, nullptr, nullptr);
-    thread_ = std::thread([this, sent = std::move(bytes)] {
-      GSocketConnection* const connection =
-          g_socket_listener_accept(listener_, nullptr, nullptr, nullptr);
-      g_output_stream_write_all(g_io_stream_get_output_stream(G_IO_STREAM(connection)), sent.data(),
-                                sent.size(), nullptr, nullptr, nullptr);
-      g_io_stream_close(G_IO_STREAM(connection), nullptr, nullptr);
-      g_object_unref(connection);
-    });
-  }
-  ~Server() {
-    thread_.join();
-    g_object_unref(listener_);
-  }
-  Server(const Server&) = delete;
-  Server& operator=(const Server&) = delete;
-
-  int port = 0;
-
- private:
-  GSocketListener* listener_;
-  std::thread thread_;
-};
-
-TEST(EvtParse, ReadsASocket) {
-  const auto sent = some_events(20'000);
-  // Joined amid a word.
-  auto words = words_of(sent, EvtFormat::evt3);
-  words.erase(words.begin(), words.begin() + 1001);
-  for (const std::string stamps : {"true", "false"}) {
-    const Server server(words);
-    Player player("tcpclientsrc host=localhost do-timestamp=" + stamps +
-                  " port=" + std::to_string(server.port) + " ! evtparse name=parse format=EVT3" +
-                  size + "! evtdec");
-    EXPECT_TRUE(player.play()) << player.error;
     EXPECT_EQ(player.events.size(), player.stat("parse", "events"));
-    EXPECT_GT(player.events.size(), sent.size() - 500);
+    EXPECT_GE(player.events.size(), sent.size() - static_cast<std::size_t>(missed) / 2);
     EXPECT_EQ(player.events.back(), sent.back());
     EXPECT_TRUE(
         std::ranges::includes(sent, player.events, {}, &AbsoluteEvent::t, &AbsoluteEvent::t));
+    if (missed == 0) {
+      EXPECT_EQ(player.events, sent);
+      EXPECT_EQ(player.stat("parse", "lost-bytes"), 0U);
+    }
   }
 }
 
@@ -311,18 +254,6 @@ TEST(EvtParse, MapsADriftingClockToRunningTime) {
   EXPECT_LE(gst_harness_query_latency(parse.get()), 20 * GST_MSECOND);
 }
 
-TEST(EvtParse, AnnouncesALongerLatency) {
-  const auto sent = some_events(5'000);
-  Camera camera(EvtFormat::evt3);
-  Parse parse;
-  EXPECT_EQ(gst_harness_query_latency(parse.get()), 10 * GST_MSECOND);
-  parse.push(padded(camera.next(sent, 3'010'000), 10 * GST_MSECOND, 1));
-  parse.push(padded(camera.next(sent, 3'060'000), 60 * GST_MSECOND, 2));
-  EXPECT_TRUE(parse.message(GST_MESSAGE_LATENCY));
-  EXPECT_GE(gst_harness_query_latency(parse.get()), 50 * GST_MSECOND);
-  EXPECT_LE(gst_harness_query_latency(parse.get()), 60 * GST_MSECOND);
-}
-
 TEST(EvtParse, StartsOverAfterAFlush) {
   const auto sent = some_events(2'000);
   const auto words = words_of(sent, EvtFormat::evt3);
@@ -373,18 +304,6 @@ TEST(EvtParse, SaysWhatIsMissing) {
   EXPECT_EQ(wrong.warning(), "");
 }
 
-TEST(EvtParse, SaysAtTheEndThatNothingWereWords) {
-  // A time that none follows is kept until the end.
-  Harness parse("evtparse format=EVT2" + std::string(size));
-  gst_harness_set_src_caps_str(parse.get(), "application/octet-stream");
-  std::vector<guint8> bytes(100'000);
-  bytes[3] = 0x80;
-  parse.push(gst_buffer_new_memdup(bytes.data(), bytes.size()));
-  EXPECT_EQ(parse.warning(), "");
-  gst_harness_push_event(parse.get(), gst_event_new_eos());
-  EXPECT_NE(parse.warning().find("not valid in this format"), std::string::npos);
-}
-
 TEST(EvtParse, SaysAtTheEndThatThereWereNoEvents) {
   // Padding of Lucid's cameras, and too few zeros to be most of a camera's data.
   for (const guint8 byte : {0x99, 0x00}) {
@@ -403,32 +322,6 @@ TEST(EvtParse, SaysAtTheEndThatThereWereNoEvents) {
   parse.push(gst_buffer_new_memdup(words.data(), words.size()));
   gst_harness_push_event(parse.get(), gst_event_new_eos());
   EXPECT_EQ(parse.warning(), "");
-}
-
-TEST(EvtParse, KeepsTriggers) {
-  const auto sent = some_events(2'000);
-  const std::vector<Trigger> triggers{{sent[500].t, 2, true}, {sent[1500].t + 3, 2, false}};
-  const auto encoder = make_evt_encoder(EvtFormat::evt3, sensor);
-  Bytes words;
-  const std::span<const AbsoluteEvent> all(sent);
-  encoder->encode(all.first(501), words);
-  encoder->encode_trigger(triggers[0], words);
-  encoder->encode(all.subspan(501, 1000), words);
-  encoder->encode_trigger(triggers[1], words);
-  encoder->encode(all.subspan(1501), words);
-  const TemporaryFile file;
-  Pipeline pipeline("appsrc name=camera format=time caps=" + in_quotes(padded_caps) +
-                    " ! evtparse format=EVT3" + size + "! evtdec ! evtenc" + file.sink());
-  GstAppSrc* const camera = GST_APP_SRC(pipeline["camera"]);
-  gst_app_src_push_buffer(camera, padded(words, GST_SECOND, 0));
-  gst_app_src_end_of_stream(camera);
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-  const auto decoder = eventcamera::make_prophesee_raw_decoder();
-  eventcamera::Decoded decoded;
-  decoder->decode(file.bytes(), decoded);
-  decoder->finish(decoded);
-  EXPECT_EQ(decoded.events, sent);
-  EXPECT_EQ(decoded.triggers, triggers);
 }
 
 }  // namespace

@@ -59,22 +59,6 @@ TEST_P(EveryFormat, SeeksToBothEnds) {
   }
 }
 
-TEST_P(EveryFormat, EndsASegmentTogetherWithAnother) {
-  const TemporaryFile file(file_of(format(), some_events()));
-  for (const std::string way : {"", "queue ! "}) {
-    const auto reader = file.source() + way + format().reader;
-    Pipeline pipeline(reader + " ! fakesink sync=true  " + reader + " ! fakesink");
-    ASSERT_TRUE(pipeline.reaches(GST_STATE_PAUSED));
-    ASSERT_TRUE(pipeline.seek(GST_SECOND, 1'100 * GST_MSECOND, GST_SEEK_FLAG_SEGMENT));
-    ASSERT_TRUE(pipeline.reaches(GST_STATE_PAUSED));
-    ASSERT_TRUE(pipeline.play()) << pipeline.error;
-    EXPECT_EQ(pipeline.end, GST_MESSAGE_SEGMENT_DONE);
-    const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
-    EXPECT_FALSE(Owned<GstMessage>(
-        gst_bus_timed_pop_filtered(bus.get(), 200 * GST_MSECOND, GST_MESSAGE_SEGMENT_DONE)));
-  }
-}
-
 /// Also a segment of no length.
 TEST_P(EveryFormat, SendsASegmentBeforeItsEnd) {
   const TemporaryFile file(file_of(format(), some_events()));

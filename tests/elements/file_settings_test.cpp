@@ -86,18 +86,6 @@ TEST(TableReaders, TakeTheSizeOfTheirProperties) {
   }
 }
 
-TEST(EventCsvDec, KeepsItsGuessAfterASeek) {
-  const TemporaryFile file(
-      std::string("t,x,y,p\n1,10,10,1\n2,16000,16000,1\n3,5,5,1\n900000,6,6,0\n"));
-  for (const std::string way : {"", "queue ! "}) {
-    Player player(file.source() + way + "eventcsvdec");
-    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-    for (int i = 0; i < 3; ++i) ASSERT_TRUE(player.seek(0));
-    EXPECT_TRUE(player.play()) << player.error;
-    EXPECT_EQ(player.events.size(), 3U);
-  }
-}
-
 TEST(EvtDec, LeavesOutEventsOutsideTheSensor) {
   auto file = file_of(format_of("evt2"), some_events());
   const std::string_view size = "height=240;width=320";

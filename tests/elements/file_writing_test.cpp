@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // What writers of event files of every format write, leave out and report.
-#include <ctime>
-
 #include "src/formats/file_formats.hpp"
 #include "tests/elements/event_files.hpp"
 #include "tests/elements/recording_files.hpp"
@@ -107,15 +105,6 @@ TEST(Writers, CountSimulatedEventsInStreamTime) {
     while (const auto buffer = h.pull()) text += bytes_of(buffer.get());
     EXPECT_NE(text.find("\n40000,"), std::string::npos) << text.substr(0, 200);
   }
-}
-
-TEST_P(EveryFormat, TellsOfEventsLeftOutWhereItIsStopped) {
-  Writer h(format());
-  h.write(AbsoluteEvent::at(5, 5, 1000, Polarity::on), 0);
-  h.write(AbsoluteEvent::at(5, 5, 10, Polarity::on), 0);
-  EXPECT_EQ(h.warning(), "");
-  gst_element_set_state(h.element(), GST_STATE_READY);
-  EXPECT_TRUE(h.warning().starts_with("Dropped 1 event earlier"));
 }
 
 TEST(EventNpzEnc, TellsOfEventsThatAreLostWithoutTheEnd) {
@@ -256,22 +245,6 @@ TEST_P(EveryFormat, SurvivesTriggersOfAnyKind) {
   reader.read(h.end());
   EXPECT_EQ(pull_events(reader), events);
   EXPECT_EQ(reader.warning(), "");
-}
-
-TEST_P(EveryFormat, WritesAnyNumberOfTriggersAmongTheEventsOfABuffer) {
-  constexpr int count = 60'000;
-  Events events;
-  std::vector<eventcamera::Trigger> triggers;
-  for (int i = 0; i < count; ++i) {
-    triggers.push_back({10 * i, 1, i % 2 == 0});
-    events.push_back(AbsoluteEvent::at(5, 5, 10 * i + 5, Polarity::on));
-  }
-  Writer h(format());
-  EXPECT_TRUE(gst_harness_push_event(h.get(), event_of(triggers)));
-  const std::clock_t before = std::clock();
-  h.write(events, 0);
-  EXPECT_LT(std::clock() - before, 10 * CLOCKS_PER_SEC);  // not a pass over all for each of them
-  EXPECT_EQ(events_in(format(), h.end()).size(), events.size());
 }
 
 }  // namespace

@@ -158,21 +158,17 @@ TEST_F(FlowJoin, MatchesByRunningTime) {
   EXPECT_EQ(joined(), 2.F);
 }
 
-TEST_F(FlowJoin, PassesFramesWithoutATime) {
-  begin();
-  push_frame(GST_CLOCK_TIME_NONE);
-  push_flow(0, 2);
-  EXPECT_EQ(joined(), none);
-  push_frame(0);
-  EXPECT_EQ(joined(), 2.F);
-}
-
 TEST_F(FlowJoin, NeedsFlowOfTheSizeOfTheVideo) {
   begin("2:3:4");
   push_frame(0);
   push_flow(0, 1);
-  EXPECT_EQ(join.error(),
-            "The optical flow has the dimensions 2:3:4, and the video needs 2:4:3:1.");
+  EXPECT_NE(join.error().find("2:3:4, and the video needs 2:4:3:1"), std::string::npos);
+  flush({video.get(), flow.get()});
+  for (auto* h : {video.get(), flow.get()}) push_segment(h);
+  begin();
+  push_frame(0);
+  push_flow(0, 1, 40 * ms, 11);
+  EXPECT_NE(join.error().find("88 bytes instead of 96"), std::string::npos);
 }
 
 TEST_F(FlowJoin, FollowsChangesOfTheSize) {
@@ -184,15 +180,6 @@ TEST_F(FlowJoin, FollowsChangesOfTheSize) {
   push_frame(40 * ms);
   push_flow(40 * ms, 2);
   EXPECT_EQ(joined(), 2.F);
-}
-
-TEST_F(FlowJoin, ReportsTensorsOfTheWrongSize) {
-  begin();
-  push_frame(0);
-  push_flow(0, 1, 40 * ms, 11);
-  EXPECT_EQ(join.error(),
-            "Cannot read a tensor of optical flow: it has 88 bytes instead of 96. Check the "
-            "element upstream.");
 }
 
 TEST_F(FlowJoin, PassesGapsOn) {
@@ -218,18 +205,6 @@ TEST_F(FlowJoin, StartsOverAfterAFlush) {
   EXPECT_EQ(joined(), 2.F);
 }
 
-TEST_F(FlowJoin, EndsASegmentOnceBothHave) {
-  begin();
-  push_frame(0);
-  push_flow(0, 1);
-  EXPECT_EQ(joined(), 1.F);
-  end_segment(flow.get());
-  push_frame(40 * ms);
-  EXPECT_EQ(joined(), none);
-  end_segment(video.get());
-  EXPECT_TRUE(next_event(video.get(), GST_EVENT_SEGMENT_DONE));
-}
-
 /// Live video, and flow that never comes.
 TEST(LiveFlowJoin, WaitsNoLongerThanTheLatency) {
   Pipeline pipeline(
@@ -239,15 +214,6 @@ TEST(LiveFlowJoin, WaitsNoLongerThanTheLatency) {
       "framerate=50/1\" ! queue ! join.flow_sink");
   EXPECT_TRUE(pipeline.play()) << pipeline.error;
   EXPECT_EQ(pipeline.stat("sink", "rendered"), 10U);
-}
-
-TEST(LiveFlowJoin, SaysThatFlowIsMissing) {
-  Pipeline pipeline(
-      "videotestsrc is-live=true num-buffers=3 ! video/x-raw,width=64,height=48,framerate=50/1 ! "
-      "flowjoin ! fakesink");
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-  ASSERT_FALSE(pipeline.warnings.empty());
-  EXPECT_NE(pipeline.warnings[0].find("link a source of tensors"), std::string::npos);
 }
 
 }  // namespace

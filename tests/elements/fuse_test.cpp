@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // eventfuse: the brightness of its pictures, and their times.
-#include <cmath>
-#include <thread>
-
 #include "src/core/event.hpp"
 #include "tests/elements/pipeline.hpp"
 
@@ -186,62 +183,6 @@ TEST(LiveFuse, GoesOnWithoutEvents) {
       "eventfuse ! video/x-raw,framerate=100/1 ! fakesink name=sink sync=true");
   EXPECT_TRUE(pipeline.play()) << pipeline.error;
   EXPECT_GE(pipeline.stat("sink", "rendered"), 19U);
-}
-
-/// A texture that moves by a pixel a picture: every tenth is a frame.
-TEST(Fused, IsNearerToAMovingTextureThanTheLastFrame) {
-  constexpr int width = 64;
-  constexpr int height = 48;
-  const auto texture = [](int i) {
-    std::vector<guint8> grey;
-    for (int y = 0; y < height; ++y)
-      for (int x = 0; x < width; ++x)
-        grey.push_back(static_cast<guint8>(120 + 60 * std::sin(0.3 * (x - i)) * std::cos(0.4 * y) +
-                                           40 * std::sin(0.17 * (x - i) + y)));
-    return grey;
-  };
-  const auto frame = [&texture](int i, int step) {
-    const auto grey = texture(i);
-    GstBuffer* const buffer = gst_buffer_new_memdup(grey.data(), grey.size());
-    GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(i) * GST_SECOND / 240;
-    GST_BUFFER_DURATION(buffer) = static_cast<GstClockTime>(step) * GST_SECOND / 240;
-    return buffer;
-  };
-  const std::string size = ", width=64, height=48, framerate=";
-  Harness camera("eventsim-dvs");
-  gst_harness_set_src_caps_str(camera.get(),
-                               ("video/x-raw, format=GRAY8" + size + "240/1").c_str());
-  TwoInputs fuse("eventfuse", "video_sink", "event_sink");
-  gst_harness_set_sink_caps_str(fuse.first.get(), "video/x-raw, framerate=240/1");
-  gst_harness_set_src_caps_str(fuse.first.get(),
-                               ("video/x-raw, format=GRAY8" + size + "24/1").c_str());
-  gst_harness_set_src_caps_str(
-      fuse.second.get(), ("application/x-event-camera, format=XYTP" + size + "240/1").c_str());
-  double fused_error = 0;
-  double held_error = 0;
-  const std::jthread frames([&] {
-    for (int i = 0; i < 60; i += 10) gst_harness_push(fuse.first.get(), frame(i, 10));
-  });
-  const std::jthread events([&] {
-    for (int i = 0; i < 60; ++i) {
-      gst_harness_push(camera.get(), frame(i, 1));
-      while (GstBuffer* const buffer = gst_harness_try_pull(camera.get()))
-        gst_harness_push(fuse.second.get(), buffer);
-    }
-    gst_harness_push_event(fuse.second.get(), gst_event_new_eos());
-  });
-  for (int i = 0; i < 60; ++i) {
-    const auto held = texture(i - i % 10);
-    const Buffer picture(gst_harness_pull(fuse.first.get()));
-    ASSERT_TRUE(picture) << i;
-    const auto fused = bytes_of(picture.get());
-    const auto truth = texture(i);
-    for (std::size_t at = 0; at < truth.size(); ++at) {
-      fused_error += std::abs(static_cast<guint8>(fused[at]) - truth[at]);
-      held_error += std::abs(held[at] - truth[at]);
-    }
-  }
-  EXPECT_LT(fused_error, 0.65 * held_error) << fused_error / held_error;
 }
 
 }  // namespace

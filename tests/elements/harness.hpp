@@ -443,23 +443,6 @@ inline Harness without_upload(const std::string& launch) {
   return {gst_harness_new_parse(launch.c_str()), launch};
 }
 
-/// Pushes a segment with a negative rate.
-inline void push_backwards_segment(GstHarness* h) {
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  segment.rate = -1;
-  segment.stop = GST_SECOND;
-  gst_harness_push_event(h, gst_event_new_segment(&segment));
-}
-
-/// Seeks backwards, which is refused without an error, then pushes a segment with a negative rate.
-inline void play_backwards(Harness& h) {
-  EXPECT_FALSE(gst_element_seek(h.element(), -1.0, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
-                                GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_SET, GST_SECOND));
-  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
-  push_backwards_segment(h.get());
-}
-
 struct Gap {
   GstClockTime start = 0;
   GstClockTime duration = 0;

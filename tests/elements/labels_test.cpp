@@ -91,46 +91,6 @@ TEST(Labels, AreCountedByEventstats) {
   }
 }
 
-/// The bytes that follow a text.
-std::string after(const std::string& text, const std::string& all) {
-  const auto at = all.find(text);
-  EXPECT_NE(at, std::string::npos) << text;
-  return at == std::string::npos ? "" : all.substr(at + text.size());
-}
-
-TEST(Labels, AreWrittenAsColumns) {
-  const auto buffers = simulated(noisy + "label=true", GST_EVENT_CAMERA_MEDIA_TYPE);
-  std::string causes;
-  std::string lines = "t,x,y,p,cause,class\n";
-  for (const auto& buffer : buffers) {
-    const auto* meta = gst_buffer_get_event_camera_label_meta(buffer.get());
-    for (gsize i = 0; i < meta->n_labels; ++i) {
-      const auto event = events_of(buffer.get())[i];
-      causes += static_cast<char>(meta->labels[i].cause);
-      lines += std::to_string(GST_BUFFER_PTS(buffer.get()) / 1000 + event.t) + "," +
-               std::to_string(event.x) + "," + std::to_string(event.y_p & 0x7fff) + "," +
-               std::to_string(event.y_p >> 15) + "," +
-               std::to_string(static_cast<int>(meta->labels[i].cause)) + ",0\n";
-    }
-  }
-  const auto written = [&](const std::string& launch) {
-    Harness h(launch);
-    h.caps("application/x-event-camera, format=XYTP, width=64, height=48", "ANY");
-    for (const auto& buffer : buffers) h.push(gst_buffer_ref(buffer.get()));
-    gst_harness_push_event(h.get(), gst_event_new_eos());
-    std::string bytes;
-    while (const auto buffer = h.pull()) bytes += bytes_of(buffer.get());
-    return bytes;
-  };
-  EXPECT_EQ(written("eventcsvenc format=labels"), lines);
-  // An archive holds its arrays as they are, after a header that ends a line.
-  const auto npz = written("eventnpzenc");
-  const auto column = after("\n", after("cause.npy", npz));
-  EXPECT_EQ(column.substr(0, causes.size()), causes);
-  const auto classes = after("\n", after("class.npy", npz));
-  EXPECT_EQ(classes.substr(0, 2 * causes.size()), std::string(2 * causes.size(), '\0'));
-}
-
 /// A source of these buffers.
 std::string source_of(const std::string& writer) {
   return "appsrc name=in format=time caps=\"application/x-event-camera, format=XYTP, "

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // What elements write to GStreamer's log.
-#include <gst/rtp/gstrtpbuffer.h>
-
 #include <algorithm>
 #include <mutex>
 #include <string>
@@ -68,36 +66,6 @@ class Log {
   std::vector<Line> lines_;
 };
 
-TEST(Log, HasACategoryForEachElementThatDraws) {
-  for (const std::string element : {"eventrender", "eventreconstruct"}) {
-    Log log(element.c_str());
-    Pipeline pipeline("videotestsrc num-buffers=3 ! eventsim-diff ! " + element + " ! fakesink");
-    ASSERT_TRUE(pipeline.play()) << pipeline.error;
-    EXPECT_FALSE(log.with("drawing").empty()) << element;
-  }
-}
-
-TEST(Log, WarnsOnceOfSkippedEvents) {
-  Log log("eventstats");
-  Harness h("eventstats");
-  h.caps("application/x-event-camera, format=XYTP, width=8, height=8",
-         "application/x-event-camera");
-  for (const GstClockTime time : {1, 2, 3})
-    h.push(buffer_of(time * GST_SECOND, {{0, 9, 0}}, GST_MSECOND));
-  log.expect_one_warning("outside the sensor", 3);
-}
-
-TEST(Log, WarnsOnceOfEventsThatReadersDrop) {
-  Log log("eventreader");
-  std::string table = "t,x,y,p\n";
-  for (int t = 0; t < 15'000; ++t)
-    table += std::to_string(20 * t) + (t % 5000 == 1 ? ",9,1,1\n" : ",1,1,1\n");
-  const TemporaryFile file(table);
-  Pipeline pipeline(file.source() + "queue ! eventcsvdec width=8 height=8 ! fakesink");
-  ASSERT_TRUE(pipeline.play()) << pipeline.error;
-  log.expect_one_warning("dropped 1 events outside the sensor", 3);
-}
-
 TEST(Log, TellsWhereDataAreCorrupt) {
   Log log("eventreader");
   std::string table = "t,x,y,p\n";
@@ -114,58 +82,34 @@ TEST(Log, TellsWhereDataAreCorrupt) {
     EXPECT_EQ(log.with("the last at byte " + std::to_string(at)).size(), 1) << at;
 }
 
-TEST(Log, WarnsOnceOfLateDatagrams) {
-  Log log("eventdatagramdepay");
-  Harness h("eventdatagramdepay format=t32-x16-y15-on1 width=8 height=8");
-  gst_harness_set_src_caps_str(h.get(), "application/x-event-datagram");
-  for (const guint8 time : {9, 5, 4, 3}) {
-    const guint8 event[] = {time, 0, 0, 0, 1, 0, 1, 0};
-    GstBuffer* datagram = gst_buffer_new_memdup(event, sizeof event);
-    GST_BUFFER_PTS(datagram) = GST_SECOND;
-    h.push(datagram);
-  }
-  log.expect_one_warning("later events arrived before it", 3);
-}
-
-/// Gives rtpeventdepay packets with the numbers 7, 8, 7, 8, by `give`.
-template <class Give>
-void log_of_late_packets(const Give& give) {
-  std::vector<Buffer> packets;
-  {
-    Harness pay("rtpeventpay max-latency=0 seqnum-offset=7");
-    pay.caps("application/x-event-camera, format=XYTP, width=8, height=8", "application/x-rtp");
-    for (const GstClockTime time : {1, 2})
-      pay.push(buffer_of(time * GST_SECOND, {{0, 1, 1}}, GST_MSECOND));
-    while (auto packet = pay.pull()) packets.push_back(std::move(packet));
-  }
-  ASSERT_EQ(packets.size(), 2);
-  Log log("rtpeventdepay");
-  Harness h("rtpeventdepay");
-  h.caps(
-      "application/x-rtp, media=application, clock-rate=1000000, encoding-name=X-EVENT-CAMERA, "
-      "width=8, height=8");
-  GstBufferList* list = gst_buffer_list_new();
-  for (const auto index : {0U, 1U, 0U, 1U})
-    gst_buffer_list_add(list, gst_buffer_ref(packets[index].get()));
-  give(h, list);
-  gst_buffer_list_unref(list);
-  EXPECT_EQ(stat_of(h.element(), "late-packets"), 2);
-  log.expect_one_warning("later ones arrived before it", 2);
-  EXPECT_EQ(log.with("packet number 7").size(), 1);
-  EXPECT_EQ(log.with("packet number 8").size(), 1);
-}
-
 TEST(Log, TellsTheNumbersOfLatePackets) {
-  log_of_late_packets([](Harness& h, GstBufferList* list) {
-    for (guint i = 0; i < gst_buffer_list_length(list); ++i)
-      h.push(gst_buffer_ref(gst_buffer_list_get(list, i)));
-  });
-}
-
-TEST(Log, TellsTheNumbersOfLatePacketsInLists) {
-  log_of_late_packets([](Harness& h, GstBufferList* list) {
-    gst_pad_push_list(h->srcpad, gst_buffer_list_ref(list));
-  });
+  std::vector<Buffer> packets;
+  Harness pay("rtpeventpay max-latency=0 seqnum-offset=7");
+  pay.caps("application/x-event-camera, format=XYTP, width=8, height=8", "application/x-rtp");
+  for (const GstClockTime time : {1, 2})
+    pay.push(buffer_of(time * GST_SECOND, {{0, 1, 1}}, GST_MSECOND));
+  while (auto packet = pay.pull()) packets.push_back(std::move(packet));
+  ASSERT_EQ(packets.size(), 2);
+  for (const bool as_list : {false, true}) {
+    Log log("rtpeventdepay");
+    Harness h("rtpeventdepay");
+    h.caps(
+        "application/x-rtp, media=application, clock-rate=1000000, encoding-name=X-EVENT-CAMERA, "
+        "width=8, height=8");
+    GstBufferList* const list = gst_buffer_list_new();
+    for (const auto index : {0U, 1U, 0U, 1U}) {
+      gst_buffer_list_add(list, gst_buffer_ref(packets[index].get()));
+      if (!as_list) h.push(gst_buffer_ref(packets[index].get()));
+    }
+    if (as_list)
+      gst_pad_push_list(h->srcpad, list);
+    else
+      gst_buffer_list_unref(list);
+    EXPECT_EQ(stat_of(h.element(), "late-packets"), 2);
+    log.expect_one_warning("later ones arrived before it", 2);
+    EXPECT_EQ(log.with("packet number 7").size(), 1);
+    EXPECT_EQ(log.with("packet number 8").size(), 1);
+  }
 }
 
 }  // namespace

@@ -72,6 +72,34 @@ class MeasureTest : public testing::Test {
       (std::string("measure_") + testing::UnitTest::GetInstance()->current_test_info()->name());
 };
 
+/// Events of 10 ms: one at this place.
+GstBuffer* one_event(GstClockTime pts, int x = 1, int y = 1) {
+  return buffer_of(pts, {Event::at(x, y, 5, Polarity::on)}, 10 * ms);
+}
+
+/// One event per millisecond for 100 ms, those of the first half caused by light.
+GstBuffer* hundred_events(GstClockTime pts) {
+  std::vector<Event> events;
+  std::vector<GstEventCameraLabel> labels;
+  for (std::uint32_t t = 0; t < 100'000; t += 1000) {
+    events.push_back(Event::at(1, 0, t, Polarity::on));
+    labels.push_back(
+        {.object_class = 0, .cause = t < 50'000 ? guint8{1} : guint8{3}, .reserved = 0});
+  }
+  GstBuffer* const buffer = buffer_of(pts, events, 100 * ms);
+  gst_buffer_add_event_camera_label_meta(buffer, labels.data(), labels.size());
+  return buffer;
+}
+
+/// Pushes a segment from 50 to 80 ms.
+void push_short_segment(GstHarness* h) {
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = 50 * ms;
+  segment.stop = 80 * ms;
+  gst_harness_push_event(h, gst_event_new_segment(&segment));
+}
+
 /* eventstats */
 
 class StatsTest : public MeasureTest {};
@@ -113,161 +141,120 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
 }
 
-TEST_F(StatsTest, DoesNotCountEventsPastTheEndOfTheirBuffer) {
-  Harness h("eventstats interval=0");
-  h.caps(small_sensor);
-  for (const GstClockTime start : {0, 10, 20})
-    h.push(buffer_of(start * ms,
-                     {Event::at(1, 0, 5, Polarity::on), Event::at(2, 0, 900'000, Polarity::on)},
-                     10 * ms));
-  EXPECT_NE(h.warning().find("later than the end of their buffer"), std::string::npos);
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  const auto message = h.message(GST_MESSAGE_ELEMENT);
-  const auto* figures = structure_of(message);
-  ASSERT_TRUE(figures);
-  EXPECT_EQ(count_in(figures), 3U);
-  EXPECT_NEAR(static_cast<double>(count_in(figures, "interval-p50")), 10 * ms, 0.03 * 10 * ms);
-}
+struct Figures {
+  guint64 events;
+  double rate;
+  GstClockTime start;
+  GstClockTime end;
+};
 
-TEST_F(StatsTest, WritesWhatHasComeWhereItIsStopped) {
-  Harness h("eventstats location=" + in_quotes(path("f.json")) +
-            " map=" + in_quotes(path("map.png")));
-  h.caps(small_sensor);
-  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
-  gst_element_set_state(h.element(), GST_STATE_READY);
-  EXPECT_NE(text_in(path("f.json")).find("\"events\" : 1"), std::string::npos);
-  EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
-  const auto message = h.message(GST_MESSAGE_ELEMENT);
-  ASSERT_TRUE(message);
-  EXPECT_EQ(count_in(structure_of(message)), 1U);
-}
+struct Stream {
+  const char* name;
+  void (*push)(Harness& h);
+  std::vector<Figures> figures;
+};
 
-TEST_F(StatsTest, WritesNothingAtAStopWhereNothingHasComeSinceItDid) {
-  for (const bool with_events : {false, true}) {
-    Harness h("eventstats location=" + in_quotes(path("f.json")));
+const Stream streams[] = {
+    {"silence, which counts as time",
+     [](Harness& h) {
+       for (const GstClockTime start : {0, 90}) h.push(one_event(start * ms));
+     },
+     {{2, 20, 0, 100 * ms}}},
+    {"events past the end of their buffer",
+     [](Harness& h) {
+       for (const GstClockTime start : {0, 10, 20})
+         h.push(buffer_of(
+             start * ms, {Event::at(1, 0, 5, Polarity::on), Event::at(2, 0, 900'000, Polarity::on)},
+             10 * ms));
+     },
+     {{3, 100, 0, 30 * ms}}},
+    {"a flush",
+     [](Harness& h) {
+       h.push(one_event(0));
+       flush({h.get()});
+       push_segment(h.get());
+       h.push(one_event(20 * ms));
+     },
+     {{1, 100, 20 * ms, 30 * ms}}},
+    {"segments that end",
+     [](Harness& h) {
+       for (const GstClockTime base : {0, 10}) {
+         play_on(h.get(), base * ms);
+         h.push(one_event(base * ms));
+         end_segment(h.get());
+       }
+     },
+     {{1, 100, 0, 10 * ms}, {1, 100, 10 * ms, 20 * ms}}},
+    {"events outside a segment",
+     [](Harness& h) {
+       push_short_segment(h.get());
+       h.push(hundred_events(0));
+       h.push(hundred_events(100 * ms));
+       gst_harness_push_event(h.get(), gst_event_new_gap(200 * ms, 100 * ms));
+     },
+     {{30, 1000, 50 * ms, 80 * ms}}},
+    {"two sensors",
+     [](Harness& h) {
+       h.push(one_event(0, 7, 3));
+       h.caps("application/x-event-camera, format=XYTP, width=4, height=2");
+       h.push(one_event(10 * ms, 3, 1));
+       h.push(one_event(20 * ms, 7, 3));
+     },
+     {{1, 100, 0, 10 * ms}, {1, 50, 10 * ms, 30 * ms}}},
+    {"time that goes back, and a buffer without PTS",
+     [](Harness& h) {
+       h.push(one_event(500 * ms));
+       h.push(one_event(0));
+       h.push(one_event(GST_CLOCK_TIME_NONE));
+     },
+     {{2, 100, 500 * ms, 10 * ms}}},
+};
+
+TEST_F(StatsTest, PostsTheFiguresOfEachPartOfAStream) {
+  for (const auto& stream : streams) {
+    SCOPED_TRACE(stream.name);
+    Harness h("eventstats interval=0");
     h.caps(small_sensor);
-    if (with_events) {
-      h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
+    stream.push(h);
+    gst_harness_push_event(h.get(), gst_event_new_eos());
+    for (const auto& expected : stream.figures) {
+      const auto message = h.message(GST_MESSAGE_ELEMENT);
+      const auto* found = structure_of(message);
+      ASSERT_TRUE(found);
+      EXPECT_EQ(count_in(found), expected.events);
+      EXPECT_NEAR(number_in(found, "rate"), expected.rate, 1e-9);
+      EXPECT_EQ(time_in(found, "start"), static_cast<gint64>(expected.start));
+      EXPECT_EQ(time_in(found, "end"), static_cast<gint64>(expected.end));
+      if (expected.events == 30) {
+        EXPECT_EQ(count_in(found, "light-events"), 0U);
+      }
+    }
+    EXPECT_FALSE(h.message(GST_MESSAGE_ELEMENT));
+  }
+}
+
+TEST_F(StatsTest, WritesAtAStopWhatHasComeSinceTheEnd) {
+  for (const bool has_ended : {false, true}) {
+    Harness h("eventstats location=" + in_quotes(path("f.json")) +
+              " map=" + in_quotes(path("map.png")));
+    h.caps(small_sensor);
+    h.push(one_event(0));
+    if (has_ended) {
       gst_harness_push_event(h.get(), gst_event_new_eos());
       EXPECT_TRUE(std::filesystem::remove(path("f.json")));
     }
     gst_element_set_state(h.element(), GST_STATE_READY);
-    EXPECT_FALSE(std::filesystem::exists(path("f.json")));
+    EXPECT_EQ(text_in(path("f.json")).find("\"events\" : 1") != std::string::npos, !has_ended);
+    EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
+    EXPECT_TRUE(h.message(GST_MESSAGE_ELEMENT));
   }
-}
-
-TEST_F(StatsTest, CountsASilenceBetweenBuffersAsTime) {
-  Harness h("eventstats");
-  h.caps(small_sensor);
-  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
-  h.push(buffer_of(90 * ms, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  const auto message = h.message(GST_MESSAGE_ELEMENT);
-  ASSERT_TRUE(message);
-  EXPECT_NEAR(number_in(structure_of(message), "rate"), 20, 1e-9);
-}
-
-TEST_F(StatsTest, ForgetsWhatLiesBeforeAFlush) {
-  Harness h("eventstats");
-  h.caps(small_sensor);
-  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
-  flush({h.get()});
-  push_segment(h.get());
-  h.push(buffer_of(0, {Event::at(2, 0, 5, Polarity::off)}, 10 * ms));
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  const auto message = h.message(GST_MESSAGE_ELEMENT);
-  ASSERT_TRUE(message);
-  EXPECT_EQ(count_in(structure_of(message)), 1U);
-  EXPECT_EQ(number_in(structure_of(message), "on-share"), 0);
-}
-
-TEST_F(StatsTest, MeasuresEachSegment) {
-  Harness h("eventstats location=" + in_quotes(path("f.json")));
-  h.caps(small_sensor);
-  for (const GstClockTime base : {0 * ms, 10 * ms}) {
-    play_on(h.get(), base);
-    h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
-    end_segment(h.get());
-    const auto message = h.message(GST_MESSAGE_ELEMENT);
-    ASSERT_TRUE(message);
-    EXPECT_EQ(count_in(structure_of(message)), 1U);
-    EXPECT_TRUE(std::filesystem::remove(path("f.json")));
-  }
-  gst_harness_push_event(h.get(), gst_event_new_eos());  // of nothing more
-  EXPECT_FALSE(h.message(GST_MESSAGE_ELEMENT));
-}
-
-TEST_F(StatsTest, CountsOnlyWhatIsInTheSegment) {
-  Harness h("eventstats");
-  h.caps(small_sensor);
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  segment.start = segment.time = 50 * ms;
-  segment.stop = 80 * ms;
-  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
-  std::vector<Event> events;
-  std::vector<GstEventCameraLabel> labels;
-  for (std::uint32_t t = 0; t < 100'000; t += 1000) {
-    events.push_back(Event::at(1, 0, t, Polarity::on));
-    labels.push_back(
-        {.object_class = 0, .cause = t < 50'000 ? guint8{1} : guint8{3}, .reserved = 0});
-  }
-  GstBuffer* buffer = buffer_of(0, events, 100 * ms);
-  gst_buffer_add_event_camera_label_meta(buffer, labels.data(), labels.size());
-  h.push(buffer);
-  h.push(buffer_of(100 * ms, events, 100 * ms));
-  gst_harness_push_event(h.get(), gst_event_new_gap(200 * ms, 100 * ms));
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  const auto message = h.message(GST_MESSAGE_ELEMENT);
-  const auto* figures = structure_of(message);
-  ASSERT_TRUE(figures);
-  EXPECT_EQ(count_in(figures), 30U);
-  EXPECT_EQ(count_in(figures, "light-events"), 0U);
-  EXPECT_EQ(time_in(figures, "start"), gint64{50 * ms});
-  EXPECT_EQ(time_in(figures, "end"), gint64{80 * ms});
-  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
-}
-
-TEST_F(StatsTest, MeasuresEachSensorOnItsOwn) {
-  Harness h("eventstats");
-  h.caps(small_sensor);
-  h.push(buffer_of(0, {Event::at(7, 3, 5, Polarity::on)}, 10 * ms));
-  h.caps("application/x-event-camera, format=XYTP, width=4, height=2");
-  auto message = h.message(GST_MESSAGE_ELEMENT);
-  ASSERT_TRUE(message);
-  EXPECT_EQ(count_in(structure_of(message)), 1U);
-  h.push(buffer_of(10 * ms,
-                   {Event::at(3, 1, 5, Polarity::on), Event::at(3, 1, 6, Polarity::on),
-                    Event::at(7, 3, 7, Polarity::on)},
-                   10 * ms));
-  EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  message = h.message(GST_MESSAGE_ELEMENT);
-  ASSERT_TRUE(message);
-  EXPECT_EQ(count_in(structure_of(message)), 2U);
-  EXPECT_NEAR(number_in(structure_of(message), "mean"), 2 / 8.0 / 0.01, 1e-9);
-}
-
-TEST_F(StatsTest, GoesOnWhereTimeGoesBackAndWherePtsAreMissing) {
-  Harness h("eventstats");
-  h.caps(small_sensor);
-  h.push(buffer_of(500 * ms, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
-  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
-  h.push(buffer_of(GST_CLOCK_TIME_NONE, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
-  EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  const auto message = h.message(GST_MESSAGE_ELEMENT);
-  ASSERT_TRUE(message);
-  EXPECT_EQ(count_in(structure_of(message)), 2U);
-  EXPECT_EQ(count_in(structure_of(message), "interval-p50"), 0U);
-  EXPECT_NEAR(number_in(structure_of(message), "rate"), 100, 1e-9);
 }
 
 TEST_F(StatsTest, WritesToALinkAPipeAndADevice) {
   const auto measure = [](const std::string& location) {
     Harness h("eventstats location=" + in_quotes(location));
     h.caps(small_sensor);
-    h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
+    h.push(one_event(0));
     gst_harness_push_event(h.get(), gst_event_new_eos());
     return h.error();
   };
@@ -292,42 +279,17 @@ TEST_F(StatsTest, WritesToALinkAPipeAndADevice) {
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
 }
 
-TEST_F(StatsTest, RefusesEventsWithoutTimes) {
-  for (const std::string element : {"eventstats", "rtpeventpay", "eventdatagrampay"}) {
-    Harness h(element);
-    h.caps(small_sensor, "ANY");
-    push_segment(h.get(), GST_FORMAT_BYTES);
-    const auto error = h.error();
-    EXPECT_NE(error.find("this stream has no timestamps"), std::string::npos)
-        << element << ": " << error;
-  }
-}
-
-/// Sets an element to PAUSED and returns its error.
-std::string refusal_of(const std::string& launch) {
-  gst_init(nullptr, nullptr);
-  Owned<GstElement> element(GST_ELEMENT(gst_object_ref_sink(
-      gst_parse_launch_full(launch.c_str(), nullptr, GST_PARSE_FLAG_NONE, nullptr))));
-  const Owned<GstBus> bus(gst_bus_new());
-  gst_element_set_bus(element.get(), bus.get());
-  EXPECT_EQ(gst_element_set_state(element.get(), GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
-  const Owned<GstMessage> message(gst_bus_pop_filtered(bus.get(), GST_MESSAGE_ERROR));
-  gst_element_set_state(element.get(), GST_STATE_NULL);
-  gst_element_set_bus(element.get(), nullptr);
-  return message ? text_of(message.get()) : "no error";
-}
-
 TEST_F(StatsTest, SaysBeforehandThatAFolderIsMissing) {
-  for (const std::string element : {"eventstats", "eventcompare"}) {
-    for (const std::string property : {"location", "map"}) {
-      const auto text =
-          refusal_of(element + " " + property + "=" + in_quotes(path("nowhere/file")));
-      EXPECT_NE(text.find("No such folder"), std::string::npos) << text;
-      EXPECT_NE(text.find("nowhere"), std::string::npos) << text;
+  for (const std::string element : {"eventstats", "eventcompare"})
+    for (const auto& [setting, error] :
+         {std::pair{"location=" + in_quotes(path("nowhere/file")), "No such folder"},
+          {"map=" + in_quotes(path("nowhere/file")), "No such folder"},
+          {"location=" + in_quotes(folder.string()), "is a folder"}}) {
+      Pipeline pipeline(element + " " + setting + "  fakesink");
+      EXPECT_FALSE(pipeline.play());
+      EXPECT_NE(pipeline.error.find(error), std::string::npos) << pipeline.error;
+      EXPECT_NE(pipeline.error.find(setting.substr(setting.find('"') + 1, 20)), std::string::npos);
     }
-    const auto text = refusal_of(element + " location=" + in_quotes(folder.string()));
-    EXPECT_NE(text.find("is a folder"), std::string::npos) << text;
-  }
 }
 
 /* eventcompare */
@@ -346,10 +308,16 @@ class CompareTest : public MeasureTest {
     gst_harness_set_src_caps_str(candidate, of_candidate.c_str());
   }
 
+  void push_both(std::initializer_list<GstClockTime> starts) {
+    for (const auto start : starts)
+      for (auto* h : {reference, candidate}) gst_harness_push(h, one_event(start));
+  }
+
   void end(GstHarness* h) { gst_harness_push_event(h, gst_event_new_eos()); }
 
-  /// Buffers passed through until EOS, then the statistics.
+  /// Ends both streams, collects the buffers that pass, and returns the statistics.
   const GstStructure* conclude() {
+    for (auto* h : {reference, candidate}) end(h);
     GstBuffer* last = nullptr;
     while (gst_harness_buffers_in_queue(candidate) > 0)
       passed.emplace_back(gst_harness_pull(candidate));
@@ -399,8 +367,6 @@ TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
   gst_harness_push(reference, buffer_of(20 * ms, {Event::at(5, 1, 1'000, Polarity::on)}, 20 * ms));
   gst_harness_push_event(candidate, gst_event_new_gap(20 * ms, 20 * ms));
   gst_harness_push(reference, buffer_of(40 * ms, {Event::at(5, 1, 1'000, Polarity::on)}, 20 * ms));
-  end(candidate);
-  end(reference);
   const auto* figures = conclude();
   ASSERT_TRUE(figures);
   EXPECT_TRUE(gst_structure_has_name(figures, "eventcompare"));
@@ -436,15 +402,10 @@ TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
 TEST_F(CompareTest, PassesTheCandidateOnWhereTheReferenceHasEnded) {
   make();
   begin();
-  gst_harness_push(reference, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
+  gst_harness_push(reference, one_event(0));
   end(reference);
-  for (const GstClockTime t : {0 * ms, 10 * ms, 20 * ms})
-    gst_harness_push(candidate, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
-  end(candidate);
-  const auto* figures = conclude();
-  ASSERT_TRUE(figures);
-  EXPECT_EQ(count_in(within(figures, "candidate")), 1U);
-  EXPECT_EQ(time_in(figures, "end"), gint64{10 * ms});
+  for (const GstClockTime t : {0 * ms, 10 * ms, 20 * ms}) gst_harness_push(candidate, one_event(t));
+  expect_comparisons({{1, 10 * ms}});
   EXPECT_EQ(passed.size(), 3U);
 }
 
@@ -454,93 +415,46 @@ TEST_F(CompareTest, ComparesEachSegment) {
   for (const GstClockTime base : {0 * ms, 10 * ms}) {
     for (auto* h : {reference, candidate}) {
       play_on(h, base);
-      gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
+      gst_harness_push(h, one_event(0));
       end_segment(h);
     }
     ASSERT_TRUE(next_event(candidate, GST_EVENT_SEGMENT_DONE));
-    message_ = compare->message(GST_MESSAGE_ELEMENT);
-    const auto* figures = structure_of(message_);
-    ASSERT_TRUE(figures);
-    EXPECT_EQ(count_in(within(figures, "candidate")), 1U);
-    EXPECT_EQ(number_in(within(figures, "reference-matches"), "within-1ms"), 1);
   }
-  for (auto* h : {reference, candidate}) end(h);  // of nothing more
-  ASSERT_TRUE(next_event(candidate, GST_EVENT_EOS));
-  EXPECT_FALSE(compare->message(GST_MESSAGE_ELEMENT));
-}
-
-TEST_F(CompareTest, StartsOverWhereTimeGoesBack) {
-  make();
-  begin();
-  for (const GstClockTime base : {0 * ms, 20 * ms}) {
-    for (auto* h : {reference, candidate}) play_on(h, base);
-    for (const GstClockTime t : {0 * ms, 10 * ms})
-      for (auto* h : {reference, candidate})
-        gst_harness_push(h, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
-  }
-  for (auto* h : {reference, candidate}) end(h);
-  expect_comparisons({{2, 20 * ms}, {2, 20 * ms}});
-  EXPECT_EQ(passed.size(), 4U);
+  expect_comparisons({{1, 10 * ms}, {1, 10 * ms}});
 }
 
 TEST_F(CompareTest, StartsOverOnceTimeGoesBackInBothStreams) {
   make();
   begin();
-  const auto push = [](GstHarness* h, GstClockTime t) {
-    gst_harness_push(h, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
-  };
-  for (const GstClockTime t : {0 * ms, 10 * ms})
-    for (auto* h : {reference, candidate}) push(h, t);
-  push(reference, 20 * ms);
-  push(candidate, 0);
-  push(reference, 30 * ms);
-  push(reference, 0);
-  for (auto* h : {reference, candidate}) end(h);
+  push_both({0 * ms, 10 * ms});
+  gst_harness_push(reference, one_event(20 * ms));
+  gst_harness_push(candidate, one_event(0));
+  gst_harness_push(reference, one_event(30 * ms));
+  gst_harness_push(reference, one_event(0));
   expect_comparisons({{2, 20 * ms}, {1, 10 * ms}});
   EXPECT_EQ(passed.size(), 3U);
+}
+
+TEST_F(CompareTest, StartsOverAfterAFlush) {
+  make();
+  begin();
+  push_both({0});
+  flush({reference, candidate});
+  for (auto* h : {reference, candidate}) push_segment(h);
+  push_both({10 * ms});
+  expect_comparisons({{1, 20 * ms}});
 }
 
 TEST_F(CompareTest, ComparesOnlyWhatIsInTheSegments) {
   make();
   begin();
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  segment.start = segment.time = 50 * ms;
-  segment.stop = 80 * ms;
-  std::vector<Event> events;
-  for (std::uint32_t t = 0; t < 100'000; t += 1000)
-    events.push_back(Event::at(1, 0, t, Polarity::on));
   for (auto* h : {reference, candidate}) {
-    gst_harness_push_event(h, gst_event_new_segment(&segment));
-    gst_harness_push(h, buffer_of(0, events, 100 * ms));
-    end(h);
+    push_short_segment(h);
+    gst_harness_push(h, hundred_events(0));
   }
-  const auto* figures = conclude();
-  ASSERT_TRUE(figures);
-  EXPECT_EQ(time_in(figures, "start"), gint64{50 * ms});
-  EXPECT_EQ(time_in(figures, "end"), gint64{80 * ms});
-  for (const char* role : {"reference", "candidate"})
-    EXPECT_EQ(count_in(within(figures, role)), 30U) << role;
+  expect_comparisons({{30, 80 * ms}});
   ASSERT_EQ(passed.size(), 1U);
   EXPECT_EQ(events_of(passed[0].get()).size(), 100U);
-}
-
-TEST_F(CompareTest, PassesTheCustomEventsOfTheCandidateOn) {
-  make();
-  const OutputOrder output(candidate);
-  begin();
-  for (const GstClockTime t : {0 * ms, 10 * ms}) {
-    push_custom(reference, "of-reference");
-    push_custom(candidate, "of-candidate");
-    for (auto* h : {reference, candidate})
-      gst_harness_push(h, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
-  }
-  end(reference);
-  end(candidate);
-  EXPECT_TRUE(conclude());
-  EXPECT_EQ(output.names(),
-            (std::vector<std::string>{"stream-start", "caps", "segment", "of-candidate", "buffer",
-                                      "of-candidate", "buffer", "eos"}));
 }
 
 /// A buffer with an event of each of these causes.
@@ -563,8 +477,6 @@ TEST_F(CompareTest, ClassifiesTheEventsThatAreLeft) {
   constexpr guint8 leak = GST_EVENT_CAMERA_CAUSE_LEAK;
   gst_harness_push(reference, caused_by({light, light, light, leak, leak, leak, leak}));
   gst_harness_push(candidate, caused_by({light, light, leak}));
-  end(reference);
-  end(candidate);
   const auto* figures = conclude();
   ASSERT_TRUE(figures);
   const auto* classification = within(figures, "classification");
@@ -579,101 +491,32 @@ TEST_F(CompareTest, ClassifiesTheEventsThatAreLeft) {
   EXPECT_DOUBLE_EQ(number_in(classification, "precision"), 2 / 3.0);
 }
 
-TEST_F(CompareTest, ClassifiesWhereNoEventIsLeft) {
-  make();
-  begin();
-  gst_harness_push(reference, caused_by({GST_EVENT_CAMERA_CAUSE_LEAK}));
-  gst_harness_push_event(candidate, gst_event_new_gap(0, 10 * ms));
-  end(reference);
-  end(candidate);
-  const auto* figures = conclude();
-  ASSERT_TRUE(figures);
-  const auto* classification = within(figures, "classification");
-  ASSERT_TRUE(classification);
-  EXPECT_STREQ(gst_structure_nth_field_name(figures, 2), "classification");  // after start and end
-  EXPECT_EQ(count_in(classification, "true-negatives"), 1U);
-}
-
-TEST_F(CompareTest, WritesWhatHasComeWhereItIsStopped) {
-  make("location=" + in_quotes(path("f.json")) + " map=" + in_quotes(path("map.png")));
-  begin();
-  for (const GstClockTime t : {0 * ms, 10 * ms})
-    for (auto* h : {reference, candidate})
-      gst_harness_push(h, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
-  EXPECT_TRUE(Buffer(gst_harness_pull(candidate)));
-  gst_element_set_state(compare->element.get(), GST_STATE_READY);
-  EXPECT_FALSE(text_in(path("f.json")).empty());
-  EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
-  const auto message = compare->message(GST_MESSAGE_ELEMENT);
-  ASSERT_TRUE(message);
-  EXPECT_EQ(time_in(structure_of(message), "start"), 0);
-}
-
-TEST_F(CompareTest, WritesNothingAtAStopWhereNothingHasComeSinceItDid) {
-  make("location=" + in_quotes(path("f.json")));
-  begin();
-  for (auto* h : {reference, candidate})
-    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
-  end(reference);
-  end(candidate);
-  EXPECT_TRUE(conclude());
-  EXPECT_TRUE(std::filesystem::remove(path("f.json")));
-  gst_element_set_state(compare->element.get(), GST_STATE_READY);
-  EXPECT_FALSE(std::filesystem::exists(path("f.json")));
-}
-
-/// Which asks for memory again. A tee waits for the answers of both of its branches.
-TEST(Compare, GoesOnWhereItsSourceChanges) {
-  const std::string source =
-      "videotestsrc num-buffers=30 ! video/x-raw, width=64, height=48, framerate=30/1 ! k.  ";
-  Pipeline pipeline(
-      "concat name=k ! eventsim-diff ! tee name=t  t. ! queue ! c.candidate  t. ! queue ! "
-      "c.reference  eventcompare name=c ! fakesink  " +
-      source + source);
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-}
-
-TEST(Compare, AsksOnceForTheStreamThatIsMissing) {
-  Harness h("eventcompare", "candidate", "src");
-  for (const char* width : {"8", "9"})
-    gst_harness_set_src_caps_str(
-        h.get(),
-        (std::string("application/x-event-camera, format=XYTP, height=4, width=") + width).c_str());
-  h.wait_for_events();
-  EXPECT_NE(h.warning().find("link a stream to the pad \"reference\""), std::string::npos);
-  EXPECT_EQ(h.warning(), "");
+TEST_F(CompareTest, WritesAtAStopWhatHasComeSinceTheEnd) {
+  for (const bool has_ended : {false, true}) {
+    make("location=" + in_quotes(path("f.json")));
+    begin();
+    push_both({0, 10 * ms});
+    EXPECT_TRUE(Buffer(gst_harness_pull(candidate)));
+    if (has_ended) {
+      EXPECT_TRUE(conclude());
+      EXPECT_TRUE(std::filesystem::remove(path("f.json")));
+    }
+    gst_element_set_state(compare->element.get(), GST_STATE_READY);
+    EXPECT_EQ(text_in(path("f.json")).empty(), has_ended);
+  }
 }
 
 /// At once, because a source whose size changes may wait for one of the streams itself.
 TEST_F(CompareTest, ReportsAndRefusesAChangeOfSize) {
   make();
   begin();
-  for (auto* h : {reference, candidate})
-    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
+  push_both({0});
   gst_harness_set_src_caps_str(reference,
                                "application/x-event-camera, format=XYTP, width=9, height=4");
   const Owned<GstMessage> error(
       gst_bus_timed_pop_filtered(compare->bus.get(), 5 * GST_SECOND, GST_MESSAGE_ERROR));
   ASSERT_TRUE(error);
-  EXPECT_NE(text_of(error.get()).find("9 x 4 pixels, the candidate 8 x 4"), std::string::npos);
-}
-
-TEST_F(CompareTest, BeginsAnewAfterAFlush) {
-  make();
-  begin();
-  for (auto* h : {reference, candidate})
-    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
-  flush({reference, candidate});
-  for (auto* h : {reference, candidate}) {
-    push_segment(h);
-    gst_harness_push(h, buffer_of(0, {Event::at(2, 1, 5, Polarity::on)}, 10 * ms));
-  }
-  end(reference);
-  end(candidate);
-  const auto* figures = conclude();
-  ASSERT_TRUE(figures);
-  EXPECT_EQ(count_in(within(figures, "candidate")), 1U);
-  EXPECT_EQ(count_in(within(figures, "reference")), 1U);
+  EXPECT_NE(text_of(error.get()).find("9 x 4"), std::string::npos);
 }
 
 }  // namespace

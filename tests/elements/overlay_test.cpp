@@ -63,17 +63,6 @@ class OverlayTest : public testing::Test {
 
 using Places = std::vector<std::pair<int, int>>;
 
-TEST_F(OverlayTest, DrawsTheEventsOfEachFramesInterval) {
-  begin("width=8, height=4");
-  push_frame(0);
-  push_events(0, {Event::at(1, 0, 0, Polarity::on), Event::at(2, 1, 40'000, Polarity::off)});
-  EXPECT_EQ(drawn(), (Places{{1, 255}, {10, 0}}));
-  push_frame(40 * ms);
-  push_events(40 * ms, {Event::at(7, 3, 5, Polarity::on), Event::at(7, 3, 6, Polarity::off)});
-  EXPECT_EQ(drawn(), (Places{{31, 64}}));
-  EXPECT_EQ(last_pts, 40 * ms);
-}
-
 TEST_F(OverlayTest, CutsBuffersOfEventsWhereFramesEnd) {
   begin("width=8, height=4");
   push_frame(0);
@@ -130,16 +119,6 @@ TEST_F(OverlayTest, DrawsTheEventsOfEachFrameAtEveryRate) {
   }
 }
 
-TEST_F(OverlayTest, IsNotHeldUpByAnEventPastTheEndOfItsBuffer) {
-  begin("width=8, height=4");
-  push_frame(0);
-  push_events(0, {Event::at(1, 0, 0, Polarity::on), Event::at(2, 0, 900'000, Polarity::on)});
-  EXPECT_EQ(drawn(), (Places{{1, 255}}));
-  push_frame(40 * ms);
-  push_events(40 * ms, {Event::at(3, 0, 5, Polarity::on)});
-  EXPECT_EQ(drawn(), (Places{{3, 255}}));
-}
-
 TEST_F(OverlayTest, LetsTheVideoUseTheMemoryOfDownstream) {
   gst_pad_add_probe(
       video->sinkpad, GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM,
@@ -184,18 +163,6 @@ TEST_F(OverlayTest, DrawsInColourOverGreyVideo) {
   ASSERT_EQ(bytes.size(), 96U);
   EXPECT_EQ(bytes.substr(0, 3), "ddd");                                     // grey 100
   EXPECT_GT(static_cast<guint8>(bytes[3]), static_cast<guint8>(bytes[5]));  // red
-}
-
-TEST(Overlay, TakesGreyVideoThatIsShownInColour) {
-  for (const char* shown : {"RGBA", "GRAY8"}) {
-    Pipeline pipeline(
-        "videotestsrc num-buffers=3 ! video/x-raw,format=GRAY8 ! tee name=t  t. ! queue ! "
-        "eventoverlay name=overlay ! capsfilter name=shown caps=video/x-raw,format=" +
-        std::string(shown) +
-        " ! fakesink name=sink  t. ! queue ! eventsim-diff ! overlay.event_sink");
-    EXPECT_TRUE(pipeline.play()) << shown << pipeline.error;
-    EXPECT_EQ(pipeline.stat("sink", "rendered"), 3U);
-  }
 }
 
 TEST_F(OverlayTest, ScalesTheSensorToTheVideo) {
@@ -244,91 +211,6 @@ TEST_F(OverlayTest, PassesGapsInTheVideoOn) {
     if (GST_EVENT_TYPE(event.get()) == GST_EVENT_GAP)
       gst_event_parse_gap(event.get(), &start, nullptr);
   EXPECT_EQ(start, 80 * ms);
-}
-
-TEST_F(OverlayTest, PassesTheCustomEventsOfTheVideoOn) {
-  const OutputOrder output(video.get());
-  begin("width=8, height=4");
-  push_custom(events.get(), "triggers");
-  GstStreamCollection* const streams = gst_stream_collection_new("events");
-  gst_harness_push_event(events.get(), gst_event_new_stream_collection(streams));
-  gst_object_unref(streams);
-  push_custom(video.get(), "of-video");
-  push_frame(0);
-  push_events(0, {});
-  EXPECT_EQ(drawn(), Places{});
-  for (auto* h : {video.get(), events.get()}) gst_harness_push_event(h, gst_event_new_eos());
-  ASSERT_TRUE(next_event(video.get(), GST_EVENT_EOS));
-  EXPECT_EQ(output.names(), (std::vector<std::string>{"stream-start", "caps", "segment", "of-video",
-                                                      "buffer", "eos"}));
-}
-
-TEST_F(OverlayTest, SendsNoGapBeforeItsSegment) {
-  begin("width=8, height=4");
-  push_frame(0);
-  push_events(0, {});
-  EXPECT_EQ(drawn(), Places{});
-  while (const Owned<GstEvent> event{gst_harness_try_pull_event(video.get())}) continue;
-  for (auto* h : {video.get(), events.get()}) play_on(h, 40 * ms);
-  gst_harness_push_event(video.get(), gst_event_new_gap(0, 40 * ms));
-  push_events(0, {});
-  push_frame(40 * ms);
-  push_events(40 * ms, {});
-  EXPECT_EQ(drawn(), Places{});
-  const Owned<GstEvent> event(gst_harness_pull_event(video.get()));
-  ASSERT_TRUE(event);
-  EXPECT_EQ(GST_EVENT_TYPE(event.get()), GST_EVENT_SEGMENT);
-}
-
-TEST_F(OverlayTest, GoesOnWithoutEventsThatEndBeforeTheyBegin) {
-  gst_harness_set_src_caps_str(video.get(),
-                               "video/x-raw, format=GRAY8, width=8, height=4, framerate=25/1");
-  gst_harness_push_event(events.get(), gst_event_new_eos());
-  for (const GstClockTime pts : {0 * ms, 40 * ms}) {
-    push_frame(pts);
-    EXPECT_EQ(drawn(), Places{});
-  }
-}
-
-TEST(LiveOverlay, GoesOnWhereNoEventsAreLinked) {
-  Pipeline pipeline(
-      "videotestsrc is-live=true num-buffers=10 ! video/x-raw,format=GRAY8,framerate=50/1 ! "
-      "eventoverlay ! fakesink name=sink sync=true");
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-  ASSERT_EQ(pipeline.warnings.size(), 1U);
-  EXPECT_NE(pipeline.warnings[0].find("link a source of events"), std::string::npos);
-  EXPECT_EQ(pipeline.stat("sink", "rendered"), 10U);
-}
-
-/// Which asks for memory again. A tee waits for the answers of both of its branches.
-TEST(Overlay, GoesOnWhereItsSourceChanges) {
-  const std::string source =
-      "videotestsrc num-buffers=30 ! video/x-raw, width=64, height=48, framerate=30/1 ! k.  ";
-  Pipeline pipeline(
-      "concat name=k ! identity single-segment=true ! tee name=t  t. ! queue ! videoconvert ! "
-      "eventoverlay name=overlay ! fakesink name=sink  t. ! queue ! eventsim-diff ! "
-      "overlay.event_sink  " +
-      source + source);
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-  EXPECT_EQ(pipeline.stat("sink", "rendered"), 60U);
-}
-
-TEST(Overlay, AsksOnceForTheEventsThatAreMissing) {
-  Harness h("eventoverlay", "video_sink", "src");
-  for (const char* size : {"width=8, height=4", "width=4, height=8"})
-    gst_harness_set_src_caps_str(
-        h.get(), (std::string("video/x-raw, format=GRAY8, framerate=25/1, ") + size).c_str());
-  h.wait_for_events();
-  EXPECT_NE(h.warning().find("link a source of events"), std::string::npos);
-  EXPECT_EQ(h.warning(), "");
-}
-
-TEST_F(OverlayTest, LeavesEventsBeyondTheSensorOut) {
-  begin("width=8, height=4");
-  push_frame(0);
-  push_events(0, {Event::at(8, 0, 5, Polarity::on), Event::at(0, 4, 6, Polarity::on)});
-  EXPECT_EQ(drawn(), Places{});
-  EXPECT_TRUE(overlay.message(GST_MESSAGE_WARNING));
 }
 
 class OverlayHalf : public OverlayTest {

@@ -98,52 +98,8 @@ void expect(const std::vector<Buffer>& found, const std::vector<Picture>& expect
   }
 }
 
-TEST_F(Render, DrawsAnIntervalAsSimulatorsDo) {
-  begin(grey_at("25/1"));
-  for (int i = 0; i < 4; ++i) push(i * 40 * ms, column(i));
-  expect(finish(), {{0, 40 * ms, accumulated(column(0))},
-                    {40 * ms, 40 * ms, accumulated(column(1))},
-                    {80 * ms, 40 * ms, accumulated(column(2))},
-                    {120 * ms, 40 * ms, accumulated(column(3))}});
-}
-
-TEST_F(Render, IsNotAheadOfTimeAfterAnEventPastTheEndOfItsBuffer) {
-  begin(grey_at("25/1"));
-  auto events = column(0);
-  events.push_back(Event::at(5, 5, 900'000, Polarity::on));
-  push(0, events);
-  for (int i = 1; i < 3; ++i) push(i * 40 * ms, column(i));
-  expect(finish(), {{0, 40 * ms, accumulated(column(0))},
-                    {40 * ms, 40 * ms, accumulated(column(1))},
-                    {80 * ms, 40 * ms, accumulated(column(2))}});
-  EXPECT_NE(h.warning().find("later than the end of their buffer"), std::string::npos);
-}
-
-/// Intervals of a third of 100 ms, with ends rounded down; all fire at their very end.
-TEST_F(Render, KeepsIntervalsApartThatAreRounded) {
-  begin(grey_at("30/1"));
-  const auto time = [](guint64 i) { return gst_util_uint64_scale(i, GST_SECOND, 30); };
-  constexpr guint64 first = 1;  // makes rounding matter
-  for (guint64 i = first; i < 20; ++i) {
-    const auto duration = time(i + 1) - time(i);
-    push(time(i),
-         {Event::at(static_cast<int>(i), 3, static_cast<guint32>(duration / 1000), Polarity::on)},
-         duration);
-  }
-  const auto pictures = finish();
-  ASSERT_EQ(pictures.size(), 19U);
-  for (guint64 i = first; i < 20; ++i)
-    EXPECT_TRUE(bytes_of(pictures[i - first].get()) ==
-                accumulated({Event::at(static_cast<int>(i), 3, 1, Polarity::on)}))
-        << i;
-}
-
-class RenderOverlapping : public Render {
- protected:
-  RenderOverlapping() : Render("eventrender accumulation-time=60000000") {}
-};
-
-TEST_F(RenderOverlapping, DrawsWindowsThatAreLongerThanPictures) {
+TEST_F(Render, DrawsWindowsThatAreLongerThanPictures) {
+  g_object_set(h.element(), "accumulation-time", 60 * ms, nullptr);
   begin(grey_at("50/1"));
   push(0, column(5));
   push(40 * ms, column(6));
@@ -172,17 +128,6 @@ TEST_F(Render, MakesAPictureOfEachBufferWhereTheFramerateVaries) {
   expect(finish(), {{7, 20 * ms, accumulated(column(1))},
                     {20 * ms + 7, 100 * ms, accumulated(column(2))},
                     {120 * ms + 7, 5 * ms, blank}});
-}
-
-TEST_F(Render, DrawsThroughGaps) {
-  begin(grey_at("25/1"));
-  push(0, column(1));
-  gst_harness_push_event(h.get(), gst_event_new_gap(40 * ms, 80 * ms));
-  push(120 * ms, column(2));
-  expect(finish(), {{0, 40 * ms, accumulated(column(1))},
-                    {40 * ms, 40 * ms, blank},
-                    {80 * ms, 40 * ms, blank},
-                    {120 * ms, 40 * ms, accumulated(column(2))}});
 }
 
 TEST_F(Render, SkipsThePicturesOfLongPauses) {
@@ -218,12 +163,6 @@ TEST_F(Render, DrawsThroughSilencesButNotThroughLeaps) {
   EXPECT_TRUE(GST_BUFFER_IS_DISCONT(pictures.back().get()));
 }
 
-TEST_F(Render, DrawsWhatThereIsAtTheEnd) {
-  begin(grey_at("10/1"));
-  push(0, column(1));
-  expect(finish(), {{0, 100 * ms, accumulated(column(1))}});
-}
-
 TEST_F(Render, DrawsWhatThereIsAtTheEndOfASegment) {
   begin(grey_at("10/1"));
   push(0, column(1));
@@ -251,22 +190,6 @@ TEST_F(Render, IsDiscontinuousAfterTwoFlushes) {
   segment(0);
   push(0, column(2));
   EXPECT_TRUE(GST_BUFFER_IS_DISCONT(wait_for_picture().get()));
-}
-
-TEST_F(Render, PassesTags) {
-  begin(grey_at("25/1"));
-  gst_harness_push_event(
-      h.get(), gst_event_new_tag(gst_tag_list_new(GST_TAG_CONTAINER_FORMAT, "AEDAT", nullptr)));
-  push(0, column(1));
-  wait_for_picture();
-  const auto event = h.pull_event(GST_EVENT_TAG);
-  ASSERT_TRUE(event);
-  GstTagList* tags = nullptr;
-  gst_event_parse_tag(event.get(), &tags);
-  gchar* format = nullptr;
-  EXPECT_TRUE(gst_tag_list_get_string(tags, GST_TAG_CONTAINER_FORMAT, &format));
-  EXPECT_STREQ(format, "AEDAT");
-  g_free(format);
 }
 
 TEST_F(Render, DrainsAndBeginsAnewInAnotherSegment) {
@@ -307,13 +230,6 @@ TEST_F(Render, DrawsShorterIntervalsWhenPlayedSlower) {
   expect(finish(), pictures);
 }
 
-TEST_F(Render, RefusesToRunBackwards) {
-  begin(grey_at("25/1"));
-  play_backwards(h);
-  finish();
-  EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
-}
-
 TEST_F(Render, PlaysOnAfterASeekThatUpstreamRefuses) {
   begin(grey_at("25/1"));
   push(0, column(1));
@@ -338,84 +254,6 @@ TEST_F(Render, DrainsWhenTheSensorChanges) {
   EXPECT_EQ(h.warning(), "");
 }
 
-TEST_F(Render, LeavesBrokenEventsOutWithAWarning) {
-  begin(grey_at("25/1"));
-  auto events = column(1);
-  events.push_back(Event::at(width, 0, 20'000, Polarity::on));
-  events.push_back(Event::at(0, height, 20'000, Polarity::on));
-  push(0, events);
-  push(40 * ms, events);
-  EXPECT_EQ(push(GST_CLOCK_TIME_NONE, column(2)), GST_FLOW_OK);
-  EXPECT_EQ(h.push(gst_buffer_new_memdup("seven b", 7)), GST_FLOW_OK);
-  expect(finish(),
-         {{0, 40 * ms, accumulated(column(1))}, {40 * ms, 40 * ms, accumulated(column(1))}});
-  EXPECT_NE(h.warning().find("outside the sensor"), std::string::npos);
-  EXPECT_NE(h.warning().find("no PTS"), std::string::npos);
-  EXPECT_EQ(h.warning(), "");
-}
-
-TEST_F(Render, TakesEventsInAnyOrder) {
-  begin(grey_at("50/1"));
-  push(80 * ms, column(1));
-  push(0, column(2));  // too late for its own picture
-  push(120 * ms, {Event::at(1, 1, 4'000'000, Polarity::on), Event::at(2, 2, 5, Polarity::off)});
-  const auto pictures = finish();
-  for (std::size_t i = 1; i < pictures.size(); ++i)
-    EXPECT_EQ(GST_BUFFER_PTS(pictures[i].get()), GST_BUFFER_PTS(pictures[i - 1].get()) + 20 * ms);
-}
-
-class RenderEachFormat : public Render, public testing::WithParamInterface<const char*> {};
-INSTANTIATE_TEST_SUITE_P(, RenderEachFormat,
-                         testing::Values("BGRx", "RGBx", "xRGB", "xBGR", "BGRA", "RGBA", "ARGB",
-                                         "ABGR", "RGB", "BGR", "GRAY8"));
-
-TEST_P(RenderEachFormat, PutsColoursWhereTheyBelong) {
-  begin("video/x-raw, framerate=25/1, format=" + std::string(GetParam()));
-  push(0, column(3));
-  const auto pictures = finish();
-  ASSERT_EQ(pictures.size(), 1U);
-  GstVideoInfo info;
-  GstCaps* caps = gst_caps_from_string(h.out_caps().c_str());
-  ASSERT_TRUE(gst_video_info_from_caps(&info, caps));
-  gst_caps_unref(caps);
-  GstVideoFrame frame;
-  ASSERT_TRUE(gst_video_frame_map(&frame, &info, pictures[0].get(), GST_MAP_READ));
-  const auto byte = [&frame](guint component, int x) {
-    return static_cast<int>(static_cast<guint8*>(
-        GST_VIDEO_FRAME_COMP_DATA(&frame, component))[x * GST_VIDEO_FRAME_COMP_PSTRIDE(&frame, 0)]);
-  };
-  const auto& colours = eventcamera::palette(eventcamera::PaletteName::dark);
-  if (GST_VIDEO_INFO_N_COMPONENTS(&info) == 1) {
-    EXPECT_EQ(byte(0, 3), eventcamera::luma(colours.on));
-    EXPECT_EQ(byte(0, 4), eventcamera::luma(colours.none));
-  } else {
-    EXPECT_EQ(byte(GST_VIDEO_COMP_R, 3), colours.on.red);
-    EXPECT_EQ(byte(GST_VIDEO_COMP_G, 3), colours.on.green);
-    EXPECT_EQ(byte(GST_VIDEO_COMP_B, 3), colours.on.blue);
-    EXPECT_EQ(byte(GST_VIDEO_COMP_B, 4), colours.none.blue);
-  }
-  gst_video_frame_unmap(&frame);
-}
-
-class RenderEachMode : public Render, public testing::WithParamInterface<const char*> {
- protected:
-  RenderEachMode() : Render("eventrender palette=grey mode=" + std::string(GetParam())) {}
-};
-INSTANTIATE_TEST_SUITE_P(, RenderEachMode,
-                         testing::Values("accumulate", "decay", "time-surface", "count"));
-
-TEST_P(RenderEachMode, ShowsOnBrighterAndOffDarker) {
-  begin(grey_at("25/1"));
-  push(0, {Event::at(1, 1, 30'000, Polarity::on), Event::at(2, 1, 30'000, Polarity::off)});
-  const auto pictures = finish();
-  ASSERT_EQ(pictures.size(), 1U);
-  const auto bytes = bytes_of(pictures[0].get());
-  const auto grey = [&bytes](int x) { return static_cast<guint8>(bytes[width + x]); };
-  EXPECT_EQ(grey(0), 128);
-  EXPECT_GT(grey(1), 140);
-  EXPECT_LT(grey(2), 100);
-}
-
 TEST_F(Render, TakesSettingsWhilePlaying) {
   begin(grey_at("25/1"));
   push(0, column(1));
@@ -429,12 +267,8 @@ TEST_F(Render, TakesSettingsWhilePlaying) {
   EXPECT_EQ(static_cast<guint8>(bytes[2]), 255);
 }
 
-class RenderByCount : public Render {
- protected:
-  RenderByCount() : Render("eventrender event-count=24") {}
-};
-
-TEST_F(RenderByCount, KeepsTheLastEventsUntilOthersCome) {
+TEST_F(Render, KeepsTheLastEventsUntilOthersCome) {
+  g_object_set(h.element(), "event-count", 24U, nullptr);
   begin(grey_at("25/1"));
   push(0, column(1));
   gst_harness_push_event(h.get(), gst_event_new_gap(40 * ms, 40 * ms));
@@ -467,16 +301,6 @@ TEST_F(Render, LeavesOutPicturesThatComeTooLate) {
   EXPECT_EQ(time, 40 * ms);
   EXPECT_EQ(drawn, 1U);
   EXPECT_EQ(dropped, 1U);
-}
-
-TEST_F(Render, DrawsAsManyPicturesAsASinkThatThrottlesTakes) {
-  begin(grey_at("25/1"));
-  push(0, column(1));
-  wait_for_picture();
-  gst_harness_push_upstream_event(
-      h.get(), gst_event_new_qos(GST_QOS_TYPE_THROTTLE, 1, static_cast<gint64>(80 * ms), 0));
-  for (int i = 1; i < 3; ++i) push(i * 40 * ms, column(i));
-  expect(finish(), {{80 * ms, 40 * ms, accumulated(column(2))}});
 }
 
 /// Live source, and a clock controlled by the test.
@@ -526,21 +350,6 @@ TEST_F(RenderLive, BeginsWithoutAnyEvent) {
   const auto picture = wait_for_picture();
   ASSERT_TRUE(picture);
   EXPECT_TRUE(bytes_of(picture.get()) == blank);
-}
-
-TEST(RenderSilence, BeginsWithoutASegment) {
-  Pipeline pipeline(
-      "appsrc is-live=true format=time "
-      "caps=application/x-event-camera,format=XYTP,width=4,height=4,framerate=0/1 "
-      "! eventrender ! fakesink name=sink");
-  pipeline.set(GST_STATE_PLAYING);
-  GstSample* sample = nullptr;
-  for (int i = 0; i < 100 && sample == nullptr; ++i) {
-    g_usleep(50'000);
-    g_object_get(pipeline["sink"], "last-sample", &sample, nullptr);
-  }
-  ASSERT_NE(sample, nullptr);
-  gst_sample_unref(sample);
 }
 
 TEST_F(RenderLive, IsOnePictureLate) {
@@ -625,14 +434,6 @@ TEST_F(Reconstruct, ShowsBrightnessInGrey) {
   EXPECT_EQ(grey(0), 128);
   EXPECT_GT(grey(1), 160);
   EXPECT_LT(grey(2), 96);
-}
-
-/// Players autoplug it.
-TEST_F(Render, IsADecoderOfVideo) {
-  GstElementFactory* factory = gst_element_get_factory(h.element());
-  EXPECT_TRUE(gst_element_factory_list_is_type(
-      factory, GST_ELEMENT_FACTORY_TYPE_DECODER | GST_ELEMENT_FACTORY_TYPE_MEDIA_VIDEO));
-  EXPECT_EQ(gst_plugin_feature_get_rank(GST_PLUGIN_FEATURE(factory)), GST_RANK_PRIMARY);
 }
 
 }  // namespace

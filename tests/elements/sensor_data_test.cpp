@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/elements/pipeline.hpp"
+#include "tests/elements/harness.hpp"
 
 namespace {
 
@@ -75,43 +75,6 @@ TEST_F(SensorData, RefusesPartialRecords) {
   EXPECT_EQ(gst_event_new_event_camera_triggers(partial.get()), nullptr);
   EXPECT_EQ(gst_event_new_event_camera_imu_samples(partial.get()), nullptr);
   g_log_set_always_fatal(fatal);
-}
-
-/// Triggers that an application sends are stored, and sent by the reader of the file.
-TEST_F(SensorData, TriggersPassThroughAFile) {
-  const auto triggers = bytes_of<GstEventCameraTrigger>({{10, 2, 1}, {20, 3, 0}});
-  harness::Harness writer("evtenc");
-  writer.caps("application/x-event-camera, format=XYTP, width=8, height=4, framerate=0/1", "ANY");
-  gst_harness_push_event(writer.get(), gst_event_new_event_camera_triggers(triggers.get()));
-  writer.push(
-      buffer_of(0, {eventcamera::Event::at(1, 2, 30, eventcamera::Polarity::on)}, GST_MSECOND));
-  gst_harness_push_event(writer.get(), gst_event_new_eos());
-  std::string words;
-  while (const auto buffer = writer.pull()) words += harness::bytes_of(buffer.get());
-  const TemporaryFile file(words);
-  Pipeline reader(file.source() + "evtdec ! fakesink name=sink");
-  std::vector<GstEventCameraTrigger> read;
-  const Owned<GstPad> pad(gst_element_get_static_pad(reader["sink"], "sink"));
-  gst_pad_add_probe(
-      pad.get(), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
-      [](GstPad*, GstPadProbeInfo* info, gpointer to) {
-        const Bytes bytes(gst_event_get_event_camera_triggers(GST_PAD_PROBE_INFO_EVENT(info)));
-        if (!bytes) return GST_PAD_PROBE_OK;
-        gsize size = 0;
-        const auto* records =
-            static_cast<const GstEventCameraTrigger*>(g_bytes_get_data(bytes.get(), &size));
-        auto& all = *static_cast<std::vector<GstEventCameraTrigger>*>(to);
-        all.insert(all.end(), records, records + size / sizeof *records);
-        return GST_PAD_PROBE_OK;
-      },
-      &read, nullptr);
-  ASSERT_TRUE(reader.play()) << reader.error;
-  ASSERT_EQ(read.size(), 2U);
-  EXPECT_EQ(read[1].t - read[0].t, 10);
-  EXPECT_EQ(read[0].input, 2U);
-  EXPECT_EQ(read[0].is_rising, 1U);
-  EXPECT_EQ(read[1].input, 3U);
-  EXPECT_EQ(read[1].is_rising, 0U);
 }
 
 }  // namespace

@@ -204,20 +204,6 @@ TEST(FlowOfFrames, MustHaveTheirSize) {
             "after the video is scaled or cropped.");
 }
 
-TEST(FlowOfFrames, IsUsedForPictures) {
-  const auto pictures = [](bool has_flow) {
-    Harness h("eventsim-dense");
-    h.caps(video, "video/x-raw, format=GRAY8");
-    std::string bytes;
-    for (int i = 0; i < frame_count; ++i) {
-      h.push(has_flow ? frame_of(i, Image<Flow>(width, height)) : frame_of(i));
-      bytes += harness::bytes_of(h.pull().get());
-    }
-    return bytes;
-  };
-  EXPECT_FALSE(pictures(true) == pictures(false));
-}
-
 TEST(FlowOfFrames, IsNotWrittenWhereNoneIsNeeded) {
   Harness h("eventsim-dvs upsampling=linear write-flow=true");
   h.caps(video);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Accepted input, output formats, and the memory of output buffers.
 #include <array>
+#include <cmath>
 
 #include "tests/elements/harness.hpp"
-#include "tests/elements/pipeline.hpp"
 
 namespace {
 
@@ -14,18 +14,14 @@ const std::string size = ", width=32, height=24, framerate=25/1";
 class EverySimulator : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
 
-TEST_P(EverySimulator, MakesEventsWhereDownstreamTakesAnything) {
-  Harness h(GetParam());
-  h.caps("video/x-raw, format=GRAY8" + size, "ANY");
-  EXPECT_EQ(h.out_caps(),
-            "application/x-event-camera, width=(int)32, height=(int)24, framerate=(fraction)25/1, "
-            "format=(string)XYTP");
-}
-
-TEST_P(EverySimulator, MakesEventsWhereDownstreamPrefersVideoButTakesBoth) {
-  Harness h(GetParam());
-  h.caps("video/x-raw, format=GRAY8" + size, "video/x-raw(ANY); application/x-event-camera");
-  EXPECT_EQ(h.out_caps().rfind("application/x-event-camera", 0), 0U) << h.out_caps();
+TEST_P(EverySimulator, MakesEventsWhereDownstreamTakesThem) {
+  for (const char* downstream : {"ANY", "video/x-raw(ANY); application/x-event-camera"}) {
+    Harness h(GetParam());
+    h.caps("video/x-raw, format=GRAY8" + size, downstream);
+    EXPECT_EQ(h.out_caps(),
+              "application/x-event-camera, width=(int)32, height=(int)24, "
+              "framerate=(fraction)25/1, format=(string)XYTP");
+  }
 }
 
 TEST_P(EverySimulator, MakesVideoWhereDownstreamTakesOnlyThat) {
@@ -241,37 +237,6 @@ TEST(Allocation, TellsUpstreamThatAnyStrideIsWelcome) {
   EXPECT_TRUE(gst_query_find_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr));
   gst_query_unref(query);
   gst_caps_unref(caps);
-}
-
-TEST(Allocation, AsksForFramesThatDoNotStraddleCacheLines) {
-  Pipeline pipeline(
-      "videotestsrc num-buffers=8 ! video/x-raw,format=GRAY8,width=640,height=480 ! "
-      "videoconvert ! eventsim-frame name=simulator ! fakesink");
-  int straddling = 0;
-  GstPad* sink = gst_element_get_static_pad(pipeline["simulator"], "sink");
-  gst_pad_add_probe(
-      sink, GST_PAD_PROBE_TYPE_BUFFER,
-      [](GstPad*, GstPadProbeInfo* info, gpointer count) {
-        GstMapInfo map;
-        gst_buffer_map(GST_PAD_PROBE_INFO_BUFFER(info), &map, GST_MAP_READ);
-        if (reinterpret_cast<std::uintptr_t>(map.data) % 64 != 0) ++*static_cast<int*>(count);
-        gst_buffer_unmap(GST_PAD_PROBE_INFO_BUFFER(info), &map);
-        return GST_PAD_PROBE_OK;
-      },
-      &straddling, nullptr);
-  gst_object_unref(sink);
-  EXPECT_TRUE(pipeline.play());
-  EXPECT_EQ(straddling, 0);
-}
-
-TEST(Allocation, TakesPicturesFromAPool) {
-  Harness h("eventsim-frame");
-  h.caps("video/x-raw, format=GRAY8" + size, "video/x-raw, format=GRAY8");
-  h.push(h.flat(0, 50));
-  h.push(h.flat(40 * GST_MSECOND, 50));
-  const auto buffer = h.pull();
-  ASSERT_TRUE(buffer);
-  EXPECT_NE(buffer->pool, nullptr);
 }
 
 }  // namespace

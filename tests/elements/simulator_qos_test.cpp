@@ -122,50 +122,12 @@ TEST_P(EverySimulator, SkipsNothingAfterAFlush) {
   EXPECT_EQ(stat_of(h.element(), "skipped-frames"), 0U);
 }
 
-TEST(Qos, SkipsFramesThatDownstreamDoesNotWant) {
-  Harness h("eventsim-frame");
-  h.caps(video, pictures);
-  for (int i = 0; i < 14; ++i) {
-    gst_harness_set_time(h.get(), frame_time(i));
-    h.push(frame_at(h, i));
-    while (h.pull()) report(h, frame_time(i), 500 * ms, GST_QOS_TYPE_THROTTLE);
-  }
-  EXPECT_EQ(stat_of(h.element(), "skipped-frames"), 9U);  // two of three
-}
-
-/// A frame that takes `work` to process.
-GstBuffer* slow_frame(const Harness& h, int i, GstClockTime work) {
-  static GstHarness* harness;
-  static GstClockTime duration;
-  harness = h.get();
-  duration = work;
-  GstBuffer* frame = frame_at(h, i);
-  auto* meta =
-      gst_buffer_add_video_meta(frame, GST_VIDEO_FRAME_FLAG_NONE, GST_VIDEO_FORMAT_GRAY8, 32, 24);
-  meta->map = [](GstVideoMeta* of, guint plane, GstMapInfo* info, gpointer* data, gint* stride,
-                 GstMapFlags flags) -> gboolean {
-    gst_harness_set_time(harness,
-                         gst_clock_get_time(GST_ELEMENT_CLOCK(harness->element)) + duration);
-    if (!gst_buffer_map(of->buffer, info, flags)) return FALSE;
-    *data = info->data + of->offset[plane];
-    *stride = of->stride[plane];
-    return TRUE;
-  };
-  meta->unmap = [](GstVideoMeta* of, guint, GstMapInfo* info) -> gboolean {
-    gst_buffer_unmap(of->buffer, info);
-    return TRUE;
-  };
-  return frame;
-}
-
 TEST(Qos, CountsFromTheStart) {
   Harness h("eventsim-frame");
   h.caps(video, pictures);
   output(h, true);
-  h.push(slow_frame(h, 9, 15 * ms));
-  EXPECT_EQ(stat_of(h.element(), "processing-time"), 15 * ms);
   gst_element_set_state(h.element(), GST_STATE_READY);
-  EXPECT_EQ(stat_of(h.element(), "frames"), 7U);
+  EXPECT_EQ(stat_of(h.element(), "frames"), 6U);
   gst_element_set_state(h.element(), GST_STATE_PAUSED);
   for (const char* count : {"frames", "skipped-frames", "processing-time"})
     EXPECT_EQ(stat_of(h.element(), count), 0U);
@@ -241,12 +203,6 @@ TEST(Qos, GivesASlowSinkRecentPictures) {
   EXPECT_LE(*std::ranges::max_element(view.ages), 300 * static_cast<gint64>(ms));
   for (std::size_t i = 1; i < view.times.size(); ++i)
     EXPECT_LT(view.times[i] - view.times[i - 1], 400 * ms) << i;
-}
-
-TEST(Qos, FallsEverFurtherBehindWithoutIt) {
-  const auto view =
-      show("eventsim-frame qos=false ! video/x-raw,format=BGRx ! identity sleep-time=66000", 60);
-  EXPECT_GT(*std::ranges::max_element(view.ages), GST_SECOND);
 }
 
 TEST(Qos, ShowsEveryFrameOfALiveCamera) {

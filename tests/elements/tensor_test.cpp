@@ -76,24 +76,6 @@ class Tensor : public testing::Test {
   std::vector<AbsoluteEvent> events;
 };
 
-TEST_F(Tensor, HasAllEventsOfItsPartOfALongBuffer) {
-  begin("representation=histogram accumulation-time=500000000",
-        "application/x-event-camera, format=XYTP, width=1, height=1");
-  std::vector<Event> many;
-  for (std::uint32_t i = 0; i < 17'000'000; ++i)
-    many.push_back(Event::at(0, 0, i / 2, Polarity::on));
-  h->push(buffer_of(0, many, 8'500 * ms));
-  for (int i = 0; i < 17; ++i) {
-    const auto tensor = h->pull();
-    ASSERT_TRUE(tensor);
-    const auto counts = bytes_of(tensor.get());
-    EXPECT_EQ(reinterpret_cast<const float*>(counts.data())[0] +
-                  reinterpret_cast<const float*>(counts.data())[1],
-              1e6F);
-  }
-  EXPECT_EQ(h->warning(), "");
-}
-
 TEST_F(Tensor, IsOneOfEachBufferByDefault) {
   begin("");
   push_columns(0, 1);
@@ -122,42 +104,11 @@ TEST_F(Tensor, HasTheSettings) {
       << h->out_caps();
 }
 
-TEST_F(Tensor, OverlapsByCount) {
-  begin("event-count=4 overlap=0.5");
-  push_columns(0, 3);
-  expect_tensor(3'333'000, 13'333'000, 0, 4);
-  expect_tensor(13'333'000, 13'333'000, 2, 6);
-  expect_tensor(23'333'000, 13'333'000, 4, 8);
-  end();
-  EXPECT_FALSE(h->pull());
-  EXPECT_NE(h->out_caps().find("framerate=(fraction)0/1"), std::string::npos);
-}
-
-TEST_F(Tensor, EndsWithAShortWindow) {
-  begin("accumulation-time=25000000");
-  push_columns(0, 2);
-  end();
-  expect_tensor(0, 25 * ms, 0, 5);
-  expect_tensor(25 * ms, 5 * ms, 5, 6);
-  EXPECT_FALSE(h->pull());
-}
-
 TEST_F(Tensor, EndsWithTheSegment) {
   begin("accumulation-time=25000000");
   push_columns(0, 0);
   gst_harness_push_event(h->get(), gst_event_new_segment_done(GST_FORMAT_TIME, 10 * ms));
   expect_tensor(0, 10 * ms, 0, 2);
-}
-
-TEST_F(Tensor, IsNotMovedByEventsPastTheEndOfTheirBuffer) {
-  begin("accumulation-time=20000000");
-  events = {{3'333, 0, Event::at(0, 1, 0, Polarity::on).y_p}};
-  h->push(buffer_of(
-      0, {Event::at(0, 1, 3'333, Polarity::on), Event::at(0, 2, 900'000, Polarity::on)}, 10 * ms));
-  EXPECT_NE(h->warning().find("later than the end of their buffer"), std::string::npos);
-  push_columns(1, 3);
-  expect_tensor(0, 20 * ms, 0, 3);
-  expect_tensor(20 * ms, 20 * ms, 3, 7);
 }
 
 TEST_F(Tensor, GoesOnThroughGaps) {
@@ -188,31 +139,11 @@ TEST_F(Tensor, IsNotMadeOfLongPauses) {
   EXPECT_EQ(h->warning(), "");
 }
 
-TEST_F(Tensor, ComesAfterNoLaterGapOfUnknownLength) {
-  begin("accumulation-time=20000000");
-  push_columns(0, 0);
-  gst_harness_push_event(h->get(), gst_event_new_gap(10 * ms, GST_CLOCK_TIME_NONE));
-  push_columns(1, 1);
-  expect_tensor(0, 20 * ms, 0, 4);
-  EXPECT_FALSE(h->pull_event(GST_EVENT_GAP));
-}
-
 TEST_F(Tensor, IsOneOfAGapWhereWindowsAreBuffers) {
   begin("frame-count=2");
   push_columns(0, 0);
   gst_harness_push_event(h->get(), gst_event_new_gap(10 * ms, 10 * ms));
   expect_tensor(0, 20 * ms, 0, 2);
-}
-
-TEST_F(Tensor, ForgetsAtAFlush) {
-  begin("accumulation-time=20000000");
-  push_columns(0, 0);
-  flush({h->get()});
-  push_segment(h->get());
-  events.clear();
-  push_columns(1, 2);
-  expect_tensor(10 * ms, 20 * ms, 0, 4);
-  EXPECT_FALSE(h->pull());
 }
 
 TEST_F(Tensor, StartsAtTheSegment) {
@@ -251,15 +182,6 @@ TEST_F(Tensor, FollowsNewCaps) {
   EXPECT_NE(h->out_caps().find("dimensions=(string)64:48:1:1"), std::string::npos);
 }
 
-TEST_F(Tensor, GoesOnWithCapsOfTheSameSize) {
-  begin("accumulation-time=50000000");
-  push_columns(0, 2);
-  gst_harness_set_src_caps_str(
-      h->get(), "application/x-event-camera, format=XYTP, width=32, height=24, framerate=50/1");
-  push_columns(3, 4);
-  expect_tensor(0, 50 * ms, 0, 10);
-}
-
 TEST_F(Tensor, TellsWhatToSetForTheTensorsThatDownstreamWants) {
   const std::pair<const char*, const char*> wishes[] = {
       {"types=uint8", "types=uint8 (set data-type)."},
@@ -289,23 +211,6 @@ TEST_F(Tensor, RefusesToBeHuge) {
             "Cannot make tensors that take more than 1 GiB; lower bins or the resolution.");
 }
 
-TEST_F(Tensor, RefusesToRunBackwards) {
-  begin("");
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  segment.rate = -1;
-  segment.stop = GST_SECOND;
-  gst_harness_push_event(h->get(), gst_event_new_segment(&segment));
-  EXPECT_EQ(h->error(), "Cannot make tensors of events backwards; play at a positive rate.");
-  EXPECT_EQ(h->push(buffer_of(0, column(0), 10 * ms)), GST_FLOW_ERROR);
-}
-
-TEST_F(Tensor, HasWindowsOfAMicrosecondOrMore) {
-  begin("accumulation-time=1 representation=event-frame");
-  EXPECT_EQ(h->push(buffer_of(0, {}, 10 * GST_USECOND)), GST_FLOW_OK);
-  EXPECT_EQ(gst_harness_buffers_received(h->get()), 10U);
-}
-
 /// The result of tensors in place of a GAP.
 TEST_F(Tensor, ReturnsWhatDownstreamSaidOfAGap) {
   begin("accumulation-time=10000000");
@@ -315,13 +220,6 @@ TEST_F(Tensor, ReturnsWhatDownstreamSaidOfAGap) {
   gst_pad_set_active((*h)->sinkpad, TRUE);
   EXPECT_EQ(h->push(buffer_of(20 * ms, column(0), 10 * ms)), GST_FLOW_FLUSHING);
   EXPECT_EQ(h->push(buffer_of(20 * ms, column(0), 10 * ms)), GST_FLOW_OK);
-}
-
-TEST_F(Tensor, WarnsOfEventsOutsideTheSensor) {
-  begin("");
-  EXPECT_EQ(h->push(buffer_of(0, {Event::at(width, 0, 0, Polarity::on)}, 10 * ms)), GST_FLOW_OK);
-  EXPECT_NE(h->warning().find("outside the sensor"), std::string::npos);
-  expect_tensor(0, 10 * ms, 0, 0);
 }
 
 TEST_F(Tensor, TakesALatencyOfItsWindow) {

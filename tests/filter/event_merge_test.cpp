@@ -85,7 +85,7 @@ Stream merged(std::vector<Source>& sources) {
   }
 }
 
-/// All events in order of time, those of one microsecond in the order of the sources.
+/// All events in order of time and, within a microsecond, of the sources.
 Stream sorted(const std::vector<Source>& sources) {
   Stream all;
   for (const auto& source : sources) {

@@ -183,31 +183,6 @@ TEST(Flicker, TakesAnEmptyBandAndInvertedThresholdsAsTheNearestValid) {
       valid);
 }
 
-TEST(Flicker, DropsALampInTheBand) {
-  const auto kept_in = [](unsigned min_frequency, double frequency, double duty_cycle,
-                          double sought_duty_cycle) {
-    const Events events = lamp(frequency, duty_cycle, 1'000'000);
-    eventcamera::FlickerFilter core(sensor);
-    return static_cast<double>(filtered(core, events,
-                                        {.min_frequency = min_frequency,
-                                         .max_frequency = 130,
-                                         .duty_cycle = sought_duty_cycle},
-                                        100)
-                                   .size()) /
-           static_cast<double>(events.size());
-  };
-  const auto kept = [&](double frequency, double duty_cycle) {
-    return kept_in(90, frequency, duty_cycle, 0.5);
-  };
-  EXPECT_LT(kept(100, 0.5), 0.05);
-  EXPECT_LT(kept(120, 0.5), 0.05);
-  EXPECT_EQ(kept(100, 0.1), 1);
-  EXPECT_EQ(kept(60, 0.5), 1);
-  EXPECT_EQ(kept(300, 0.5), 1);
-  for (int tenths = 1; tenths <= 9; ++tenths)
-    EXPECT_LT(kept_in(100, 100, tenths / 10.0, tenths / 10.0), 0.05) << tenths;
-}
-
 TEST(HotPixels, AreThoseOfTheReference) {
   for (const double ratio : {1.5, 4.0})
     expect_same<HotPixelFilter>({.learning_period = 300'000'000, .min_rate = 20, .ratio = ratio},
@@ -255,19 +230,6 @@ TEST(HotPixels, AreLearntAnewWhenSettingsChange) {
   HotPixelFilter shortened(sensor);
   EXPECT_EQ(fires(shortened, 0, 15, second / 20, {.learning_period = 3'600'000'000'000}), 0U);
   EXPECT_EQ(fires(shortened, second, 45, second / 20, {}), 1U);
-}
-
-TEST(HotPixels, AreFoundInASceneThatMoves) {
-  const Events events = made_scene(sensor);
-  HotPixelFilter core(sensor);
-  const auto kept = filtered(core, events, {.min_rate = 50}, 1000);
-  const auto of_hot = [](const Events& all) {
-    return std::ranges::count_if(all, [](const auto& event) {
-      return event.x == sensor.width / 2 && event.y() == sensor.height - 1;
-    });
-  };
-  EXPECT_LT(of_hot(kept), of_hot(events) / 2);
-  EXPECT_GT(kept.size(), events.size() - static_cast<std::size_t>(of_hot(events)) - 100);
 }
 
 TEST(PixelList, IsReadAsWritten) {
@@ -334,14 +296,6 @@ TEST(Rate, AddsUpFractionsOfEvents) {
     EXPECT_EQ(kept_of(1000), 1000);
     for (const Microseconds distance : {2, 500}) EXPECT_NEAR(kept_of(distance), 1000, 2);
   }
-}
-
-TEST(Rate, OfABurstAtOneTimeIsLimited) {
-  const Events events = random_events(sensor, 100'000, 0, 1);
-  RateFilter core(sensor);
-  const auto kept = filtered(core, events, {.max_rate = 100'000}, 100'000);
-  // Half more than 1000: the size of the burst is not known in advance.
-  EXPECT_EQ(kept.size(), 1500U);
 }
 
 TEST(Rate, OfAlternatingLoadIsLimited) {

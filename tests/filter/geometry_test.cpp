@@ -6,8 +6,13 @@
 
 #include <array>
 #include <cmath>
+#include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "src/filter/camera_calibration.hpp"
 #include "src/filter/crop_filter.hpp"
@@ -17,7 +22,6 @@
 #include "src/filter/scale_filter.hpp"
 #include "src/filter/undistort_filter.hpp"
 #include "tests/filter/streams.hpp"
-#include "tests/reference/geometry.hpp"
 
 namespace {
 
@@ -30,9 +34,45 @@ using eventcamera::PixelMask;
 using eventcamera::PolarityFilter;
 using eventcamera::ScaleFilter;
 using eventcamera::UndistortFilter;
-using reference::Pixel;
+
+using Pixel = std::pair<int, int>;
 
 constexpr SensorSize sensor{37, 23};
+
+namespace reference {
+
+/// Moves each event to the pixel that move(x, y) returns, if any.
+template <class Move>
+Events moved(const Events& events, const Move& move) {
+  Events result;
+  for (const auto& event : events)
+    if (const std::optional<Pixel> pixel = move(event.x, event.y()))
+      result.push_back(AbsoluteEvent::at(pixel->first, pixel->second, event.t, event.polarity()));
+  return result;
+}
+
+/// Events of the output's pixels: the last of `min_events`, but not two in a microsecond.
+Events scaled(const Events& events, SensorSize in, SensorSize out, unsigned min_events) {
+  struct Cell {
+    unsigned count = 0;
+    std::optional<Microseconds> last{};
+  };
+  std::map<std::tuple<int, int, Polarity>, Cell> cells;
+  Events result;
+  for (const auto& event : events) {
+    const int x = event.x * out.width / in.width;
+    const int y = event.y() * out.height / in.height;
+    auto& cell = cells[{x, y, event.polarity()}];
+    if (++cell.count < min_events) continue;
+    cell.count = 0;
+    if (cell.last == event.t) continue;
+    cell.last = event.t;
+    result.push_back(AbsoluteEvent::at(x, y, event.t, event.polarity()));
+  }
+  return result;
+}
+
+}  // namespace reference
 
 /// A filter that depends on neither time nor settings, as others.
 template <class Core>
@@ -53,47 +93,13 @@ Events streams_of_all_pixels() {
   return events;
 }
 
-/// What a filter makes of a stream in buffers of up to `max_buffer` events, with or without labels.
-/// Checks that label i is that of event i: the number of the event.
-template <class Core>
-Events cut_and_filtered(Core& core, const Events& events, const typename Core::Settings& settings,
-                        std::size_t max_buffer, bool is_labelled) {
-  std::mt19937 random(7);  // NOLINT(bugprone-random-generator-seed): reproducible
-  Events kept;
-  std::size_t last_label = 0;
-  for (std::size_t done = 0; done < events.size();) {
-    const auto count = std::min<std::size_t>(events.size() - done, 1 + random() % max_buffer);
-    const Microseconds start = events[done].t - static_cast<Microseconds>(random() % 1000);
-    std::vector<Event> buffer;
-    std::vector<Label> labels;
-    for (std::size_t i = done; i < done + count; ++i) {
-      buffer.push_back(
-          {static_cast<std::uint32_t>(events[i].t - start), events[i].x, events[i].y_p});
-      if (is_labelled) labels.push_back({.object_class = static_cast<std::uint16_t>(i - done)});
-    }
-    const LabelledEvents left = core.filter({buffer, labels}, start, settings);
-    EXPECT_EQ(left.labels.size(), is_labelled ? left.events.size() : 0U);
-    for (std::size_t i = 0; i < left.events.size(); ++i) {
-      const Event& event = left.events[i];
-      kept.push_back({start + event.t, event.x, event.y_p});
-      if (!is_labelled) continue;
-      const auto& before = events[done + left.labels[i].object_class];
-      EXPECT_EQ(before.t, start + event.t);
-      EXPECT_TRUE(i == 0 || left.labels[i].object_class > last_label);
-      last_label = left.labels[i].object_class;
-    }
-    done += count;
-  }
-  return kept;
-}
-
 template <class Make>
 void expect_same(const Make& make, const auto& settings, const Events& events,
                  const Events& expected) {
   for (const std::size_t max_buffer : {std::size_t{1}, std::size_t{60}, std::size_t{60'000}}) {
     for (const bool is_labelled : {false, true}) {
       auto core = make();
-      EXPECT_TRUE(cut_and_filtered(core, events, settings, max_buffer, is_labelled) == expected)
+      EXPECT_TRUE(filtered(core, events, settings, max_buffer, 7, is_labelled) == expected)
           << "buffers of " << max_buffer;
     }
   }
@@ -166,16 +172,16 @@ TEST(Scale, MergesWhereMomentsStartOver) {
     events.insert(events.end(), 1 + static_cast<std::size_t>(t % 3 == 0),
                   AbsoluteEvent::at(static_cast<int>(t % 37), 3, t, Polarity::on));
   ScaleFilter core(sensor, {10, 10});
-  EXPECT_TRUE(cut_and_filtered(core, events, {1}, 10'000, false) ==
+  EXPECT_TRUE(filtered(core, events, {1}, 10'000) ==
               reference::scaled(events, sensor, {10, 10}, 1));
 }
 
 TEST(Scale, ForgetsWhatItCounted) {
   const Events events = streams_of_all_pixels();
   ScaleFilter core(sensor, {10, 10});
-  const auto first = cut_and_filtered(core, events, {3}, 1000, false);
+  const auto first = filtered(core, events, {3}, 1000);
   core.forget();
-  EXPECT_TRUE(cut_and_filtered(core, events, {3}, 1000, false) == first);
+  EXPECT_TRUE(filtered(core, events, {3}, 1000) == first);
 }
 
 /* masks */
@@ -297,19 +303,21 @@ TEST(Calibration, IsReadFromXml) {
 }
 
 TEST(Calibration, SaysWhatIsWrong) {
-  const auto error = [](const std::string& yaml) {
-    return error_of<std::invalid_argument>([&] { eventcamera::parse_calibration(yaml); });
-  };
-  EXPECT_EQ(error(""), "it has no camera_matrix");
-  EXPECT_NE(error("a: [").find("line"), std::string::npos);
-  EXPECT_EQ(error("<?xml?>"), "it has no camera_matrix");
-  EXPECT_EQ(error("<?xml?><a"), "its last tag has no end");
-  EXPECT_EQ(error(opencv_xml("x")), "distortion_coefficients has \"x\" in place of a number");
-  EXPECT_EQ(error("camera_matrix: [1, 2]"), "camera_matrix has 2 numbers, not 9");
-  EXPECT_EQ(error("camera_matrix: [x]"), "camera_matrix has \"x\" in place of a number");
-  EXPECT_NE(error("camera_matrix: [0, 0, 0, 0, 1, 0, 0, 0, 1]").find("focal"), std::string::npos);
-  EXPECT_NE(error(opencv_yaml("0, 0, 0, 0, 0, 0.1")).find("more than 5"), std::string::npos);
-  EXPECT_NE(error(opencv_yaml("0", "distortion_model: odd\n")).find("odd"), std::string::npos);
+  const std::pair<std::string, std::string> errors[] = {
+      {"", "no camera_matrix"},
+      {"a: [", "line"},
+      {"<?xml?>", "no camera_matrix"},
+      {"<?xml?><a", "no end"},
+      {opencv_xml("x"), "\"x\" in place of a number"},
+      {"camera_matrix: [1, 2]", "2 numbers, not 9"},
+      {"camera_matrix: [0, 0, 0, 0, 1, 0, 0, 0, 1]", "focal"},
+      {opencv_yaml("0, 0, 0, 0, 0, 0.1"), "more than 5"},
+      {opencv_yaml("0", "distortion_model: odd\n"), "odd"}};
+  for (const auto& [file, words] : errors) {
+    const auto error =
+        error_of<std::invalid_argument>([&text = file] { eventcamera::parse_calibration(text); });
+    EXPECT_NE(error.find(words), std::string::npos) << error;
+  }
 }
 
 /// Undistorting is the inverse of the model's equations.
@@ -359,13 +367,6 @@ TEST(Undistort, MovesEventsAndDropsThoseThatLeaveThePicture) {
   EXPECT_LT(expected.size(), events.size());
   expect_same([&] { return Adapted<UndistortFilter>{UndistortFilter(sensor, calibration)}; },
               Adapted<UndistortFilter>::Settings{}, events, expected);
-}
-
-TEST(Undistort, LeavesAPerfectLensAlone) {
-  const Events events = streams_of_all_pixels();
-  const CameraCalibration calibration{.fx = 20, .fy = 21, .cx = 18, .cy = 11};
-  Adapted<UndistortFilter> core{UndistortFilter(sensor, calibration)};
-  EXPECT_TRUE(cut_and_filtered(core, events, {}, 1000, true) == events);
 }
 
 }  // namespace

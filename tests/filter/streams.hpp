@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <random>
 #include <vector>
 
@@ -67,7 +68,7 @@ inline Events made_scene(SensorSize sensor, unsigned seed = 1) {
   return events;
 }
 
-/// What a filter keeps of a stream that reaches it in buffers of 1 to `max_buffer` events. Checks
+/// What a filter makes of a stream that reaches it in buffers of 1 to `max_buffer` events. Checks
 /// that labels stay with their events.
 template <eventcamera::Filter Core>
 Events filtered(Core& core, const Events& events, const typename Core::Settings& settings,
@@ -83,7 +84,7 @@ Events filtered(Core& core, const Events& events, const typename Core::Settings&
     for (std::size_t i = done; i < done + count; ++i) {
       buffer.push_back(
           {static_cast<std::uint32_t>(events[i].t - start), events[i].x, events[i].y_p});
-      if (is_labelled) labels.push_back({.object_class = buffer.back().x});
+      if (is_labelled) labels.push_back({.object_class = static_cast<std::uint16_t>(events[i].t)});
     }
     const LabelledEvents left = core.filter({buffer, labels}, start, settings);
     EXPECT_EQ(left.labels.size(), is_labelled ? left.events.size() : 0U);
@@ -91,7 +92,7 @@ Events filtered(Core& core, const Events& events, const typename Core::Settings&
       const Event& event = left.events[i];
       kept.push_back({start + event.t, event.x, event.y_p});
       if (!left.labels.empty()) {
-        EXPECT_EQ(left.labels[i].object_class, event.x);
+        EXPECT_EQ(left.labels[i].object_class, static_cast<std::uint16_t>(start + event.t));
       }
     }
     done += count;

@@ -33,10 +33,6 @@ constexpr Method methods[] = {{"dis_lq", FlowMethod::dis_lq},
                               {"farneback", FlowMethod::farneback},
                               {"opencv_dis", FlowMethod::opencv_dis}};
 
-void PrintTo(const Method& method, std::ostream* out) {
-  *out << method.name;
-}
-
 class EveryFlow : public testing::TestWithParam<std::tuple<Method, Pictures>> {
  protected:
   Image<Flow> flow_of(const Picture& from, const Picture& to) {

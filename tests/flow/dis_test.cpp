@@ -4,14 +4,34 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/video/tracking.hpp>
 #include <tuple>
 
+#include "src/flow/opencv.hpp"
 #include "tests/flow/moving_pictures.hpp"
-#include "tests/flow/opencv_dis.hpp"
 
 namespace {
 
 using namespace eventcamera;
+
+/// OpenCV's implementation of DIS with the parameters of ours, for images of at least 64x64 pixels.
+Image<Flow> opencv_dis(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
+                       const DisFlow::Quality& quality) {
+  const auto dis = cv::DISOpticalFlow::create();
+  dis->setPatchSize(quality.patch);
+  dis->setPatchStride(quality.stride);
+  dis->setGradientDescentIterations(quality.iterations);
+  dis->setFinestScale(quality.finest_scale(from.width(), from.height()));
+  dis->setUseSpatialPropagation(false);
+  regularise(*dis);
+  cv::Mat flow;
+  // Contiguous rows, as it requires.
+  dis->calc(opencv_image(from.view()).clone(), opencv_image(to.view()).clone(), flow);
+  Image<Flow> result(from.width(), from.height());
+  result.assign(
+      {flow.ptr<Flow>(), static_cast<std::ptrdiff_t>(flow.step[0]), from.width(), from.height()});
+  return result;
+}
 
 class Dis : public testing::TestWithParam<std::tuple<bool, Pictures>> {};
 

@@ -131,22 +131,6 @@ TEST_P(EverySize, SearchesAreTheSameOnEveryTarget) {
   }
 }
 
-TEST(PointTracker, FollowsATexture) {
-  const auto from = scene::texture<std::uint8_t>(160, 120, 8, 0, 0);
-  const auto to = scene::texture<std::uint8_t>(160, 120, 8, -4, 2);
-  ThreadPool threads;
-  PointTracker tracker(2);
-  tracker.push(from.view(), threads);
-  tracker.push(to.view(), threads);
-  const Point points[] = {{100, 40}, {60, 50}, {80, 70}};
-  for (const auto& track : tracker.track(points, threads)) {
-    EXPECT_TRUE(track.found);
-    EXPECT_NEAR(track.flow.x, 4, 0.1);
-    EXPECT_NEAR(track.flow.y, -2, 0.1);
-  }
-  EXPECT_TRUE(tracker.track({}, threads).empty());
-}
-
 TEST(PointTracker, LosesWhatHasNoTexture) {
   const auto picture = scene::flat<std::uint8_t>(60, 40, 90);
   ThreadPool threads;

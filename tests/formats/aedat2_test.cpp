@@ -5,43 +5,49 @@
 
 #include "src/formats/aedat/aedat2_decoder.hpp"
 #include "tests/formats/aedat_files.hpp"
-#include "tests/formats/pieces.hpp"
-#include "tests/formats/random_events.hpp"
+#include "tests/formats/recordings.hpp"
 #include "tests/formats/shared_data.hpp"
 
 namespace {
 
 using namespace eventcamera;
 using aedat_files::Bytes;
-using pieces::decoded;
+using recordings::decode;
+using recordings::Events;
 
 constexpr SensorSize davis346{346, 260};
 constexpr SensorSize dvs128{128, 128};
 constexpr Microseconds hour = 3'600'000'000;
 
-TEST(Aedat2, Davis) {
-  const auto events = random_events::make(davis346, 30'000, 1, 0, {hour});
-  const auto bytes =
-      aedat_files::aedat2_davis(events, davis346, "eu.seebetter.ini.chips.davis.Davis346blue");
-  pieces::expect_events<Aedat2Decoder>(bytes, events, davis346);
+Events some_events(SensorSize size) {
+  return recordings::random_events(size, 30'000, 1, 5, hour);
 }
 
-TEST(Aedat2, Dvs128) {
-  const auto events = random_events::make(dvs128, 30'000, 2, 5, {hour});
-  const auto bytes = aedat_files::aedat2_dvs128(events);
-  pieces::expect_events<Aedat2Decoder>(bytes, events, dvs128);
+/// Expects these events and this sensor without corruption, for any split.
+void expect_events(const Bytes& bytes, const Events& events, SensorSize size,
+                   Aedat2Version version = Aedat2Version::two) {
+  EXPECT_TRUE(recordings::events_however_split(
+                  [&] { return std::make_unique<Aedat2Decoder>(SensorSize{}, version); }, bytes) ==
+              events);
+  Aedat2Decoder decoder({}, version);
+  decode(decoder, bytes);
+  EXPECT_EQ(decoder.size(), size);
+  EXPECT_EQ(decoder.corruption().places + decoder.corruption().outside, 0U);
 }
 
-TEST(Aedat1, Dvs128) {
-  const auto events = random_events::make(dvs128, 30'000, 3, 5, {hour});
-  const auto bytes = aedat_files::aedat1(events);
-  for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}, std::size_t{0}}) {
-    Aedat2Decoder decoder({}, Aedat2Version::one);
-    EXPECT_TRUE(decoded(decoder, bytes, piece).events == events);
-    EXPECT_EQ(decoder.size(), dvs128);
-    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
-    EXPECT_EQ(decoder.corruption().outside, 0U);
-  }
+TEST(Aedat2, ReadsTheFilesOfEveryProgram) {
+  const SensorSize v2e640{640, 480};
+  const auto davis = some_events(davis346);
+  const auto dvs = some_events(dvs128);
+  const auto v2e = some_events(v2e640);
+  expect_events(
+      aedat_files::aedat2_davis(davis, davis346, "eu.seebetter.ini.chips.davis.Davis346blue"),
+      davis, davis346);
+  expect_events(aedat_files::aedat2_dvs128(dvs), dvs, dvs128);
+  expect_events(aedat_files::aedat1(dvs), dvs, dvs128, Aedat2Version::one);
+  // No camera is named: the addresses tell.
+  expect_events(aedat_files::aedat2_v2e(v2e, v2e640), v2e, v2e640);
+  expect_events(aedat_files::aedat2_of_matlab(dvs), dvs, dvs128);
 }
 
 TEST(Aedat1, RecordsAsTheFormatHasThem) {
@@ -52,7 +58,7 @@ TEST(Aedat1, RecordsAsTheFormatHasThem) {
        {0x02, 0x13, 0x00, 0x00, 0x01, 0x02, 0x80, 0x00, 0x00, 0x00, 0x01, 0x03})
     bytes.push_back(byte);
   Aedat2Decoder decoder({}, Aedat2Version::one);
-  const auto out = decoded(decoder, bytes);
+  const auto out = decode(decoder, bytes);
   EXPECT_EQ(out.events, (std::vector{AbsoluteEvent::at(118, 125, 0x102, Polarity::off)}));
   EXPECT_EQ(out.triggers, (std::vector<Trigger>{{0x103, 0, true}}));
 }
@@ -66,7 +72,7 @@ TEST(Aedat2, AddressesAsTheFormatHasThem) {
   aedat_files::add_record(bytes, 1U << 10 | 2, 1004);                    // falling edge
   aedat_files::add_record(bytes, 9U << 22 | 4U << 12 | 1U << 10, 1005);  // v2e noise event
   Aedat2Decoder decoder;
-  const auto out = decoded(decoder, bytes);
+  const auto out = decode(decoder, bytes);
   EXPECT_EQ(decoder.size(), (SensorSize{240, 180}));
   EXPECT_EQ(out.events, (std::vector{AbsoluteEvent::at(236, 172, 1000, Polarity::on),
                                      AbsoluteEvent::at(235, 170, 1005, Polarity::off)}));
@@ -77,50 +83,33 @@ TEST(Aedat2, AddressesAsTheFormatHasThem) {
   aedat_files::add_record(bytes, 2U << 8 | 9U << 1 | 1, 51);
   aedat_files::add_record(bytes, 0x8000, 52);
   Aedat2Decoder other;
-  const auto of_dvs = decoded(other, bytes);
+  const auto of_dvs = decode(other, bytes);
   EXPECT_EQ(of_dvs.events, (std::vector{AbsoluteEvent::at(118, 125, 50, Polarity::on),
                                         AbsoluteEvent::at(118, 125, 51, Polarity::off)}));
   EXPECT_EQ(of_dvs.triggers, (std::vector<Trigger>{{52, 0, true}}));
 }
 
-TEST(Aedat2, WrapsAreFollowedThroughSilence) {
-  std::vector<AbsoluteEvent> events;
-  Microseconds t = 0;
-  for (int i = 0; i < 40; ++i) {
-    events.push_back(AbsoluteEvent::at(i, i, t, Polarity::on));
-    events.push_back(AbsoluteEvent::at(i, i, t + 3, Polarity::off));
-    t += 70LL * 60 * 1'000'000;  // a wrap takes 71.6 minutes
-  }
-  Aedat2Decoder decoder;
-  EXPECT_TRUE(decoded(decoder, aedat_files::aedat2_dvs128(events)).events == events);
-  EXPECT_EQ(decoder.corruption().places, 0U);
-}
-
-TEST(Aedat2, DisorderIsKeptEvenAcrossAWrap) {
-  const auto wrap = Microseconds{1} << 32;
-  std::vector<AbsoluteEvent> events;
-  for (const auto t : {wrap / 2 - 2, wrap / 2 + 1, wrap / 2 - 1, wrap / 2 + 2, wrap / 2 - 500})
-    events.push_back(AbsoluteEvent::at(1, 1, t, Polarity::on));
-  Aedat2Decoder decoder;
-  EXPECT_TRUE(decoded(decoder, aedat_files::aedat2_dvs128(events)).events == events);
-}
-
-TEST(Aedat2, WhereNoCameraIsNamedTheAddressesTell) {
-  const SensorSize v2e640{640, 480};
-  const auto of_v2e = random_events::make(v2e640, 3000, 7, 0, {hour});
-  pieces::expect_events<Aedat2Decoder>(aedat_files::aedat2_v2e(of_v2e, v2e640), of_v2e, v2e640);
-  const auto few = random_events::make(dvs128, 3000, 8, 0, {hour});
-  pieces::expect_events<Aedat2Decoder>(aedat_files::aedat2_of_matlab(few), few, dvs128);
+TEST(Aedat2, WrapsAreFollowedThroughSilenceAndDisorder) {
+  constexpr auto wrap = Microseconds{1} << 32;
+  Events silence;
+  for (int i = 0; i < 40; ++i)
+    for (const int j : {0, 3})  // a wrap takes 71.6 minutes
+      silence.push_back(AbsoluteEvent::at(i, i, 70LL * 60 * 1'000'000 * i + j, Polarity::on));
+  Events disorder;
+  for (const auto t : {wrap / 2 - 2, wrap / 2 - 3, wrap / 2 + 1, wrap / 2 - 1, wrap / 2 - 500})
+    disorder.push_back(AbsoluteEvent::at(1, 1, t, Polarity::on));
+  for (const auto& events : {silence, disorder})
+    expect_events(aedat_files::aedat2_dvs128(events), events, dvs128);
 }
 
 TEST(Aedat2, TheHeaderOrTheUserTellsTheSizeOfADavis) {
   for (const SensorSize size : {SensorSize{240, 180}, davis346}) {
-    const auto events = random_events::make(size, 3000, 9, 0, {hour});
+    const auto events = some_events(size);
     const auto text = std::to_string(size.width) + "x" + std::to_string(size.height);
     for (const std::string& line : {"# sensor size " + text + "\r\n", std::string()}) {
       const auto bytes = aedat_files::aedat2_v2e(events, size, line);
       Aedat2Decoder decoder(line.empty() ? size : SensorSize{});
-      EXPECT_TRUE(decoded(decoder, bytes).events == events) << line;
+      EXPECT_TRUE(decode(decoder, bytes).events == events) << line;
       EXPECT_EQ(decoder.size(), size);
       EXPECT_FALSE(decoder.streams().front().mirrored);
     }
@@ -128,55 +117,50 @@ TEST(Aedat2, TheHeaderOrTheUserTellsTheSizeOfADavis) {
   auto bytes = aedat_files::aedat2_header("DAVI346");
   aedat_files::add_record(bytes, 7U << 22 | 3U << 12 | 1U << 11, 1000);
   Aedat2Decoder decoder(davis346);
-  EXPECT_EQ(decoded(decoder, bytes).events,
+  EXPECT_EQ(decode(decoder, bytes).events,
             std::vector{AbsoluteEvent::at(342, 252, 1000, Polarity::on)});
 }
 
 TEST(Aedat2, WithoutASizeEventsStayMirrored) {
   const SensorSize size{240, 180};
-  const auto events = random_events::make(size, 3000, 10, 0, {hour});
-  for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}}) {
-    Aedat2Decoder decoder;
-    auto turned = decoded(decoder, aedat_files::aedat2_v2e(events, size), piece).events;
-    EXPECT_EQ(decoder.size(), SensorSize{});
-    EXPECT_TRUE(decoder.streams().front().mirrored);
-    for (auto& event : turned)
-      event = AbsoluteEvent::at(239 - event.x, 179 - event.y(), event.t, event.polarity());
-    EXPECT_TRUE(turned == events);
-    EXPECT_EQ(decoder.corruption().places + decoder.corruption().outside, 0U);
-  }
+  const auto events = some_events(size);
+  Aedat2Decoder decoder;
+  auto turned = decode(decoder, aedat_files::aedat2_v2e(events, size), 1).events;
+  EXPECT_EQ(decoder.size(), SensorSize{});
+  EXPECT_TRUE(decoder.streams().front().mirrored);
+  for (auto& event : turned)
+    event = AbsoluteEvent::at(239 - event.x, 179 - event.y(), event.t, event.polarity());
+  EXPECT_TRUE(turned == events);
+  EXPECT_EQ(decoder.corruption().places + decoder.corruption().outside, 0U);
 }
 
 TEST(Aedat2, WhatIsNotAedat2IsRefused) {
   for (const std::string_view text : {"", "#", "#!AER-DAT3.1\r\n", "#!AER-DAT4.0\r\n",
                                       "% evt 3.0\n", "#!AER-DAT2.0\r\n# AEChip: Cochlea\r\n"}) {
-    const Bytes bytes(text.begin(), text.end());
     Aedat2Decoder decoder;
-    EXPECT_THROW(decoded(decoder, bytes), UnsupportedFormat) << text;
+    EXPECT_THROW(decode(decoder, recordings::bytes_of(text)), UnsupportedFormat) << text;
   }
 }
 
 TEST(Aedat2, MissingBytesCostNoMoreThanTheNextFewRecords) {
-  const auto events = random_events::make(dvs128, 2000, 4, 1'000'000'000, {1000});
+  const auto events = recordings::random_events(dvs128, 2000, 4, 1'000'000'000, 1000);
   const auto sound = aedat_files::aedat2_dvs128(events);
   const auto data = sound.size() - 8 * events.size();
   for (std::size_t missing = 1; missing < 8; ++missing) {
     auto bytes = sound;
     const auto at = static_cast<std::ptrdiff_t>(data + 8 * 1000 + 3);
     bytes.erase(bytes.begin() + at, bytes.begin() + at + static_cast<std::ptrdiff_t>(missing));
-    for (const std::size_t piece : {1000, 1}) {
-      Aedat2Decoder decoder;
-      const auto found = decoded(decoder, bytes, piece).events;
-      EXPECT_GE(found.size(), 1990U);
-      EXPECT_TRUE(std::equal(events.end() - 990, events.end(), found.end() - 990)) << missing;
-      EXPECT_EQ(decoder.corruption().places, 1U);
-      EXPECT_NEAR(static_cast<double>(decoder.corruption().first_at), static_cast<double>(at), 16);
-    }
+    Aedat2Decoder decoder;
+    const auto found = decode(decoder, bytes, 1).events;
+    EXPECT_GE(found.size(), 1990U);
+    EXPECT_TRUE(std::equal(events.end() - 990, events.end(), found.end() - 990)) << missing;
+    EXPECT_EQ(decoder.corruption().places, 1U);
+    EXPECT_NEAR(static_cast<double>(decoder.corruption().first_at), static_cast<double>(at), 16);
   }
 }
 
 TEST(Aedat2, ATimeFarFromItsNeighboursMovesNoOther) {
-  const auto events = random_events::make(davis346, 100, 4, 1'000'000'000, {1000});
+  const auto events = recordings::random_events(davis346, 100, 4, 1'000'000'000, 1000);
   auto bytes = aedat_files::aedat2_davis(events, davis346, "Davis346");
   bytes[bytes.size() - 8 * 50 + 4] ^= 0x40;
   bytes[bytes.size() - 8 * 30] |= 0x7f;  // a row outside the sensor
@@ -184,7 +168,7 @@ TEST(Aedat2, ATimeFarFromItsNeighboursMovesNoOther) {
   auto expected = events;
   expected.erase(expected.begin() + 70);
   expected.erase(expected.begin() + 50);
-  EXPECT_TRUE(decoded(decoder, bytes, 1).events == expected);
+  EXPECT_TRUE(decode(decoder, bytes, 1).events == expected);
   EXPECT_EQ(decoder.corruption().places, 1U);
   EXPECT_EQ(decoder.corruption().outside, 1U);
 }
@@ -192,17 +176,14 @@ TEST(Aedat2, ATimeFarFromItsNeighboursMovesNoOther) {
 TEST(Aedat2, ARecordingWithALongHeader) {
   const auto bytes = shared_data::events_file("aedat2-dvs128-header.aedat");
   if (bytes.empty()) GTEST_SKIP() << "no aedat2-dvs128-header.aedat in $SHARED_DATA";
-  for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}}) {
-    Aedat2Decoder decoder;
-    decoded(decoder, bytes, piece);
-    EXPECT_EQ(decoder.data_at(), 4241U);
-    EXPECT_EQ(decoder.size(), dvs128);
-    // The content is "$$$...\r\n", which is no address of a DVS128; the last 6 bytes are a partial
-    // record.
-    EXPECT_EQ(decoder.corruption().places, 1U);
-    EXPECT_EQ(decoder.corruption().first_at, 4241U);
-    EXPECT_EQ((bytes.size() - decoder.data_at()) % 8, 6U);
-  }
+  Aedat2Decoder decoder;
+  decode(decoder, bytes, 1);
+  EXPECT_EQ(decoder.data_at(), 4241U);
+  EXPECT_EQ(decoder.size(), dvs128);
+  // The content is "$$$...\r\n", which is no address of a DVS128; the last 6 bytes are a partial
+  // record.
+  EXPECT_EQ(decoder.corruption().places, 1U);
+  EXPECT_EQ(decoder.corruption().first_at, 4241U);
 }
 
 }  // namespace

@@ -64,45 +64,42 @@ inline void add_record(Bytes& bytes, std::uint32_t address, Microseconds t) {
   add_big(bytes, static_cast<std::uint32_t>(t));
 }
 
+/// A header, and the records of events whose address is `address_of(event)`.
+template <class AddressOf>
+Bytes aedat2(Bytes bytes, std::span<const AbsoluteEvent> events, const AddressOf& address_of) {
+  for (const auto& event : events) add_record(bytes, address_of(event), event.t);
+  return bytes;
+}
+
 inline Bytes aedat2_davis(std::span<const AbsoluteEvent> events, SensorSize size,
                           std::string_view chip) {
   auto bytes = aedat2_header(chip);
   add(bytes, "#End Of ASCII Header\r\n");
-  for (const auto& event : events) add_record(bytes, davis_address(event, size), event.t);
-  return bytes;
+  return aedat2(bytes, events, [&](const auto& event) { return davis_address(event, size); });
+}
+
+inline Bytes aedat2_dvs128(std::span<const AbsoluteEvent> events) {
+  auto bytes = aedat2_header("ch.unizh.ini.jaer.chip.retina.DVS128");
+  add(bytes, "#End Of ASCII Header\r\n");
+  return aedat2(bytes, events, dvs128_address);
 }
 
 /// What v2e writes, which names no camera; `size_line` is a line more.
 inline Bytes aedat2_v2e(std::span<const AbsoluteEvent> events, SensorSize size,
                         std::string_view size_line = "") {
   Bytes bytes;
-  add(bytes,
-      "#!AER-DAT2.0\r\n# This is a raw AE data file created by AEDat2Output in v2e (see "
-      "https://github.com/SensorsINI/v2e)\r\n# Data format is int32 address, int32 timestamp (8 "
-      "bytes total), repeated for each event\r\n# Timestamps tick is 1 us\r\n");
+  add(bytes, "#!AER-DAT2.0\r\n# This is a raw AE data file created by AEDat2Output in v2e\r\n");
   add(bytes, size_line);
-  for (const auto& event : events)
-    add_record(bytes, size.width == 640 ? dvs640_address(event) : davis_address(event, size),
-               event.t);
-  return bytes;
+  return aedat2(bytes, events, [&](const auto& event) {
+    return size.width == 640 ? dvs640_address(event) : davis_address(event, size);
+  });
 }
 
 /// What MATLAB's saveaerdat.m writes of a DVS128.
 inline Bytes aedat2_of_matlab(std::span<const AbsoluteEvent> events) {
   Bytes bytes;
-  add(bytes,
-      "#!AER-DAT2.0\r\n# This is a raw AE data file created by saveaerdat.m\r\n# Data format is "
-      "int32 address, int32 timestamp (8 bytes total), repeated for each event\r\n# Timestamps "
-      "tick is 1 us\r\n");
-  for (const auto& event : events) add_record(bytes, dvs128_address(event), event.t);
-  return bytes;
-}
-
-inline Bytes aedat2_dvs128(std::span<const AbsoluteEvent> events) {
-  auto bytes = aedat2_header("ch.unizh.ini.jaer.chip.retina.DVS128");
-  add(bytes, "#End Of ASCII Header\r\n");
-  for (const auto& event : events) add_record(bytes, dvs128_address(event), event.t);
-  return bytes;
+  add(bytes, "#!AER-DAT2.0\r\n# This is a raw AE data file created by saveaerdat.m\r\n");
+  return aedat2(bytes, events, dvs128_address);
 }
 
 // AEDAT 1.0
@@ -132,10 +129,9 @@ inline void add_aedat3_packet_header(Bytes& bytes, int type, int event_size, std
                                      std::int64_t number) {
   add_little(bytes, type, 2);
   add_little(bytes, 1, 2);
-  add_little(bytes, event_size, 4);
-  add_little(bytes, 4, 4);
-  add_little(bytes, overflow, 4);
-  for (int i = 0; i < 3; ++i) add_little(bytes, number, 4);
+  for (const auto field :
+       {std::int64_t{event_size}, std::int64_t{4}, overflow, number, number, number})
+    add_little(bytes, field, 4);
 }
 
 /// A packet ends at a wrap of the times, or after `max_events`.

@@ -4,14 +4,13 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/formats/recognise.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {
 
 using namespace eventcamera;
+using recordings::Bytes;
 using recordings::decode;
-using Bytes = std::vector<std::uint8_t>;
 
 constexpr SensorSize n_mnist{34, 34};
 
@@ -33,19 +32,7 @@ TEST(AtisBin, AddsOverflowsAndWraps) {
   const auto decoded = decode(*decoder, Bytes{1, 2,   0x80, 0,    1,     //
                                               0, 240, 0,    0,    0,     // an overflow
                                               1, 2,   0x80, 0,    2,     //
-                                              1, 2,   0xff, 0xff, 0xf0,  //
-                                              1, 2,   0x80, 0,    5});   // a wrap
-  constexpr Microseconds overflow = 8192;
-  EXPECT_EQ(decoded.events,
-            (std::vector{AbsoluteEvent::at(1, 2, 1, Polarity::on),
-                         AbsoluteEvent::at(1, 2, overflow + 2, Polarity::on),
-                         AbsoluteEvent::at(1, 2, overflow + 0x7ffff0, Polarity::on),
-                         AbsoluteEvent::at(1, 2, overflow + 0x800005, Polarity::on)}));
-}
-
-TEST(AtisBin, KeepsDisorderAcrossAWrap) {
-  const auto decoder = make_atis_bin_decoder(n_mnist);
-  const auto decoded = decode(*decoder, Bytes{1, 2,   0xff, 0xff, 0xff,  //
+                                              1, 2,   0xff, 0xff, 0xff,  //
                                               1, 2,   0x80, 0,    2,     // a wrap
                                               1, 2,   0xff, 0xff, 0xfe,  // from before it
                                               0, 240, 0,    0,    0,     // an overflow
@@ -53,7 +40,9 @@ TEST(AtisBin, KeepsDisorderAcrossAWrap) {
   constexpr Microseconds overflow = 8192;
   std::vector<Microseconds> times;
   for (const auto& event : decoded.events) times.push_back(event.t);
-  EXPECT_EQ(times, (std::vector<Microseconds>{0x7fffff, 0x800002, 0x7ffffe, overflow + 0x800003}));
+  EXPECT_EQ(times,
+            (std::vector<Microseconds>{1, overflow + 2, overflow + 0x7fffff, overflow + 0x800002,
+                                       overflow + 0x7ffffe, 2 * overflow + 0x800003}));
 }
 
 TEST(AtisBin, CountsEventsOutsideTheSensorAndATruncatedOne) {
@@ -63,41 +52,6 @@ TEST(AtisBin, CountsEventsOutsideTheSensorAndATruncatedOne) {
   EXPECT_EQ(decoded.events, (std::vector{AbsoluteEvent::at(0, 0, 2, Polarity::off)}));
   EXPECT_EQ(decoder->corruption().outside, 2U);
   EXPECT_EQ(decoder->corruption().places, 1U);
-}
-
-Bytes some_file() {
-  recordings::Random random(1);
-  Bytes bytes;
-  std::uint32_t t = 400;
-  for (int i = 0; i < 1000; ++i) {
-    t += static_cast<std::uint32_t>(recordings::below(random, 300));
-    const auto polarity = static_cast<std::uint8_t>(recordings::below(random, 2) << 7);
-    bytes.insert(bytes.end(), {static_cast<std::uint8_t>(recordings::below(random, 34)),
-                               static_cast<std::uint8_t>(recordings::below(random, 34)),
-                               static_cast<std::uint8_t>(t >> 16 | polarity),
-                               static_cast<std::uint8_t>(t >> 8), static_cast<std::uint8_t>(t)});
-  }
-  return bytes;
-}
-
-TEST(AtisBin, IsRecognisedByTheOrderOfItsTimes) {
-  const auto file = some_file();
-  EXPECT_EQ(recognise(file), (Recognised{"application/x-atis-bin", Likelihood::high}));
-  EXPECT_EQ(recognise(std::span(file).first(500)), Recognised{}) << "too few events";
-
-  auto shifted = file;
-  shifted.erase(shifted.begin());
-  EXPECT_EQ(recognise(shifted), Recognised{});
-  EXPECT_EQ(recognise(Bytes(5000)), Recognised{});
-  recordings::Random random(1);
-  for (int i = 0; i < 200; ++i) {
-    Bytes noise(5000);
-    for (auto& byte : noise) byte = static_cast<std::uint8_t>(random());
-    EXPECT_EQ(recognise(noise), Recognised{});
-    for (std::size_t at = 0; at < noise.size(); ++at)
-      noise[at] = static_cast<std::uint8_t>(at / static_cast<std::size_t>(1 + i % 7));
-    EXPECT_EQ(recognise(noise), Recognised{});
-  }
 }
 
 }  // namespace

@@ -41,35 +41,8 @@ EVENTS = made_events()
 FRAMES = [(START + i * 500_000, i + 1) for i in range(40)]
 
 
-class Cdr:
-    """XCDR1, little-endian: fields at multiples of their size after the encapsulation."""
-
-    def __init__(self):
-        self.bytes = b""
-
-    def put(self, code, *values):
-        for value in values:
-            size = struct.calcsize("<" + code)
-            self.bytes += bytes(-len(self.bytes) % size) + struct.pack("<" + code, value)
-
-    def text(self, text):
-        self.put("I", len(text) + 1)
-        self.bytes += text.encode() + b"\0"
-
-    def array(self, content):
-        self.put("I", len(content))
-        self.bytes += content
-
-    def header(self, t):
-        self.put("I", t // 1_000_000, t % 1_000_000 * 1000)
-        self.text("camera")
-
-    def message(self):
-        return b"\0\1\0\0" + self.bytes
-
-
 class Ros1:
-    """Fields without padding."""
+    """Fields without padding, little-endian."""
 
     def __init__(self):
         self.bytes = b""
@@ -82,7 +55,8 @@ class Ros1:
         self.array(text.encode())
 
     def array(self, content):
-        self.bytes += struct.pack("<I", len(content)) + content
+        self.put("I", len(content))
+        self.bytes += content
 
     def header(self, t):
         self.put("I", 0, t // 1_000_000, t % 1_000_000 * 1000)
@@ -90,6 +64,25 @@ class Ros1:
 
     def message(self):
         return self.bytes
+
+
+class Cdr(Ros1):
+    """XCDR1: fields at multiples of their size after the encapsulation."""
+
+    def put(self, code, *values):
+        for value in values:
+            self.bytes += bytes(-len(self.bytes) % struct.calcsize("<" + code))
+            super().put(code, value)
+
+    def text(self, text):
+        self.array(text.encode() + b"\0")
+
+    def header(self, t):
+        self.put("I", t // 1_000_000, t % 1_000_000 * 1000)
+        self.text("camera")
+
+    def message(self):
+        return b"\0\1\0\0" + self.bytes
 
 
 class Evt3:
@@ -363,19 +356,19 @@ def main():
                                         ("libcaer", "packet", "libcaer", "mono8"),
                                         ("libcaer_cmp", "packet", "libcaer_cmp", "mono8"),
                                         ("array", "array", "", "mono8"), ("prophesee", "prophesee", "", "mono8")]:
-        cdr, topics = messages(Cdr, kind, encoding, image), topics_of(kind)
+        cdr, ros1 = (messages(serialization, kind, encoding, image) for serialization in (Cdr, Ros1))
+        topics = topics_of(kind)
         write_mcap(folder / f"{name}.mcap", cdr, topics)
         if name.startswith("libcaer"):
             continue
+        write_mcap(folder / f"{name}-ros1.mcap", ros1, topics, "zstd", ros1=True)
+        write_bag(folder / f"{name}.bag", ros1, topics)
+        write_db3(folder / f"{name}.db3", cdr, topics)
         if name == "evt3":
             for compression in "lz4", "zstd":
                 write_mcap(folder / f"{name}-{compression}.mcap", cdr, topics, compression)
             write_mcap(folder / f"{name}-no-index.mcap", cdr, topics, "lz4", summary=False)
             write_mcap(folder / f"{name}-no-chunks.mcap", cdr, topics, chunked=False)
-        ros1 = messages(Ros1, kind, encoding, image)
-        write_mcap(folder / f"{name}-ros1.mcap", ros1, topics, "zstd", ros1=True)
-        write_bag(folder / f"{name}.bag", ros1, topics)
-        write_db3(folder / f"{name}.db3", cdr, topics)
         if name == "mono":
             write_mcap(folder / "mono-restarted.mcap", messages(Cdr, kind, encoding, image, restart=30), topics)
             write_db3(folder / "mono-old.db3", cdr, topics_of("old"))

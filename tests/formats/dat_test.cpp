@@ -63,31 +63,25 @@ TEST(Dat, ReadsTriggers) {
 }
 
 TEST(Dat, FollowsWrapsAndKeepsDisorder) {
-  const auto decoder = make_dat_decoder();
-  const auto decoded = decode(
-      *decoder, file(version_2, 0x0c, {{0xfffffff0, 0}, {3, 0}, {2, 0}, {0xf0000000, 0}, {1, 0}}));
-  std::vector<Microseconds> times;
-  for (const auto& event : decoded.events) times.push_back(event.t);
-  const auto lap = Microseconds{1} << 32;
-  EXPECT_EQ(times, (std::vector<Microseconds>{0xfffffff0, lap + 3, lap + 2, lap + 0xf0000000,
-                                              2 * lap + 1}));
-}
-
-TEST(Dat, KeepsDisorderAcrossAWrap) {
-  const auto decoder = make_dat_decoder();
-  const auto decoded = decode(*decoder, file(version_2, 0x0c,
-                                             {{0xffffffff, 0},
-                                              {2, 0},
-                                              {0xfffffffe, 0},
-                                              {3, 0},
-                                              {0xffff0000, 0},
-                                              {0xffff0001, 0},
-                                              {4, 0}}));
-  std::vector<Microseconds> times;
-  for (const auto& event : decoded.events) times.push_back(event.t);
-  const auto lap = Microseconds{1} << 32;
-  EXPECT_EQ(times, (std::vector<Microseconds>{lap - 1, lap + 2, lap - 2, lap + 3, lap - 0x10000,
-                                              lap - 0xffff, lap + 4}));
+  const auto times_of = [](std::initializer_list<Record> records) {
+    std::vector<Microseconds> times;
+    for (const auto& event : decode(*make_dat_decoder(), file(version_2, 0x0c, records)).events)
+      times.push_back(event.t);
+    return times;
+  };
+  constexpr auto lap = Microseconds{1} << 32;
+  EXPECT_EQ(
+      times_of({{0xfffffff0, 0}, {3, 0}, {2, 0}, {0xf0000000, 0}, {1, 0}}),
+      (std::vector<Microseconds>{0xfffffff0, lap + 3, lap + 2, lap + 0xf0000000, 2 * lap + 1}));
+  EXPECT_EQ(times_of({{0xffffffff, 0},
+                      {2, 0},
+                      {0xfffffffe, 0},
+                      {3, 0},
+                      {0xffff0000, 0},
+                      {0xffff0001, 0},
+                      {4, 0}}),
+            (std::vector<Microseconds>{lap - 1, lap + 2, lap - 2, lap + 3, lap - 0x10000,
+                                       lap - 0xffff, lap + 4}));
 }
 
 TEST(Dat, IsAnErrorThatSaysWhy) {

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/formats/hdf5/ecf.hpp"
 
+#include <gtest/gtest.h>
+
 #include <cstring>
 
-#include "tests/formats/table_events.hpp"
+#include "tests/formats/recordings.hpp"
 
 namespace {
 
-using namespace table_events;
-
-using Events = std::vector<AbsoluteEvent>;
+using namespace recordings;
 
 Bytes encoded_chunk(const Events& events) {
   Bytes chunk;
@@ -32,33 +32,31 @@ TEST(Ecf, ChunkByteByByte) {
   const Events events = {AbsoluteEvent::at(5, 9, 100, Polarity::on),
                          AbsoluteEvent::at(7, 9, 100, Polarity::on),
                          AbsoluteEvent::at(3, 9, 1100, Polarity::off)};
-  const Bytes expected = {
-      3 << 2,
-      0,
-      0,
-      0,
-      100,
-      0,
-      0,
-      0,
-      0,
-      0,
-      0,
-      0,     // three events, nothing packed, from 100 us on
-      0x02,  // no later, two events
-      0xf8,
-      0xfe,
-      0xf3,
-      0x01,  // 0x3e8 us later, one event
-      (9 << 5 & 0xff) | 3,
-      9 >> 3,  // three in row 9
-      (5 << 5 & 0xff) | 8,
-      0,
-      3 << 5,
-      0,  // x = 5 and 5 + 2, x = 3
-      0x82,
-      0x01,  // two ON, one OFF
-  };
+  const Bytes expected = {3 << 2,
+                          0,
+                          0,
+                          0,  // three events, nothing packed,
+                          100,
+                          0,
+                          0,
+                          0,
+                          0,
+                          0,
+                          0,
+                          0,     // from 100 us on
+                          0x02,  // no later, two events
+                          0xf8,
+                          0xfe,
+                          0xf3,
+                          0x01,  // 0x3e8 us later, one event
+                          (9 << 5 & 0xff) | 3,
+                          9 >> 3,  // three in row 9
+                          (5 << 5 & 0xff) | 8,
+                          0,  // x = 5 and 5 + 2,
+                          3 << 5,
+                          0,  // x = 3
+                          0x82,
+                          0x01};  // two ON, one OFF
   EXPECT_EQ(encoded_chunk(events), expected);
   expect_comes_back(events);
 }
@@ -97,10 +95,10 @@ TEST(Ecf, PackedChunksByteByByte) {
 }
 
 TEST(Ecf, ComesBack) {
-  for (const auto size : sizes())
+  for (const SensorSize size : {SensorSize{1, 1}, {2, 3}, {640, 480}, {2048, 2048}})
     for (unsigned seed = 0; seed < 60; ++seed)
-      expect_comes_back(random_events(seed < 40 ? seed : seed * seed * 10, size, seed));
-  expect_comes_back(random_events(ecf_max_events, {2048, 2048}, 1, -5'000'000'000));
+      expect_comes_back(random_events(size, seed < 40 ? seed : seed * seed * 10, seed));
+  expect_comes_back(random_events({2048, 2048}, ecf_max_events, 1, -5'000'000'000));
   // Runs at and around the lengths at which the encoding changes.
   for (const std::size_t count : {14, 15, 16, 30, 31, 32, 126, 127, 128, 65534, 65535})
     expect_comes_back(Events(count, AbsoluteEvent::at(2047, 2047, 1LL << 62, Polarity::on)));
@@ -118,21 +116,12 @@ TEST(Ecf, OtherWritersGoOnBehindTheLastEvent) {
 }
 
 TEST(Ecf, CorruptChunksAreRefused) {
-  const auto events = random_events(500, {640, 480}, 3);
+  const auto events = random_events({640, 480}, 500, 3);
   const auto chunk = encoded_chunk(events);
   Events out;
   for (std::size_t size = 0; size < chunk.size(); ++size) {
     EXPECT_FALSE(decode_ecf(std::span(chunk).first(size), out)) << size;
     EXPECT_TRUE(out.empty());
-  }
-  std::mt19937 random(5);
-  for (int i = 0; i < 20'000; ++i) {
-    auto corrupt = chunk;
-    for (int j = 0; j < 3; ++j)
-      corrupt[random() % corrupt.size()] = static_cast<std::uint8_t>(random());
-    out.clear();
-    decode_ecf(corrupt, out);
-    EXPECT_LE(out.size(), ecf_max_events);
   }
   // More events than a chunk can have, a run longer than the chunk, a time of more than 64 bits.
   EXPECT_FALSE(decode_ecf(Bytes{0, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3}, out));

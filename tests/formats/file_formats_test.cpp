@@ -3,21 +3,41 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <span>
 #include <string>
 #include <string_view>
 
+#include "src/formats/file_formats.hpp"
 #include "tests/formats/formats.hpp"
-#include "tests/formats/recognise.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {
 
 using namespace eventcamera;
+using recordings::Bytes;
 using namespace std::string_literals;
 using namespace std::string_view_literals;
 
+/// What a file is, by its first bytes, as GStreamer chooses among typefinders.
+struct Recognised {
+  std::string_view media_type;  ///< empty if the format is unknown
+  Likelihood likelihood = Likelihood::none;
+
+  friend bool operator==(const Recognised&, const Recognised&) = default;
+};
+
+Recognised recognise(std::span<const std::uint8_t> start) {
+  Recognised best;
+  for (const auto& format : file_formats()) {
+    const auto found = likelihood(format, start);
+    if (found > best.likelihood) best = {format.media_type, found};
+  }
+  return best;
+}
+
 Recognised recognise(std::string_view text) {
-  return eventcamera::recognise({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  return recognise({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
 Recognised certain(std::string_view type) {
@@ -49,17 +69,12 @@ TEST(Recognition, KnowsFilesByTheirFirstBytes) {
       // Its time unit is missing, which is reported on reading.
       {"1000 1 2 1\n2000 1 2 1\n3000 1 2 1\n", "application/x-event-csv"}};
   for (const auto& [start, type] : starts) EXPECT_EQ(recognise(start), certain(type)) << start;
+  const auto aedat3 = recordings::bytes_of("#!AER-DAT3.");
+  EXPECT_EQ(file_format_of("application/x-aedat")->version(aedat3), 3);
   EXPECT_EQ(recognise("% Version 2\n% end\n\x0c\x08"),
             (Recognised{"application/x-prophesee-dat", Likelihood::high}));
   EXPECT_EQ(recognise(std::string(2048, '\0').append(hdf5)),
             (Recognised{"application/x-hdf5", Likelihood::possible}));
-}
-
-TEST(Recognition, TellsTheVersionOfAedat) {
-  const auto start = "#!AER-DAT3."sv;
-  EXPECT_EQ(file_format_of("application/x-aedat")
-                ->version({reinterpret_cast<const std::uint8_t*>(start.data()), start.size()}),
-            3);
 }
 
 TEST(Recognition, LeavesOtherFilesAlone) {
@@ -106,13 +121,48 @@ TEST(Recognition, MoreBytesMakeNoOtherKind) {
     if (format.name.starts_with("evt")) continue;  // words without a header
     const auto events = recordings::random_events(random, size, 20, 1000);
     const auto bytes = recordings::encode(*format.make_encoder(size), events);
-    const auto whole = eventcamera::recognise(bytes);
+    const auto whole = recognise(bytes);
     ASSERT_NE(whole.media_type, "") << format.name;
     for (std::size_t count = 0; count < bytes.size(); ++count) {
-      const auto start = eventcamera::recognise(std::span(bytes).first(count));
+      const auto start = recognise(std::span(bytes).first(count));
       EXPECT_TRUE(start == Recognised{} || start == whole)
           << format.name << ", " << count << " bytes";
     }
+  }
+}
+
+/// A file of N-MNIST.
+Bytes n_mnist() {
+  recordings::Random random(1);
+  Bytes bytes;
+  std::uint32_t t = 400;
+  for (int i = 0; i < 1000; ++i) {
+    t += static_cast<std::uint32_t>(recordings::below(random, 300));
+    const auto upper = t >> 16 | static_cast<std::uint32_t>(i % 2) << 7;
+    for (const auto byte :
+         {static_cast<std::uint32_t>(i % 34), static_cast<std::uint32_t>(i % 31), upper, t >> 8, t})
+      bytes.push_back(static_cast<std::uint8_t>(byte));
+  }
+  return bytes;
+}
+
+TEST(Recognition, KnowsNMnistByTheOrderOfItsTimes) {
+  const auto file = n_mnist();
+  EXPECT_EQ(recognise(file), (Recognised{"application/x-atis-bin", Likelihood::high}));
+  EXPECT_EQ(recognise(std::span(file).first(500)), Recognised{}) << "too few events";
+
+  auto shifted = file;
+  shifted.erase(shifted.begin());
+  EXPECT_EQ(recognise(shifted), Recognised{});
+  EXPECT_EQ(recognise(Bytes(5000)), Recognised{});
+  recordings::Random random(1);
+  for (int i = 0; i < 200; ++i) {
+    Bytes noise(5000);
+    for (auto& byte : noise) byte = static_cast<std::uint8_t>(random());
+    EXPECT_EQ(recognise(noise), Recognised{});
+    for (std::size_t at = 0; at < noise.size(); ++at)
+      noise[at] = static_cast<std::uint8_t>(at / static_cast<std::size_t>(1 + i % 7));
+    EXPECT_EQ(recognise(noise), Recognised{});
   }
 }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
+#include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include <cmath>
@@ -11,18 +12,18 @@
 #include "src/formats/numpy/zip_archive.hpp"
 #include "src/formats/temporary_file.hpp"
 #include "tests/formats/npz_file.hpp"
-#include "tests/formats/table_events.hpp"
+#include "tests/formats/recordings.hpp"
 
 namespace {
 
-using namespace table_events;
+using namespace recordings;
 using npz_file::archive;
 using npz_file::column;
 using npz_file::columns_of_events;
 using npz_file::Member;
 
 struct Read {
-  std::vector<AbsoluteEvent> events;
+  Events events;
   SensorSize size;
   Corruption corruption;
 };
@@ -56,8 +57,8 @@ Read read(const Bytes& bytes, const TableSettings& settings = {}) {
   return read;
 }
 
-std::vector<AbsoluteEvent> events_of(std::size_t count) {
-  std::vector<AbsoluteEvent> events;
+Events events_of(std::size_t count) {
+  Events events;
   for (std::size_t i = 0; i < count; ++i)
     events.push_back(AbsoluteEvent::at(static_cast<int>(i % 640), static_cast<int>(i * 7 % 480),
                                        static_cast<Microseconds>(i * 3),
@@ -90,34 +91,14 @@ TEST(Npz, NamesOfAnyTool) {
   coords[4].first = "polarities.npy";
   EXPECT_EQ(read(archive(coords, true)).events, events);
   // EVIMO2.
-  auto evimo = columns_of_events(events);
   std::vector<std::uint16_t> xy;
-  for (const auto& event : events) {
-    xy.push_back(event.x);
-    xy.push_back(static_cast<std::uint16_t>(event.y()));
-  }
-  evimo[0] = {"dataset_events_xy.npy",
-              npz_file::array("'<u2'", "(" + std::to_string(events.size()) + ", 2)", xy)};
-  evimo[2].first = "dataset_events_p.npy";
-  evimo[3].first = "dataset_events_t.npy";
-  evimo.pop_back();
-  evimo[2] = {"dataset_events_p.npy", columns_of_events(events)[4].second};
+  for (const auto& event : events)
+    xy.insert(xy.end(), {event.x, static_cast<std::uint16_t>(event.y())});
+  const std::vector<Member> evimo{
+      {"dataset_events_xy.npy", npz_file::array("'<u2'", "(5000, 2)", xy)},
+      {"dataset_events_t.npy", coords[3].second},
+      {"dataset_events_p.npy", coords[4].second}};
   EXPECT_EQ(read(archive(evimo, true)).events, events);
-}
-
-TEST(Npz, AnArrayOfEvents) {
-  const std::vector<double> numbers = {0.5, 3, 4, 1, 0.75, 5, 6, 0};
-  const std::vector<AbsoluteEvent> expected = {AbsoluteEvent::at(3, 4, 500'000, Polarity::on),
-                                               AbsoluteEvent::at(5, 6, 750'000, Polarity::off)};
-  const Member rows = {"arr_0.npy", npz_file::array("'<f8'", "(2, 4)", numbers)};
-  const Member fields = {
-      "events.npy",
-      npz_file::array("[('t', '<f8'), ('x', '<f8'), ('y', '<f8'), ('p', '<f8')]", "(2,)", numbers)};
-  const Member other = {"frame.npy", column<double>("<f8", numbers)};
-  const Member text = {"readme.txt", bytes_of("hello")};
-  for (const auto& member : {rows, fields})
-    for (const bool is_compressed : {false, true})
-      EXPECT_EQ(read(archive({text, other, member}, is_compressed)).events, expected);
 }
 
 Member plain_array(const std::string& name, std::size_t rows, std::size_t columns) {
@@ -126,17 +107,21 @@ Member plain_array(const std::string& name, std::size_t rows, std::size_t column
 }
 
 TEST(Npz, AnArrayOfEventsAmongOthers) {
-  const Member events = {"events.npy",
-                         npz_file::array<double>("'<f8'", "(2, 4)", {7, 3, 4, 1, 9, 5, 6, 0})};
-  const std::vector<AbsoluteEvent> expected = {AbsoluteEvent::at(3, 4, 7, Polarity::on),
-                                               AbsoluteEvent::at(5, 6, 9, Polarity::off)};
+  const std::vector<double> numbers = {0.5, 3, 4, 1, 0.75, 5, 6, 0};
+  const Events expected = {AbsoluteEvent::at(3, 4, 500'000, Polarity::on),
+                           AbsoluteEvent::at(5, 6, 750'000, Polarity::off)};
+  const Member rows = {"arr_0.npy", npz_file::array("'<f8'", "(2, 4)", numbers)};
+  const Member fields = {
+      "events.npy",
+      npz_file::array("[('t', '<f8'), ('x', '<f8'), ('y', '<f8'), ('p', '<f8')]", "(2,)", numbers)};
+  const Member other = {"frame.npy", column<double>("<f8", numbers)};
+  const Member text = {"readme.txt", bytes_of("hello")};
   const auto matrix = plain_array("K.npy", 3, 3);
   const auto poses = plain_array("poses.npy", 10, 5);
-  EXPECT_EQ(read(archive({matrix, events}, true), {.unit = TimeUnit::microseconds}).events,
-            expected);
-  EXPECT_EQ(read(archive({poses, matrix, events}, true),
-                 {.columns = *columns_of("txyp"), .unit = TimeUnit::microseconds})
-                .events,
+  for (const auto& member : {rows, fields})
+    for (const bool is_compressed : {false, true})
+      EXPECT_EQ(read(archive({text, other, matrix, member}, is_compressed)).events, expected);
+  EXPECT_EQ(read(archive({poses, matrix, rows}, true), {.columns = *columns_of("txyp")}).events,
             expected);
 }
 
@@ -161,19 +146,9 @@ TEST(Npz, WhatIsWrongIsToldAndWhatIsWholeIsRead) {
   auto flipped = archive(columns_of_events(events), false);
   for (std::size_t at = 300'000; at < 300'010; ++at) flipped[at] ^= 0xff;
   EXPECT_GT(read(flipped).corruption.places, 0U);
-
-  // Wrong checksum of an array: events decompressed before are kept.
-  auto changed = archive(columns_of_events(events), true);
-  changed[changed.size() / 2] ^= 0x55;
-  try {
-    EXPECT_GT(read(changed).corruption.places, 0U);
-  } catch (const UnsupportedFormat&) {
-    // A header may have been corrupted.
-  }
 }
 
 TEST(Npz, WhatIsNoneIsRefused) {
-  const auto whole = archive(columns_of_events(events_of(1000)), true);
   const auto refused = [](const Bytes& bytes, std::string_view words,
                           const TableSettings& settings = {}) {
     try {
@@ -183,27 +158,28 @@ TEST(Npz, WhatIsNoneIsRefused) {
       EXPECT_NE(std::string_view(error.what()).find(words), std::string_view::npos) << error.what();
     }
   };
+  const auto archive_of = [](const Member& member) { return archive({member}, true); };
+  const auto array = [](const char* type, const char* shape, std::size_t count) {
+    return Member{"a.npy", npz_file::array(type, shape, std::vector<double>(count))};
+  };
+  auto columns = columns_of_events(events_of(10));
+  auto cut = archive(columns, true);
+  cut.resize(cut.size() - 30);
   refused({}, "neither arrays t, x, y and p");
   refused(bytes_of("hello, this is a text"), "cannot be opened");
-  refused(Bytes(whole.begin(), whole.end() - 30), "cannot be opened");
-  refused(archive({{"readme.txt", bytes_of("hello")}}, true), "neither arrays t, x, y and p");
-  auto lacks = columns_of_events(events_of(10));
-  lacks.pop_back();
-  refused(archive(lacks, true), "neither arrays t, x, y and p");
-  refused(
-      archive({{"a.npy", npz_file::array("'<f8'", "(3, 500)", std::vector<double>(1500))}}, true),
-      "must have the shape (N, 4) or (4, N)");
-  refused(archive({{"events.npy", npz_file::array("'|O'", "()", std::vector<double>(1))}}, true),
-          "pickled");
-  const auto matrix = archive({plain_array("K.npy", 3, 3)}, true);
-  refused(matrix, "of K.npy: the NumPy array has 3 columns; an event needs four: t, x, y and p");
-  const auto poses = archive({plain_array("poses.npy", 10, 5)}, true);
-  refused(poses, "of poses.npy: the NumPy array has 5 columns; column-order has 4",
-          {.columns = *columns_of("txyp")});
-  refused(poses, "poses.npy: unknown columns in the NumPy array; set column-order for all 5");
-  auto wide = columns_of_events(events_of(10));
+  refused(cut, "cannot be opened");
+  refused(archive_of({"readme.txt", bytes_of("hello")}), "neither arrays t, x, y and p");
+  refused(archive_of(array("'<f8'", "(3, 500)", 1500)), "(N, 4) or (4, N)");
+  refused(archive_of(array("'|O'", "()", 1)), "pickled");
+  refused(archive_of(plain_array("K.npy", 3, 3)), "K.npy: the NumPy array has 3 columns");
+  const auto poses = archive_of(plain_array("poses.npy", 10, 5));
+  refused(poses, "column-order has 4", {.columns = *columns_of("txyp")});
+  refused(poses, "set column-order for all 5");
+  auto wide = columns;
   wide[0].second = npz_file::array("'<u2'", "(10, 2)", std::vector<std::uint16_t>(20));
   refused(archive(wide, true), "must have one column");
+  columns.pop_back();
+  refused(archive(columns, true), "neither arrays t, x, y and p");
 }
 
 /// Archive as an encoder writes it. Checks that its end comes in pieces.
@@ -226,11 +202,9 @@ Bytes written(Encoder& encoder, std::span<const AbsoluteEvent> events, std::size
 }
 
 TEST(NpzEncoder, ComesBackWithTheSensorSize) {
-  auto all = sizes();
-  all.push_back({16384, 16384});
-  for (const auto size : all) {
+  for (const auto size : {SensorSize{1, 1}, {640, 480}, {16384, 16384}}) {
     for (const std::size_t count : {0, 1, 5000, 100'000}) {
-      const auto events = random_events(count, size, static_cast<unsigned>(size.width), -1000);
+      const auto events = random_events(size, count, 1, -1000);
       const auto bytes = written(*make_npz_encoder(size), events);
       const auto found = read(bytes);
       EXPECT_TRUE(found.events == events) << count;
@@ -241,14 +215,6 @@ TEST(NpzEncoder, ComesBackWithTheSensorSize) {
   }
 }
 
-TEST(NpzEncoder, IsNothingUntilItIsWhole) {
-  const auto bytes = written(*make_npz_encoder({640, 480}), events_of(20));
-  for (std::size_t size = 1; size < bytes.size(); ++size)
-    EXPECT_THROW(read(Bytes(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size))),
-                 UnsupportedFormat)
-        << size;
-}
-
 TEST(NpzEncoder, LeavesNoFiles) {
   auto folder = (std::filesystem::temp_directory_path() / "npz-test-XXXXXX").string();
   ASSERT_NE(mkdtemp(folder.data()), nullptr);
@@ -256,12 +222,7 @@ TEST(NpzEncoder, LeavesNoFiles) {
   const auto encoder = make_npz_encoder({640, 480});
   EXPECT_TRUE(std::filesystem::is_empty(folder));
   std::filesystem::remove(folder);
-  try {
-    make_npz_encoder({640, 480});
-    ADD_FAILURE() << "the folder is not there";
-  } catch (const TemporaryFileError& error) {
-    EXPECT_EQ(error.what(), "temporary file in " + folder + ": No such file or directory");
-  }
+  EXPECT_THROW(make_npz_encoder({640, 480}), TemporaryFileError);
   unsetenv("TMPDIR");
 }
 
@@ -280,8 +241,8 @@ TEST(NpzEncoder, FailsOnAFullDisk) {
 }
 
 TEST(Npz, NumbersOfTheSensorSize) {
-  const auto size_of = [](const Member& width, const Member& height,
-                          const TableSettings& settings = {}) {
+  const auto read_with = [](const Member& width, const Member& height,
+                            const TableSettings& settings = {}) {
     auto members = columns_of_events(events_of(10));
     members.push_back(width);
     members.push_back(height);
@@ -290,40 +251,36 @@ TEST(Npz, NumbersOfTheSensorSize) {
   const auto floating = [](const std::string& name, double value) {
     return Member{name, npz_file::array<double>("'<f8'", "()", {value})};
   };
-  const auto in_array = [](const std::string& name, std::uint16_t value) {
-    return Member{name, column<std::uint16_t>("<u2", {value})};
-  };
   const auto one = [](const std::string& name, std::int64_t value) {
     return Member{name, npz_file::array<std::int64_t>("'<i8'", "()", {value})};
   };
-  constexpr SensorSize size = {640, 480};
-  EXPECT_EQ(size_of(one("width.npy", 640), one("height.npy", 480)).size, size);
-  EXPECT_EQ(size_of(in_array("width.npy", 640), floating("height.npy", 480)).size, size);
-  EXPECT_EQ(size_of(one("a/width.npy", 16384), one("a/height.npy", 16384)).size,
+  const Member in_array{"width.npy", column<std::uint16_t>("<u2", {640})};
+  const auto width = one("width.npy", 640);
+  EXPECT_EQ(read_with(width, one("height.npy", 480)).size, (SensorSize{640, 480}));
+  EXPECT_EQ(read_with(in_array, floating("height.npy", 480)).size, (SensorSize{640, 480}));
+  EXPECT_EQ(read_with(one("a/width.npy", 16384), one("a/height.npy", 16384)).size,
             (SensorSize{16384, 16384}));
 
-  // That of the settings comes first; events outside are counted.
-  const auto set =
-      size_of(one("width.npy", 640), one("height.npy", 480), {.size = SensorSize{320, 240}});
+  // The size of the settings comes first; events outside are counted.
+  const auto set = read_with(width, one("height.npy", 480), {.size = SensorSize{320, 240}});
   EXPECT_EQ(set.size, (SensorSize{320, 240}));
-  const auto small = size_of(one("width.npy", 9), one("height.npy", 480));
+  const auto small = read_with(one("width.npy", 9), one("height.npy", 480));
   EXPECT_EQ(small.events.size(), 9U);
   EXPECT_EQ(small.corruption.outside, 1U);
 
   // One alone is ignored, and an impossible size is corruption.
-  const auto none = size_of(one("width.npy", 640), one("other.npy", 480));
+  const auto none = read_with(width, one("other.npy", 480));
   EXPECT_EQ(none.size, SensorSize{});
   EXPECT_EQ(none.corruption.places, 0U);
-  const Member text = {"height.npy", bytes_of("not an array")};
   for (const auto& height :
        {one("height.npy", 0), one("height.npy", -1), one("height.npy", 32769),
-        floating("height.npy", std::nan("")), text,
+        floating("height.npy", std::nan("")), Member{"height.npy", bytes_of("not an array")},
         Member{"height.npy", column<double>("<f8", {1, 2})},
         Member{"height.npy", npz_file::array<std::int64_t>("'<i8'", "()", {})}}) {
-    const auto found = size_of(one("width.npy", 640), height);
+    const auto found = read_with(width, height);
     EXPECT_EQ(found.size, SensorSize{});
     EXPECT_EQ(found.events.size(), 10U);
-    EXPECT_EQ(found.corruption.first, "the arrays width and height are not a sensor size");
+    EXPECT_EQ(found.corruption.places, 1U);
   }
 }
 
@@ -394,17 +351,11 @@ TEST(ZipWriter, WritesFilesOfAnySize) {
 
     ZipArchive archive(file);
     EXPECT_EQ(archive.names(), (std::vector<std::string>{"first", "zeros", "last"}));
-    for (const std::size_t index : {0, 2}) {
-      Bytes found(10);
-      auto entry = archive.open(index);
-      ASSERT_EQ(entry.read(found), few.size()) << index;
-      found.resize(few.size());
-      EXPECT_EQ(found, few);
+    for (const std::size_t index : {0, 1, 2}) {
+      Bytes found(few.size(), 9);
+      EXPECT_EQ(archive.open(index).read(found), few.size());
+      EXPECT_EQ(found, index == 1 ? Bytes(few.size()) : few) << index;
     }
-    Bytes found(10, 1);
-    auto entry = archive.open(1);
-    entry.read(found);
-    EXPECT_EQ(found.front(), 0);
   }
 }
 
@@ -471,7 +422,7 @@ TEST(Npz, ClaimsTakeNoMemory) {
   }
 
   // Zeros, which compress to a thousandth of their size, are read in small pieces.
-  const auto bomb = columns_of_events(std::vector<AbsoluteEvent>(1'000'000));
+  const auto bomb = columns_of_events(Events(1'000'000));
   MemoryBytes source(archive(bomb, true));
   EXPECT_LT(source.size(), 100'000U);
   const auto reader = make_npz_decoder();

@@ -11,9 +11,9 @@
 #include <string>
 #include <tuple>
 
+#include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
-#include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/aedat/aedat_decoder.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/decoder.hpp"
@@ -21,14 +21,13 @@
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
-#include "tests/formats/pieces.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace eventcamera {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
-using Events = std::vector<AbsoluteEvent>;
+using recordings::Bytes;
+using recordings::Events;
 
 constexpr SensorSize sensor{320, 240};
 constexpr Microseconds chunk_length = 10'000;
@@ -52,6 +51,10 @@ struct File {
   RecordingReader::MakeDecoder make_decoder;
 };
 
+std::unique_ptr<AedatDecoder> make_aedat_decoder() {
+  return std::make_unique<AedatDecoder>();
+}
+
 File raw_file() {
   const auto encoder = make_prophesee_raw_encoder(EvtFormat::evt3, sensor);
   return {"raw", recordings::encode(*encoder, some_events()),
@@ -65,26 +68,36 @@ File npy_file() {
           [] { return std::make_unique<NpyDecoder>(); }};
 }
 
-/// Events, and a frame every 100 ms, starting 50 ms earlier, whose pixels contain its number.
+/// Encodes a frame whose pixels contain its number.
+void add_picture(Aedat4Encoder& encoder, Microseconds t, int number, Bytes& bytes, int width = 5,
+                 int height = 3) {
+  const Bytes pixels(static_cast<std::size_t>(width * height), static_cast<std::uint8_t>(number));
+  encoder.encode({t, t, t, t, t, PixelFormat::grey8, width, height, 0, 0, pixels.data(), width},
+                 bytes);
+}
+
+Events from(const Events& events, Microseconds start, Microseconds stop) {
+  Events found;
+  std::ranges::copy_if(events, std::back_inserter(found),
+                       [&](const auto& event) { return event.t >= start && event.t < stop; });
+  return found;
+}
+
+/// Events, and a frame every 100 ms, starting 50 ms earlier.
 File aedat_file(bool has_table) {
   Aedat4Encoder encoder({sensor, "a camera", Aedat4Compression::lz4, true, has_table});
   Bytes bytes;
   const auto events = some_events();
-  std::span<const AbsoluteEvent> rest(events);
-  for (int i = 0; i < 40; ++i) {
-    const auto t = events.front().t - 50'000 + i * 100'000;
-    const auto count = std::ranges::find_if(rest, [t](auto e) { return e.t >= t; }) - rest.begin();
-    encoder.encode(rest.first(static_cast<std::size_t>(count)), bytes);
-    rest = rest.subspan(static_cast<std::size_t>(count));
-    const Bytes pixels(15, static_cast<std::uint8_t>(i));
-    encoder.encode({t, t, t, t, t, PixelFormat::grey8, 5, 3, 0, 0, pixels.data(), 5}, bytes);
+  auto last = events.front().t - 50'000;
+  for (int i = 0; i < 40; ++i, last += 100'000) {
+    if (i > 0) encoder.encode(from(events, last - 100'000, last), bytes);
+    add_picture(encoder, last, i, bytes);
   }
-  encoder.encode(rest, bytes);
+  encoder.encode(from(events, last - 100'000, INT64_MAX), bytes);
   encoder.finish(bytes);
-  if (const auto patch = encoder.patch())
-    std::ranges::copy(patch->bytes, bytes.begin() + static_cast<std::ptrdiff_t>(patch->position));
+  recordings::apply_patch(encoder, bytes);
   return {has_table ? "aedat_with_a_table" : "aedat_without_a_table", std::move(bytes),
-          [] { return std::make_unique<AedatDecoder>(); }};
+          make_aedat_decoder};
 }
 
 /// As an older DV writes them: the table has the positions of the packets, and zeros.
@@ -99,16 +112,8 @@ File aedat_file_with_a_table_of_zeros() {
   for (auto& entry : table.value()) entry.elements = entry.start = entry.end = 0;
   file.name = "aedat_with_a_table_of_zeros";
   file.bytes.erase(file.bytes.begin() + table_at, file.bytes.end());
-  Aedat4Compressor(decoder.compression()).compress(aedat4_table_content(*table), file.bytes);
+  make_aedat4_compressor(decoder.compression()).compress(aedat4_table_content(*table), file.bytes);
   return file;
-}
-
-std::vector<File> all_files() {
-  std::vector<File> files{raw_file(), npy_file()};
-  files.push_back(aedat_file(true));
-  files.push_back(aedat_file_with_a_table_of_zeros());
-  files.push_back(aedat_file(false));
-  return files;
 }
 
 /// Complete output.
@@ -120,10 +125,14 @@ struct Outcome {
   std::vector<Chunk> chunks;
   std::vector<Picture> pictures;
   std::vector<Trigger> triggers;
+  std::vector<Microseconds> waiting;  ///< triggers whose chunk has to follow
 
   void take(const RecordingReader::Start& /*start*/) { ++starts; }
   void take(const RecordingReader::Chunk& chunk) {
-    EXPECT_GE(starts, 1U);
+    for (const auto t : std::exchange(waiting, {})) {
+      EXPECT_GE(t, chunk.start);
+      EXPECT_LT(t, chunk.start + chunk.duration);
+    }
     chunks.emplace_back(chunk.stream, chunk.start, chunk.duration,
                         std::vector<Event>(chunk.events.begin(), chunk.events.end()));
   }
@@ -131,13 +140,29 @@ struct Outcome {
     pictures.emplace_back(item.stream, item.time, item.frame.pixels[0]);
   }
   void take(const TriggerItem& item) {
-    triggers.insert(triggers.end(), item.triggers.begin(), item.triggers.end());
+    for (const auto& trigger : item.triggers) {
+      triggers.push_back(trigger);
+      if (trigger.t >= 0) waiting.push_back(trigger.t);
+    }
   }
   void take(const ImuItem& /*item*/) {}
 
   void take_all(RecordingReader& reader) {
     while (const auto output = reader.next())
       std::visit([this](const auto& item) { take(item); }, *output);
+  }
+
+  /// Pushes the file in pieces, each in memory of its own.
+  void take_all(RecordingReader& reader, std::span<const std::uint8_t> file, std::size_t piece) {
+    for (const auto part : recordings::pieces_of(file, piece)) {
+      const Bytes copy(part.begin(), part.end());
+      reader.push(copy);
+      take_all(reader);
+    }
+    EXPECT_FALSE(reader.at_end());
+    reader.finish();
+    take_all(reader);
+    EXPECT_TRUE(reader.at_end());
   }
 
   /// Events of one stream, without silences.
@@ -160,64 +185,44 @@ struct Outcome {
   }
 };
 
-Events from(const Events& events, Microseconds start, Microseconds stop) {
-  Events found;
-  std::ranges::copy_if(events, std::back_inserter(found),
-                       [&](const auto& event) { return event.t >= start && event.t < stop; });
-  return found;
-}
-
-class Recording : public testing::TestWithParam<File> {
- protected:
-  Microseconds origin() const {
-    return GetParam().name.starts_with("aedat") ? 1'950'000 : 2'000'000;
-  }
-  RecordingReader reader() const { return {GetParam().make_decoder, chunk_length}; }
-};
-INSTANTIATE_TEST_SUITE_P(, Recording, testing::ValuesIn(all_files()),
+class Recording : public testing::TestWithParam<File> {};
+INSTANTIATE_TEST_SUITE_P(, Recording,
+                         testing::Values(raw_file(), npy_file(), aedat_file(true),
+                                         aedat_file_with_a_table_of_zeros(), aedat_file(false)),
                          [](const auto& test) { return test.param.name; });
 
 TEST_P(Recording, IsTheSamePushedAndPulled) {
-  MemoryBytes bytes(GetParam().bytes);
-  RecordingReader pulled(GetParam().make_decoder, chunk_length);
+  const auto& [name, file, make_decoder] = GetParam();
+  const Microseconds origin = name.starts_with("aedat") ? 1'950'000 : 2'000'000;
+  recordings::BreakableBytes bytes(file);
+  bytes.is_broken = true;
+  RecordingReader pulled(make_decoder, chunk_length);
   pulled.open(bytes);
+  EXPECT_FALSE(pulled.duration());
+  EXPECT_FALSE(pulled.next());
+  EXPECT_FALSE(pulled.at_end());
+  bytes.is_broken = false;
   Outcome expected;
   expected.take_all(pulled);
   EXPECT_TRUE(pulled.at_end());
   EXPECT_EQ(expected.starts, 1U);
-  EXPECT_EQ(pulled.origin(), origin());
-  EXPECT_EQ(expected.events(origin()), some_events());
+  EXPECT_EQ(pulled.origin(), origin);
+  EXPECT_EQ(pulled.duration(), 5'999'950 + 1 - origin);
+  EXPECT_EQ(expected.events(origin), some_events());
   expected.expect_no_overlap();
   EXPECT_EQ(pulled.counts().events, some_events().size());
   EXPECT_EQ(pulled.counts().frames, expected.pictures.size());
   EXPECT_EQ(pulled.counts().corrupt_places, 0U);
   for (const std::size_t size : {1UL, 0UL, 1UL << 24}) {
-    RecordingReader pushed(GetParam().make_decoder, chunk_length);
+    RecordingReader pushed(make_decoder, chunk_length);
     Outcome outcome;
-    for (const auto piece : pieces::of(GetParam().bytes, size)) {
-      const Bytes copy(piece.begin(), piece.end());
-      pushed.push(copy);
-      outcome.take_all(pushed);
-    }
-    EXPECT_FALSE(pushed.at_end());
-    pushed.finish();
-    outcome.take_all(pushed);
-    EXPECT_TRUE(pushed.at_end());
-    EXPECT_EQ(pushed.origin(), origin());
-    EXPECT_EQ(outcome.events(origin()), some_events());
+    outcome.take_all(pushed, file, size);
+    EXPECT_EQ(pushed.origin(), origin);
+    EXPECT_EQ(outcome.events(origin), some_events());
     outcome.expect_no_overlap();
     EXPECT_EQ(outcome.pictures, expected.pictures);
     EXPECT_EQ(pushed.streams().size(), pulled.streams().size());
   }
-}
-
-TEST_P(Recording, TellsItsDuration) {
-  MemoryBytes bytes(GetParam().bytes);
-  RecordingReader reader(GetParam().make_decoder, chunk_length);
-  reader.open(bytes);
-  EXPECT_FALSE(reader.duration());
-  ASSERT_TRUE(reader.next());
-  EXPECT_EQ(reader.duration(), 5'999'950 + 1 - origin());
 }
 
 /// Events, and a frame every 100 ms; all of one before the first of the other.
@@ -226,11 +231,7 @@ Bytes aedat_of_parts(bool frames_first) {
   Bytes bytes;
   const auto events = some_events();
   if (!frames_first) encoder.encode(events, bytes);
-  for (int i = 0; i < 40; ++i) {
-    const auto t = events.front().t + i * 100'000;
-    const Bytes pixels(15, static_cast<std::uint8_t>(i));
-    encoder.encode({t, t, t, t, t, PixelFormat::grey8, 5, 3, 0, 0, pixels.data(), 5}, bytes);
-  }
+  for (int i = 0; i < 40; ++i) add_picture(encoder, events.front().t + i * 100'000, i, bytes);
   if (frames_first) encoder.encode(events, bytes);
   encoder.finish(bytes);
   return bytes;
@@ -240,14 +241,9 @@ TEST(RecordingReader, ReadsStreamsThatAreWrittenOneAfterTheOther) {
   for (const bool frames_first : {false, true}) {
     const auto bytes = aedat_of_parts(frames_first);
     for (const std::size_t size : {std::size_t{1000}, bytes.size()}) {
-      RecordingReader reader([] { return std::make_unique<AedatDecoder>(); }, chunk_length);
+      RecordingReader reader(make_aedat_decoder, chunk_length);
       Outcome outcome;
-      for (const auto piece : pieces::of(bytes, size)) {
-        reader.push(piece);
-        outcome.take_all(reader);
-      }
-      reader.finish();
-      outcome.take_all(reader);
+      outcome.take_all(reader, bytes, size);
       EXPECT_EQ(outcome.events(reader.origin()), some_events());
       EXPECT_EQ(outcome.pictures.size(), 40U);
       EXPECT_EQ(reader.counts().late, 0U);
@@ -261,7 +257,7 @@ TEST(RecordingReader, ReadsStreamsThatAreWrittenOneAfterTheOther) {
     }
 
     MemoryBytes source(bytes);
-    RecordingReader reader([] { return std::make_unique<AedatDecoder>(); }, chunk_length);
+    RecordingReader reader(make_aedat_decoder, chunk_length);
     reader.open(source);
     reader.seek(200'000, 400'000);
     Outcome part;
@@ -309,17 +305,14 @@ TEST(RecordingReader, DoesNotReadOnWhileAStreamIsSilent) {
     const std::vector events(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
     for (int i = 0; i < frames; ++i) {
       const auto t = all.front().t + i * 10'000;
-      const Bytes pixels(64 * 48, static_cast<std::uint8_t>(i));
       encoder.encode(from(events, t, t + 10'000), bytes);
-      encoder.encode({t, t, t, t, t, PixelFormat::grey8, 64, 48, 0, 0, pixels.data(), 64}, bytes);
+      add_picture(encoder, t, i, bytes, 64, 48);
     }
     encoder.encode(from(events, all.front().t + frames * 10'000, all.back().t + 1), bytes);
     encoder.finish(bytes);
-    const auto patch = encoder.patch();
-    std::ranges::copy(patch->bytes, bytes.begin() + static_cast<std::ptrdiff_t>(patch->position));
-
+    recordings::apply_patch(encoder, bytes);
     WatchedBytes source(bytes);
-    RecordingReader reader([] { return std::make_unique<AedatDecoder>(); }, chunk_length);
+    RecordingReader reader(make_aedat_decoder, chunk_length);
     reader.open(source);
     reader.seek(0, stop);
     Outcome outcome;
@@ -347,34 +340,10 @@ TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
   const auto make_decoder = [] { return make_prophesee_raw_decoder(); };
   for (const std::size_t size : {1UL, 0UL, 1UL << 24}) {
     RecordingReader reader(make_decoder, chunk_length);
-    std::vector<Trigger> found;
-    std::vector<Microseconds> waiting;
-    Microseconds end = 0;
-    const auto take = [&] {
-      while (const auto output = reader.next()) {
-        if (const auto* const item = std::get_if<TriggerItem>(&*output)) {
-          for (auto trigger : item->triggers) {
-            if (trigger.t >= 0) waiting.push_back(trigger.t);
-            trigger.t += reader.origin();
-            found.push_back(trigger);
-          }
-        } else if (const auto* const chunk = std::get_if<RecordingReader::Chunk>(&*output)) {
-          EXPECT_EQ(chunk->start, end);
-          end = chunk->start + chunk->duration;
-          for (const auto t : std::exchange(waiting, {})) {
-            EXPECT_GE(t, chunk->start);
-            EXPECT_LT(t, end);
-          }
-        }
-      }
-    };
-    for (const auto piece : pieces::of(bytes, size)) {
-      reader.push(piece);
-      take();
-    }
-    reader.finish();
-    take();
-    EXPECT_EQ(found, triggers);
+    Outcome outcome;
+    outcome.take_all(reader, bytes, size);
+    for (auto& trigger : outcome.triggers) trigger.t += reader.origin();
+    EXPECT_EQ(outcome.triggers, triggers);
     EXPECT_EQ(reader.counts().triggers, triggers.size());
   }
 
@@ -383,7 +352,6 @@ TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
   reader.open(source);
   reader.seek(3'700'000, 3'900'000);
   Outcome sought;
-  sought.starts = 1;
   sought.take_all(reader);
   ASSERT_EQ(sought.triggers.size(), 4U);
   EXPECT_EQ(reader.counts().triggers, 4U);
@@ -393,38 +361,19 @@ TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
   }
 }
 
-TEST(RecordingReader, GuessesTheSizeOfASensor) {
-  const auto file = npy_file();
-  for (const std::size_t size : {1UL, 1UL << 24}) {
-    RecordingReader reader(file.make_decoder, chunk_length);
-    for (const auto piece : pieces::of(file.bytes, size)) {
-      reader.push(piece);
-      if (reader.next()) break;
-    }
-    ASSERT_EQ(reader.streams().size(), 1U);
-    EXPECT_EQ(reader.streams().front().size_from, RecordingReader::SizeFrom::assumption);
-    EXPECT_EQ(reader.streams().front().info.size, (SensorSize{320, 320})) << size;
-  }
-}
-
-/// A file that does not state its size, whose events move out of the size that the first ones fit
-/// into. It has more rows than the decoder samples.
-File growing_file() {
-  Events events;
-  for (int i = 0; i < 60'000; ++i)
-    events.push_back(AbsoluteEvent::at(i / 60, i / 100, Microseconds{50} * i,
-                                       i % 2 == 0 ? Polarity::off : Polarity::on));
-  NpyEncoder encoder;
-  return {"growing", recordings::encode(encoder, events),
-          [] { return std::make_unique<NpyDecoder>(); }};
-}
-
+/// Of a file that does not state its size. It has more rows than the decoder samples, whose events
+/// move out of the size that the first ones fit into.
 TEST(RecordingReader, GrowsAnAssumedSensorBeforeTheEventsThatNeedIt) {
-  const auto file = growing_file();
-  RecordingReader reader(file.make_decoder, chunk_length);
+  Events growing;
+  for (int i = 0; i < 60'000; ++i)
+    growing.push_back(AbsoluteEvent::at(i / 60, i / 100, Microseconds{50} * i, Polarity::off));
+  NpyEncoder encoder;
+  const auto file = recordings::encode(encoder, growing);
+  RecordingReader reader(npy_file().make_decoder, chunk_length);
   std::vector<SensorSize> sizes;
   std::size_t events = 0;
-  const auto take_all = [&] {
+  for (const auto piece : recordings::pieces_of(file, 500)) {
+    reader.push(piece);
     while (const auto output = reader.next()) {
       const auto* const chunk = std::get_if<RecordingReader::Chunk>(&*output);
       if (chunk == nullptr) continue;
@@ -436,14 +385,11 @@ TEST(RecordingReader, GrowsAnAssumedSensorBeforeTheEventsThatNeedIt) {
       }
       events += chunk->events.size();
     }
-  };
-  for (const auto piece : pieces::of(file.bytes, 500)) {
-    reader.push(piece);
-    take_all();
   }
   reader.finish();
-  take_all();
-  EXPECT_EQ(events, 60'000U);
+  Outcome rest;
+  rest.take_all(reader);
+  EXPECT_EQ(events + rest.events(0).size(), 60'000U);
   EXPECT_EQ(reader.counts().outside, 0U);
   ASSERT_GE(sizes.size(), 3U);
   EXPECT_EQ(sizes.front(), (SensorSize{128, 128}));
@@ -466,19 +412,10 @@ TEST(RecordingReader, GuessesTheSizeOfASensorFromMostEvents) {
   const auto make_decoder = npy_file().make_decoder;
   for (const std::size_t piece_size : {bytes.size(), std::size_t{4000}}) {
     RecordingReader reader(make_decoder, chunk_length);
-    std::size_t read = 0;
-    const auto take_all = [&] {
-      while (const auto output = reader.next())
-        if (const auto* const chunk = std::get_if<RecordingReader::Chunk>(&*output))
-          read += chunk->events.size();
-    };
-    for (const auto piece : pieces::of(bytes, piece_size)) {
-      reader.push(piece);
-      take_all();
-    }
-    reader.finish();
-    take_all();
-    EXPECT_EQ(read, std::size_t{count}) << piece_size;
+    Outcome outcome;
+    outcome.take_all(reader, bytes, piece_size);
+    EXPECT_EQ(outcome.events(0).size(), std::size_t{count}) << piece_size;
+    EXPECT_EQ(reader.streams().front().size_from, RecordingReader::SizeFrom::assumption);
     EXPECT_EQ(reader.counts().outside, 8U) << piece_size;
     EXPECT_EQ(reader.streams().front().info.size, (SensorSize{240, 180})) << piece_size;
   }
@@ -498,22 +435,6 @@ TEST(UsedPixels, AreImplausibleWhereMoreThanAFewLieBeyondAnySensor) {
   EXPECT_TRUE(are_implausible(2, 1, 1));
   EXPECT_FALSE(are_implausible(990, 10, 0));
   EXPECT_TRUE(are_implausible(990, 10, 1));
-}
-
-TEST(RecordingReader, LeavesOutWhatLiesOutsideASizeThatIsSet) {
-  const auto file = npy_file();
-  RecordingReader reader(file.make_decoder, chunk_length);
-  reader.push(file.bytes);
-  reader.finish();
-  ASSERT_TRUE(std::holds_alternative<RecordingReader::Start>(*reader.next()));
-  reader.set_size(0, {160, 240});
-  Outcome outcome;
-  outcome.starts = 1;
-  outcome.take_all(reader);
-  const auto within =
-      std::ranges::count_if(some_events(), [](auto event) { return event.x < 160; });
-  EXPECT_EQ(outcome.events(0).size(), static_cast<std::size_t>(within));
-  EXPECT_EQ(reader.counts().outside, some_events().size() - static_cast<std::size_t>(within));
 }
 
 /// Longer than the surveyed part and slower at its end, so that no estimate is right.
@@ -630,20 +551,8 @@ TEST(RecordingReader, KeepsNoStateOfWordsThroughADiscontinuity) {
   EXPECT_EQ(std::get<3>(chunks.front()), (std::vector{Event::at(3, 9, 0, Polarity::off)}));
   EXPECT_EQ(outcome.triggers.size(), 1U);
   EXPECT_EQ(reader.counts().corrupt_places, 1U);
-  EXPECT_EQ(reader.corruption().first, "EVT3 vector without a base column");
   EXPECT_EQ(reader.corruption().first_at, 15U + 8U);
   EXPECT_EQ(reader.streams().front().info.size, sensor);
-}
-
-TEST(RecordingReader, SaysWhatIsNoRecording) {
-  const auto make = [] { return make_prophesee_raw_decoder(); };
-  RecordingReader pushed(make, chunk_length);
-  pushed.finish();
-  EXPECT_THROW(pushed.next(), UnsupportedFormat);
-  MemoryBytes empty({});
-  RecordingReader pulled(make, chunk_length);
-  pulled.open(empty);
-  EXPECT_THROW(pulled.next(), UnsupportedFormat);
 }
 
 /// A table in any order: pulled, it is sorted; pushed, it is refused, however it is divided.
@@ -653,8 +562,7 @@ TEST(RecordingReader, SortsATableOrRefusesIt) {
   std::mt19937 random(3);
   std::ranges::shuffle(shuffled, random);
   // Few rows are not told apart from a flipped bit by their number, but by their share.
-  const std::vector<Events> tables{shuffled, Events(shuffled.begin(), shuffled.begin() + 10)};
-  for (const auto& events : tables) {
+  for (const auto& events : {shuffled, Events(shuffled.begin(), shuffled.begin() + 10)}) {
     NpyEncoder encoder;
     const auto file = recordings::encode(encoder, events);
     auto expected = events;
@@ -676,7 +584,6 @@ TEST(RecordingReader, SortsATableOrRefusesIt) {
 
       const Microseconds start = (expected.back().t - first) / 2;
       Outcome sought;
-      sought.starts = outcome.starts;
       pulled.seek(start, std::nullopt);
       sought.take_all(pulled);
       EXPECT_EQ(sought.events(first), from(expected, first + start, expected.back().t + 1));
@@ -686,12 +593,7 @@ TEST(RecordingReader, SortsATableOrRefusesIt) {
         RecordingReader pushed(make, chunk_length);
         Outcome before;
         try {
-          for (const auto part : pieces::of(file, piece)) {
-            pushed.push(part);
-            before.take_all(pushed);
-          }
-          pushed.finish();
-          before.take_all(pushed);
+          before.take_all(pushed, file, piece);
         } catch (const UnsupportedFormat& error) {
           errors.emplace_back(error.what());
         }
@@ -714,40 +616,6 @@ TEST(RecordingReader, DropsAWrongTimeOfALongTable) {
   outcome.take_all(pulled);
   EXPECT_FALSE(pulled.is_sorted());
   EXPECT_EQ(pulled.counts().stray, 1U);
-}
-
-/// A source that fails once.
-class Broken final : public ByteSource {
- public:
-  explicit Broken(Bytes bytes) : bytes_(std::move(bytes)) {}
-  std::uint64_t size() const override { return bytes_.size(); }
-  std::optional<std::size_t> read(std::uint64_t position,
-                                  std::span<std::uint8_t> out) noexcept override {
-    if (failed()) return std::nullopt;
-    return bytes_.read(position, out);
-  }
-  std::optional<std::span<const std::uint8_t>> piece(std::uint64_t position) override {
-    if (failed()) return std::nullopt;
-    return bytes_.piece(position);
-  }
-  bool failed() const noexcept override { return failed_; }
-
-  bool failed_ = true;
-
- private:
-  MemoryBytes bytes_;
-};
-
-TEST_P(Recording, IsReadWhereBytesCanBeReadAgain) {
-  Broken bytes(GetParam().bytes);
-  RecordingReader reader(GetParam().make_decoder, chunk_length);
-  reader.open(bytes);
-  EXPECT_FALSE(reader.next());
-  EXPECT_FALSE(reader.at_end());
-  bytes.failed_ = false;
-  Outcome outcome;
-  outcome.take_all(reader);
-  EXPECT_EQ(outcome.events(origin()), some_events());
 }
 
 }  // namespace

@@ -3,12 +3,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <span>
+#include <stdexcept>
 #include <string>
+#include <string_view>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "src/core/sensor_size.hpp"
+#include "src/formats/byte_source.hpp"
 #include "src/formats/corruption.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
@@ -17,6 +23,8 @@ namespace recordings {
 
 using namespace eventcamera;
 using Random = std::mt19937_64;
+using Bytes = std::vector<std::uint8_t>;
+using Events = std::vector<AbsoluteEvent>;
 
 inline int below(Random& random, int end) {
   return std::uniform_int_distribution<int>(0, end - 1)(random);
@@ -24,9 +32,9 @@ inline int below(Random& random, int end) {
 
 /// Typical events of cameras and simulators: noise, rows that fire at once, bursts, and pauses of
 /// up to `max_pause`.
-inline std::vector<AbsoluteEvent> random_events(Random& random, SensorSize size, std::size_t count,
-                                                Microseconds max_pause) {
-  std::vector<AbsoluteEvent> events;
+inline Events random_events(Random& random, SensorSize size, std::size_t count,
+                            Microseconds max_pause) {
+  Events events;
   Microseconds t = below(random, 3) == 0 ? below(random, 100'000) : 0;
   const auto polarity = [&] { return below(random, 2) == 0 ? Polarity::off : Polarity::on; };
   while (events.size() < count) {
@@ -69,30 +77,96 @@ inline std::vector<AbsoluteEvent> random_events(Random& random, SensorSize size,
   return events;
 }
 
-inline std::vector<std::uint8_t> encode(Encoder& encoder, std::span<const AbsoluteEvent> events) {
-  std::vector<std::uint8_t> bytes;
-  encoder.encode(events, bytes);
+/// Exactly `count` events, none before `start`.
+inline Events random_events(SensorSize size, std::size_t count, unsigned seed,
+                            Microseconds start = 0, Microseconds max_pause = 10'000'000) {
+  Random random(seed);
+  auto events = random_events(random, size, count, max_pause);
+  events.resize(count);
+  for (auto& event : events) event.t += start;
+  return events;
+}
+
+inline Bytes bytes_of(std::string_view text) {
+  return {text.begin(), text.end()};
+}
+
+inline Bytes encode(Encoder& encoder, std::span<const AbsoluteEvent> events,
+                    std::size_t at_once = SIZE_MAX) {
+  Bytes bytes;
+  for (; !events.empty(); events = events.subspan(std::min(at_once, events.size())))
+    encoder.encode(events.first(std::min(at_once, events.size())), bytes);
   while (encoder.finish(bytes)) continue;
   return bytes;
 }
 
-/// Decodes everything, in pieces of `next_piece()` bytes.
-template <class NextPiece>
-Decoded decode(EventDecoder& decoder, std::span<const std::uint8_t> bytes,
-               const NextPiece& next_piece) {
-  Decoded decoded;
+/// Writes the patch of an encoder, as a seekable output does.
+inline void apply_patch(const Encoder& encoder, Bytes& bytes) {
+  if (const auto patch = encoder.patch())
+    std::ranges::copy(patch->bytes, bytes.begin() + static_cast<std::ptrdiff_t>(patch->position));
+}
+
+/// Every piece has `size` bytes; 0: random sizes, many of them tiny.
+inline std::vector<std::span<const std::uint8_t>> pieces_of(std::span<const std::uint8_t> bytes,
+                                                            std::size_t size) {
+  Random random(1);
+  std::vector<std::span<const std::uint8_t>> pieces;
   while (!bytes.empty()) {
-    const auto piece = bytes.first(std::min<std::size_t>(bytes.size(), next_piece()));
-    decoder.decode(piece, decoded);
-    bytes = bytes.subspan(piece.size());
+    const std::size_t wanted = size != 0           ? size
+                               : random() % 4 == 0 ? 1 + random() % 20000
+                                                   : 1 + random() % 40;
+    pieces.push_back(bytes.first(std::min(wanted, bytes.size())));
+    bytes = bytes.subspan(pieces.back().size());
   }
+  return pieces;
+}
+
+/// Decodes everything, each piece in memory of its own.
+inline Decoded decode(EventDecoder& decoder, std::span<const std::uint8_t> bytes,
+                      std::size_t piece = SIZE_MAX) {
+  Decoded decoded;
+  for (const auto part : pieces_of(bytes, piece))
+    decoder.decode(Bytes(part.begin(), part.end()), decoded);
   decoder.finish(decoded);
   return decoded;
 }
 
-inline Decoded decode(EventDecoder& decoder, std::span<const std::uint8_t> bytes) {
-  return decode(decoder, bytes, [&] { return bytes.size(); });
+/// Events of a decoder; throws if its output differs between splits of these bytes.
+template <class Make>
+Events events_however_split(const Make& make, std::span<const std::uint8_t> bytes) {
+  const auto outcome = [&](std::size_t piece) {
+    const auto decoder = make();
+    const auto decoded = decode(*decoder, bytes, piece);
+    const auto& corruption = decoder->corruption();
+    return std::tuple(decoded.events, decoded.triggers, decoder->size(), corruption.places,
+                      corruption.first_at, corruption.first, corruption.outside);
+  };
+  const auto whole = outcome(SIZE_MAX);
+  for (const std::size_t piece : {1, 7, 4097, 0})
+    if (outcome(piece) != whole)
+      throw std::logic_error("other output for pieces of " + std::to_string(piece));
+  return std::get<0>(whole);
 }
+
+/// A source that fails while it is broken.
+class BreakableBytes final : public ByteSource {
+ public:
+  explicit BreakableBytes(Bytes bytes) : source_(std::move(bytes)) {}
+  std::uint64_t size() const override { return source_.size(); }
+  std::optional<std::size_t> read(std::uint64_t position,
+                                  std::span<std::uint8_t> out) noexcept override {
+    return is_broken ? std::nullopt : source_.read(position, out);
+  }
+  std::optional<std::span<const std::uint8_t>> piece(std::uint64_t position) override {
+    return is_broken ? std::nullopt : source_.piece(position);
+  }
+  bool failed() const noexcept override { return is_broken; }
+
+  bool is_broken = false;
+
+ private:
+  MemoryBytes source_;
+};
 
 /// Error of a decoder for a file; empty if it succeeds.
 inline std::string refusal(EventDecoder& decoder, std::span<const std::uint8_t> bytes) {

@@ -137,12 +137,14 @@ inline Text cdr_event_array(SensorSize size, std::span<const AbsoluteEvent> even
 }
 
 /// A .db3 with the topic /dvs/events of dvs_msgs/msg/EventArray: a row per message of up to
-/// `per_message` events.
+/// `per_message` events. Pages of 512 bytes are the smallest.
 inline std::vector<std::uint8_t> db3_of_events(SensorSize size,
                                                std::span<const AbsoluteEvent> events,
-                                               std::size_t per_message) {
+                                               std::size_t per_message, int page_size = 4096) {
   sqlite3* database = nullptr;
   sqlite3_open(":memory:", &database);
+  const auto pages = "PRAGMA page_size = " + std::to_string(page_size);
+  sqlite3_exec(database, pages.c_str(), nullptr, nullptr, nullptr);
   sqlite3_exec(database,
                "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,"
                " serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);"

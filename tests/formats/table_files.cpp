@@ -15,17 +15,17 @@
 #include "src/formats/numpy/npz.hpp"
 #include "src/formats/text/csv_decoder.hpp"
 #include "src/formats/text/csv_encoder.hpp"
+#include "tests/formats/recordings.hpp"
 
 namespace {
 
-using namespace eventcamera;
+using namespace recordings;
 
 constexpr SensorSize size = {1280, 720};
 
-std::vector<std::uint8_t> load(const std::string& path) {
+Bytes load(const std::string& path) {
   std::ifstream stream(path, std::ios::binary);
-  const std::string text(std::istreambuf_iterator<char>(stream), {});
-  return {text.begin(), text.end()};
+  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
 void save(const std::string& path, const void* bytes, std::size_t count) {
@@ -33,74 +33,58 @@ void save(const std::string& path, const void* bytes, std::size_t count) {
       .write(static_cast<const char*>(bytes), static_cast<std::streamsize>(count));
 }
 
+/// Nothing for HDF5, whose writer writes the file itself.
+std::unique_ptr<Encoder> make_encoder(const std::string& kind) {
+  if (kind == "npy") return std::make_unique<NpyEncoder>();
+  if (kind == "npz") return make_npz_encoder(size);
+  for (const auto& [name, description, format] : csv_formats())
+    if (kind == name) return std::make_unique<CsvEncoder>(format, size);
+  return nullptr;
+}
+
 void write_file(const std::string& kind, const std::string& file, const std::string& raw) {
-  const auto bytes = load(raw);
-  std::vector<AbsoluteEvent> events(bytes.size() / sizeof(AbsoluteEvent));
-  if (!events.empty())
-    std::memcpy(static_cast<void*>(events.data()), bytes.data(),
-                events.size() * sizeof(AbsoluteEvent));
-  std::vector<std::uint8_t> out;
-  if (kind == "npy") {
-    NpyEncoder encoder;
-    encoder.encode(events, out);
-    encoder.finish(out);
-    const auto patch = encoder.patch().value();
-    std::memcpy(out.data() + patch.position, patch.bytes.data(), patch.bytes.size());
-    save(file, out.data(), out.size());
+  const auto memory = load(raw);
+  Events events(memory.size() / sizeof(AbsoluteEvent));
+  if (!events.empty()) std::memcpy(static_cast<void*>(events.data()), memory.data(), memory.size());
+  if (const auto encoder = make_encoder(kind)) {
+    auto bytes = encode(*encoder, events);
+    apply_patch(*encoder, bytes);
+    save(file, bytes.data(), bytes.size());
     return;
   }
-  if (kind == "npz") {
-    const auto encoder = make_npz_encoder(size);
-    encoder->encode(events, out);
-    while (encoder->finish(out)) continue;
-    save(file, out.data(), out.size());
-    return;
-  }
-  for (const auto& [name, description, format] : csv_formats()) {
-    if (kind != name) continue;
-    CsvEncoder encoder(format, size);
-    encoder.encode(events, out);
-    encoder.finish(out);
-    save(file, out.data(), out.size());
-    return;
-  }
-  Hdf5Writer::Settings settings;
-  settings.size = size;
-  settings.format = kind == "metavision-hdf5" ? Hdf5Format::metavision : Hdf5Format::dsec;
-  settings.compression =
-      kind == "dsec-gzip" ? Hdf5Writer::Compression::gzip : Hdf5Writer::Compression::none;
-  Hdf5Writer writer(file, settings);
+  Hdf5Writer writer(
+      file,
+      {kind == "metavision-hdf5" ? Hdf5Format::metavision : Hdf5Format::dsec,
+       kind == "dsec-gzip" ? Hdf5Writer::Compression::gzip : Hdf5Writer::Compression::none, size});
   writer.append(events);
   writer.close();
 }
 
 void read_file(const std::string& kind, const std::string& file, const std::string& raw) {
-  Decoded out;
+  Events events;
   Corruption corruption;
+  MemoryBytes bytes(load(file));
   if (kind == "hdf5") {
-    MemoryBytes bytes(load(file));
     Hdf5Reader reader(bytes);
-    while (reader.read(10'000, out.events) > 0) {
+    while (reader.read(10'000, events) > 0) {
     }
     corruption = reader.corruption();
   } else if (kind == "npz") {
-    MemoryBytes bytes(load(file));
     const auto reader = make_npz_decoder();
     reader->open(bytes);
     while (const auto item = reader->next()) {
-      const auto events = std::get<EventItem>(*item).events;
-      out.events.insert(out.events.end(), events.begin(), events.end());
+      const auto some = std::get<EventItem>(*item).events;
+      events.insert(events.end(), some.begin(), some.end());
     }
     corruption = reader->corruption();
   } else {
     const std::unique_ptr<EventDecoder> decoder =
         kind == "npy" ? std::unique_ptr<EventDecoder>(std::make_unique<NpyDecoder>())
                       : std::make_unique<CsvDecoder>();
-    decoder->decode(load(file), out);
-    decoder->finish(out);
+    events = decode(*decoder, load(file)).events;
     corruption = decoder->corruption();
   }
-  save(raw, out.events.data(), out.events.size() * sizeof(AbsoluteEvent));
+  save(raw, events.data(), events.size() * sizeof(AbsoluteEvent));
   std::printf("%d %d %s\n", static_cast<int>(corruption.places),
               static_cast<int>(corruption.outside), corruption.first.c_str());
 }

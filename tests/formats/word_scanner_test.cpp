@@ -15,9 +15,9 @@ namespace {
 
 using namespace eventcamera;
 using recordings::below;
+using recordings::Bytes;
+using recordings::Events;
 using recordings::Random;
-using Bytes = std::vector<std::uint8_t>;
-using Events = std::vector<AbsoluteEvent>;
 using Piece = WordScanner::Piece;
 
 constexpr SensorSize sensor{320, 320};
@@ -80,23 +80,23 @@ std::vector<Events> in_transfers(const Events& events, Microseconds length = 10'
   return transfers;
 }
 
-Bytes part(const Bytes& bytes, std::size_t begin, std::size_t end) {
-  const auto first = bytes.begin();
-  return {first + static_cast<std::ptrdiff_t>(begin),
-          first + static_cast<std::ptrdiff_t>(std::min(end, bytes.size()))};
-}
-
 /// A scanner, and the decoder after it, which starts over after a gap, as evtdec does.
 class Reader {
  public:
   Reader(const Format& format, Framing framing)
       : format_(format), scanner_(make_word_scanner(format.format, sensor, framing)) {}
 
-  void scan(const Bytes& bytes, bool is_discontinuous = false,
+  void scan(std::span<const std::uint8_t> bytes, bool is_discontinuous = false,
             std::optional<Microseconds> elapsed = std::nullopt) {
     // In memory of its own, so that sanitizers detect reads past its end.
-    scanner_->scan({bytes, is_discontinuous, elapsed}, pieces);
+    const Bytes copy(bytes.begin(), bytes.end());
+    scanner_->scan({copy, is_discontinuous, elapsed}, pieces);
     decode();
+  }
+
+  void scan_pieces(const Bytes& bytes, std::size_t length) {
+    for (const auto piece : recordings::pieces_of(bytes, length)) scan(piece);
+    finish();
   }
 
   void finish() {
@@ -167,23 +167,35 @@ class EveryFormat : public testing::TestWithParam<Format> {
  protected:
   const Format& format = GetParam();
 
+  const Events sent = some_events(8'000, 1'000'000);
+
+  Bytes sent_bytes() const { return Camera(format).transfer_of(sent); }
+
   /// A transfer as in a padded buffer: words, an end marker and old bytes.
-  Bytes padded(Bytes words, std::size_t capacity, unsigned seed = 3) const {
+  Bytes padded(Bytes words) const {
     words.insert(words.end(), format.end_marker.begin(), format.end_marker.end());
-    Random random(seed);
-    while (words.size() < capacity) words.push_back(static_cast<std::uint8_t>(random()));
+    Random random(3);
+    while (words.size() < 8192) words.push_back(static_cast<std::uint8_t>(random()));
     return words;
+  }
+
+  /// Scans the transfers of a camera; the first one arrives after `elapsed`, if it is known.
+  void scan_padded(Reader& reader, const Events& events, bool is_discontinuous = false,
+                   std::optional<Microseconds> elapsed = std::nullopt) const {
+    Camera camera(format);
+    for (const auto& some : in_transfers(events)) {
+      reader.scan(padded(camera.transfer_of(some)), std::exchange(is_discontinuous, false),
+                  elapsed);
+      if (elapsed) elapsed = 10'000;
+    }
   }
 };
 INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
 TEST_P(EveryFormat, ReadsPaddedTransfers) {
-  const auto sent = some_events(8'000, 1'000'000);
-  Camera camera(format);
   Reader reader(format, Framing::padded);
-  for (const auto& events : in_transfers(sent))
-    reader.scan(padded(camera.transfer_of(events), 8192));
+  scan_padded(reader, sent);
   reader.finish();
   EXPECT_EQ(reader.events, sent);
   EXPECT_EQ(reader.counts().events, sent.size());
@@ -191,38 +203,24 @@ TEST_P(EveryFormat, ReadsPaddedTransfers) {
   EXPECT_EQ(reader.counts().gaps, 0U);
 }
 
-TEST_P(EveryFormat, ReadsLooseBytesInPiecesOfAnySize) {
-  const auto sent = some_events(5'000, 1'000'000);
-  const auto bytes = Camera(format).transfer_of(sent);
+TEST_P(EveryFormat, ReadsBytesInPiecesOfAnySize) {
+  const auto bytes = sent_bytes();
   for (const std::size_t length : {1, 3, 64, 4096, 1'000'000}) {
     SCOPED_TRACE(length);
     Reader reader(format, Framing::loose);
-    for (std::size_t at = 0; at < bytes.size(); at += length)
-      reader.scan(
-          {bytes.begin() + static_cast<std::ptrdiff_t>(at),
-           bytes.begin() + static_cast<std::ptrdiff_t>(std::min(at + length, bytes.size()))});
-    reader.finish();
+    reader.scan_pieces(bytes, length);
     EXPECT_EQ(reader.events, sent);
     EXPECT_EQ(reader.counts().lost_bytes, 0U);
     EXPECT_EQ(reader.counts().bytes, bytes.size());
   }
-}
-
-TEST_P(EveryFormat, JoinsWordsTornBetweenTransfers) {
-  const auto sent = some_events(5'000, 1'000'000);
-  const auto bytes = Camera(format).transfer_of(sent);
+  // Full buffers have no end marker, and words are torn between them.
   Reader reader(format, Framing::padded);
-  // Full buffers have no end marker.
-  const auto length = 64 * format.word + format.word / 2;
-  for (std::size_t at = 0; at < bytes.size(); at += length)
-    reader.scan(part(bytes, at, at + length));
-  reader.finish();
+  reader.scan_pieces(bytes, 64 * format.word + format.word / 2);
   EXPECT_EQ(reader.events, sent);
   EXPECT_EQ(reader.counts().lost_bytes, 0U);
 }
 
 TEST_P(EveryFormat, SkipsZerosAfterALostEndMarker) {
-  const auto sent = some_events(5'000, 1'000'000);
   Camera camera(format);
   Reader reader(format, Framing::padded);
   for (const auto& events : in_transfers(sent)) {
@@ -235,7 +233,6 @@ TEST_P(EveryFormat, SkipsZerosAfterALostEndMarker) {
 }
 
 TEST_P(EveryFormat, CountsLostTransfers) {
-  const auto sent = some_events(8'000, 1'000'000);
   const auto transfers = in_transfers(sent);
   Camera camera(format);
   Reader reader(format, Framing::padded);
@@ -243,7 +240,7 @@ TEST_P(EveryFormat, CountsLostTransfers) {
   std::size_t dropped = 0;
   bool after_loss = false;
   for (std::size_t i = 0; i < transfers.size(); ++i) {
-    const auto bytes = padded(camera.transfer_of(transfers[i]), 8192);
+    const auto bytes = padded(camera.transfer_of(transfers[i]));
     if (i % 7 == 3) {
       dropped += transfers[i].size();
       after_loss = true;
@@ -260,13 +257,12 @@ TEST_P(EveryFormat, CountsLostTransfers) {
 }
 
 TEST_P(EveryFormat, DropsTransfersThatComeAgain) {
-  const auto sent = some_events(8'000, 1'000'000);
   Camera camera(format);
   Reader reader(format, Framing::padded);
   std::size_t again = 0;
   int number = 0;
   for (const auto& events : in_transfers(sent)) {
-    const auto bytes = padded(camera.transfer_of(events), 8192);
+    const auto bytes = padded(camera.transfer_of(events));
     reader.scan(bytes);
     if (++number % 5 != 0) continue;
     for (int i = 0; i < 3; ++i) reader.scan(bytes);
@@ -281,7 +277,6 @@ TEST_P(EveryFormat, DropsTransfersThatComeAgain) {
 
 /// A transfer that ends early shows the words of an earlier one past its end.
 TEST_P(EveryFormat, DropsOldWordsPastATornTransfer) {
-  const auto sent = some_events(8'000, 1'000'000);
   Camera camera(format);
   Reader reader(format, Framing::padded);
   Bytes buffer(8192);
@@ -304,14 +299,13 @@ TEST_P(EveryFormat, DropsOldWordsPastATornTransfer) {
 }
 
 TEST_P(EveryFormat, FindsWordsAgainAfterLostBytes) {
-  const auto sent = some_events(8'000, 1'000'000);
-  const auto bytes = Camera(format).transfer_of(sent);
+  const auto bytes = sent_bytes();
   Random random(7);
   Reader reader(format, Framing::loose);
   for (std::size_t at = 0; at < bytes.size();) {
-    const auto end = std::min(bytes.size(), at + 2000 + random() % 3000);
-    reader.scan(part(bytes, at, end));
-    at = end + 1 + random() % 40;
+    const auto length = std::min<std::size_t>(bytes.size() - at, 2000 + random() % 3000);
+    reader.scan(std::span(bytes).subspan(at, length));
+    at += length + 1 + random() % 40;
   }
   reader.finish();
   const auto [missing, wrong] = compare(sent, reader.events);
@@ -328,36 +322,27 @@ TEST_P(EveryFormat, KeepsTheTimeAcrossWraps) {
   // EVT3 wraps after 16 s, the others after 4.7 h.
   const Microseconds wrap =
       format.format == EvtFormat::evt3 ? Microseconds{1} << 24 : Microseconds{1} << 34;
-  const auto sent = some_events(8'000, wrap - 300'000);
-  Camera camera(format);
+  const auto events = some_events(8'000, wrap - 300'000);
   Reader reader(format, Framing::padded);
-  for (const auto& events : in_transfers(sent))
-    reader.scan(padded(camera.transfer_of(events), 8192));
+  scan_padded(reader, events);
   reader.finish();
-  ASSERT_EQ(reader.events.size(), sent.size());
-  const auto shift = sent.front().t - reader.events.front().t;
+  ASSERT_EQ(reader.events.size(), events.size());
+  const auto shift = events.front().t - reader.events.front().t;
   EXPECT_EQ(shift % (Microseconds{1} << 24), 0);
-  for (std::size_t i = 0; i < sent.size(); ++i)
-    ASSERT_EQ(reader.events[i].t + shift, sent[i].t) << i;
+  for (std::size_t i = 0; i < events.size(); ++i)
+    ASSERT_EQ(reader.events[i].t + shift, events[i].t) << i;
   EXPECT_EQ(reader.counts().gaps, 0U);
 }
 
 TEST_P(EveryFormat, CountsTheWrapsOfALongGap) {
-  auto sent = some_events(2'000, 1'000'000);
-  const auto later = some_events(2'000, sent.back().t + 100'000'000, 2);
+  auto events = some_events(2'000, 1'000'000);
+  const auto later = some_events(2'000, events.back().t + 100'000'000, 2);
   Reader reader(format, Framing::padded);
-  Camera before(format);
-  Camera after(format);
-  for (const auto& events : in_transfers(sent))
-    reader.scan(padded(before.transfer_of(events), 8192), false, 10'000);
-  bool is_first = true;
-  for (const auto& events : in_transfers(later)) {
-    reader.scan(padded(after.transfer_of(events), 8192), is_first, is_first ? 100'010'000 : 10'000);
-    is_first = false;
-  }
+  scan_padded(reader, events, false, 10'000);
+  scan_padded(reader, later, true, 100'010'000);
   reader.finish();
-  sent.insert(sent.end(), later.begin(), later.end());
-  const auto [missing, wrong] = compare(sent, reader.events);
+  std::ranges::copy(later, std::back_inserter(events));
+  const auto [missing, wrong] = compare(events, reader.events);
   EXPECT_EQ(wrong, 0U);
   EXPECT_LT(missing, 300U);
 }
@@ -366,11 +351,7 @@ TEST_P(EveryFormat, FollowsACameraThatStartsOver) {
   const auto first = some_events(5'000, 9'000'000);
   const auto second = some_events(5'000, 1'000, 2);
   Reader reader(format, Framing::padded);
-  for (const auto* events : {&first, &second}) {
-    Camera camera(format);
-    for (const auto& some : in_transfers(*events))
-      reader.scan(padded(camera.transfer_of(some), 8192), false, 10'000);
-  }
+  for (const auto* events : {&first, &second}) scan_padded(reader, *events, false, 10'000);
   reader.finish();
   EXPECT_EQ(reader.events.size() + reader.counts().lost_events, first.size() + second.size());
   EXPECT_LT(reader.counts().lost_events, 700U);
@@ -381,19 +362,14 @@ TEST_P(EveryFormat, FollowsACameraThatStartsOver) {
 
 /// A flipped bit costs what is between the times beside it, or the rest of a transfer.
 TEST_P(EveryFormat, SurvivesFlippedBits) {
-  const auto sent = some_events(8'000, 1'000'000);
-  const auto bytes = Camera(format).transfer_of(sent);
+  const auto bytes = sent_bytes();
   Random random(5);
   for (const auto framing : {Framing::loose, Framing::padded}) {
     auto flipped = bytes;
     for (int i = 0; i < 8; ++i)
       flipped[random() % flipped.size()] ^= static_cast<std::uint8_t>(1 << below(random, 8));
     Reader reader(format, framing);
-    for (std::size_t at = 0; at < flipped.size(); at += 1024)
-      reader.scan(
-          {flipped.begin() + static_cast<std::ptrdiff_t>(at),
-           flipped.begin() + static_cast<std::ptrdiff_t>(std::min(at + 1024, flipped.size()))});
-    reader.finish();
+    reader.scan_pieces(flipped, 1024);
     const auto [missing, wrong] = compare(sent, reader.events);
     EXPECT_LT(missing, sent.size() / 4);
     EXPECT_LT(wrong, sent.size() / 10);
@@ -403,20 +379,17 @@ TEST_P(EveryFormat, SurvivesFlippedBits) {
 /// The cameras of Lucid fill their packets, within vectors, too.
 TEST(WordScanner, KeepsThePaddingOfLucid) {
   const auto sent = some_events(5'000, 1'000'000);
-  for (const auto& format : formats) {
-    if (format.format != EvtFormat::evt3) continue;
-    const auto bytes = Camera(format).transfer_of(sent);
-    Bytes padded;
-    for (std::size_t at = 0; at < bytes.size(); at += 2) {
-      padded.insert(padded.end(), {bytes[at], bytes[at + 1]});
-      if (at / 2 % 7 == 0) padded.insert(padded.end(), 2 * (1 + at % 3), 0x99);
-    }
-    Reader reader(format, Framing::loose);
-    reader.scan(padded);
-    reader.finish();
-    EXPECT_EQ(reader.events, sent);
-    EXPECT_EQ(reader.counts().lost_bytes, 0U);
+  const auto& evt3 = formats[3];
+  const auto bytes = Camera(evt3).transfer_of(sent);
+  Bytes padded;
+  for (std::size_t at = 0; at < bytes.size(); at += 2) {
+    padded.insert(padded.end(), {bytes[at], bytes[at + 1]});
+    if (at / 2 % 7 == 0) padded.insert(padded.end(), 2 * (1 + at % 3), 0x99);
   }
+  Reader reader(evt3, Framing::loose);
+  reader.scan_pieces(padded, padded.size());
+  EXPECT_EQ(reader.events, sent);
+  EXPECT_EQ(reader.counts().lost_bytes, 0U);
 }
 
 }  // namespace

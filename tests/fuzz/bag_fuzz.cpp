@@ -26,41 +26,22 @@ void seek(Decoder& reader, std::span<const std::uint8_t> bytes, Microseconds t) 
   take(reader, sums);
 }
 
-Sums sums_of(std::span<const std::uint8_t> bytes, Pieces pieces) {
-  const auto reader = std::make_unique<BagDecoder>("");
-  Sums sums;
-  try {
-    in_pieces(bytes, pieces, [&](auto piece) {
-      reader->push(piece);
-      take(*reader, sums);
-    });
-    reader->drain();
-    take(*reader, sums);
-  } catch (const UnsupportedFormat&) {
-    sums.rest.add(std::uint64_t{1});
-    return sums;
-  }
-  sums.rest.add(reader->corruption());
-  sums.rest.add(reader->streams().size());
-  return sums;
-}
-
 void read_with_index(std::span<const std::uint8_t> bytes) {
-  const auto reader = std::make_unique<BagDecoder>("");
+  BagDecoder reader("");
   MemoryBytes source({bytes.begin(), bytes.end()});
   Sums sums;
   try {
-    const bool reads_itself = reader->open(source);
+    const bool reads_itself = reader.open(source);
     if (!reads_itself) {
-      reader->push(bytes);
-      take(*reader, sums);
-      reader->drain();
+      reader.push(bytes);
+      take(reader, sums);
+      reader.drain();
     }
-    take(*reader, sums);
-    const auto last = reader->last_time();
+    take(reader, sums);
+    const auto last = reader.last_time();
     if (reads_itself) bytes = {};
-    seek(*reader, bytes, last.value_or(1'000'000));
-    seek(*reader, bytes, std::numeric_limits<Microseconds>::min());
+    seek(reader, bytes, last.value_or(1'000'000));
+    seek(reader, bytes, std::numeric_limits<Microseconds>::min());
   } catch (const UnsupportedFormat&) {
   }
 }
@@ -92,7 +73,10 @@ void play(std::span<const std::uint8_t> bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span bytes(data, size);
-  const auto outcome = [&](Pieces pieces) { return sums_of(bytes, pieces); };
+  const auto outcome = [&](Pieces pieces) {
+    BagDecoder reader("");
+    return sums_of(reader, bytes, pieces);
+  };
   // Of a corrupt page, SQLite at times gives what its memory held before.
   if (has_at(0, sqlite_magic, bytes))
     outcome({});

@@ -48,25 +48,19 @@ void require_same_again(const DatagramSettings& settings, std::vector<AbsoluteEv
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const auto formats = datagrams::all();
-  std::span bytes(data, size);
+  const std::span bytes(data, size);
   if (bytes.empty()) return 0;
   const auto& settings = formats[bytes[0] % formats.size()].settings;
-  bytes = bytes.subspan(1);
   const auto unpacker = make_datagram_unpacker(settings);
   std::vector<AbsoluteEvent> events;
   Microseconds latest = 0;
-  for (Microseconds arrival = 0; bytes.size() >= 3;) {
-    const auto wanted = static_cast<std::size_t>(bytes[0] | bytes[1] << 8);
-    arrival += Microseconds{1} << bytes[2] % 40;
-    bytes = bytes.subspan(3);
-    const auto part = bytes.first(std::min(wanted, bytes.size()));
-    bytes = bytes.subspan(part.size());
-    // In memory of its own, so that sanitizers detect reads past its end.
-    const std::vector<std::uint8_t> datagram(part.begin(), part.end());
+  Microseconds arrival = 0;
+  fuzz::for_each_packet(bytes.subspan(1), [&](int flags, const auto& datagram) {
+    arrival += Microseconds{1} << flags % 40;
     const auto reception = unpacker->unpack(datagram, arrival, events);
     require_valid(settings, reception, events, datagram.size(), latest);
     if (!events.empty()) latest = events.back().t;
     require_same_again(settings, events);
-  }
+  });
   return 0;
 }

@@ -61,6 +61,20 @@ void require_same_however_cut(std::span<const std::uint8_t> bytes, const Outcome
   require(outcome_of(pieces) == outcome_of(Pieces{}), "pieces make the same");
 }
 
+/// Calls `take(flags, packet)` for packets, each after two bytes with its size and one with flags.
+template <class Take>
+void for_each_packet(std::span<const std::uint8_t> bytes, const Take& take) {
+  while (bytes.size() >= 3) {
+    const auto size = static_cast<std::size_t>(bytes[0] | bytes[1] << 8);
+    const int flags = bytes[2];
+    bytes = bytes.subspan(3);
+    const auto packet = bytes.first(std::min(size, bytes.size()));
+    bytes = bytes.subspan(packet.size());
+    // In memory of its own, so that sanitizers detect reads past its end.
+    take(flags, std::vector<std::uint8_t>(packet.begin(), packet.end()));
+  }
+}
+
 /// Number of events earlier than a previous one.
 inline std::uint64_t unsorted(std::span<const AbsoluteEvent> events) {
   std::uint64_t count = 0;
@@ -124,12 +138,10 @@ auto outcome(const Make& make, std::span<const std::uint8_t> bytes, Pieces piece
 }
 
 template <class Make>
-int decoder(const Make& make, const std::uint8_t* data, std::size_t size,
-            std::size_t events_per_byte) {
-  const std::span bytes(data, size);
+void check_decoder(const Make& make, std::span<const std::uint8_t> bytes,
+                   std::size_t events_per_byte) {
   require_same_however_cut(
       bytes, [&](Pieces pieces) { return outcome(make, bytes, pieces, events_per_byte); });
-  return 0;
 }
 
 }  // namespace fuzz

@@ -73,4 +73,24 @@ inline void take(Decoder& reader, Sums& sums) {
   }
 }
 
+/// Complete output of a decoder that is pushed, and then drained; nothing of a file that it
+/// refuses.
+inline Sums sums_of(Decoder& reader, std::span<const std::uint8_t> bytes, Pieces pieces) {
+  Sums sums;
+  try {
+    in_pieces(bytes, pieces, [&](auto piece) {
+      reader.push(piece);
+      take(reader, sums);
+    });
+    reader.drain();
+    take(reader, sums);
+  } catch (const UnsupportedFormat&) {
+    sums.rest.add(std::uint64_t{1});
+    return sums;
+  }
+  sums.rest.add(reader.corruption());
+  sums.rest.add(reader.streams().size());
+  return sums;
+}
+
 }  // namespace fuzz

@@ -17,13 +17,8 @@ struct Seed {
   std::vector<std::uint8_t> bytes;
 };
 
-/// At most `count`, to keep files small.
-inline std::vector<AbsoluteEvent> few_events(unsigned seed, SensorSize size, std::size_t count) {
-  constexpr Microseconds max_pause = 3'600'000'000;
-  recordings::Random random(seed);
-  auto events = recordings::random_events(random, size, count, max_pause);
-  events.resize(count);
-  return events;
+inline recordings::Events few_events(unsigned seed, SensorSize size, std::size_t count) {
+  return recordings::random_events(size, count, seed, 0, 3'600'000'000);
 }
 
 }  // namespace fuzz

@@ -17,11 +17,8 @@
 
 namespace fuzz {
 
-using Bytes = std::vector<std::uint8_t>;
-
-inline Bytes bytes_of(std::string_view text) {
-  return {text.begin(), text.end()};
-}
+using recordings::Bytes;
+using recordings::bytes_of;
 
 inline std::vector<Seed> csv_seeds() {
   std::vector<Seed> seeds;
@@ -134,7 +131,7 @@ inline Bytes deflated(const Bytes& bytes) {
   return packed;
 }
 
-/// For hdf5_chunk_fuzz: layout, filters, and the bytes of a chunk.
+/// For chunks of HDF5: layout, filters, and the bytes of a chunk.
 inline std::vector<Seed> hdf5_chunk_seeds() {
   auto seeds = ecf_seeds();
   for (auto& seed : seeds) seed.bytes.insert(seed.bytes.begin(), {2, 0, 200, 250, 0});
@@ -150,7 +147,7 @@ inline std::vector<Seed> hdf5_chunk_seeds() {
   return seeds;
 }
 
-/// For hdf5_filters_fuzz: filters, those that are not applied, and 16 numbers of 4 bytes.
+/// For the filters of HDF5: filters, those that are not applied, and 16 numbers of 4 bytes.
 inline std::vector<Seed> hdf5_filters_seeds() {
   const Bytes numbers(64, 1);
   Bytes shuffled = {1, 1, 1, 6, 3};

@@ -44,30 +44,22 @@ class Pieces {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  std::span bytes(data, size);
+  const std::span bytes(data, size);
   if (bytes.empty()) return 0;
   const auto format = static_cast<EvtFormat>(bytes[0] % 5);
   const auto framing = bytes[0] % 2 == 0 ? Framing::loose : Framing::padded;
-  bytes = bytes.subspan(1);
   const auto scanner = make_word_scanner(format, sensor, framing);
   Pieces read(format);
   std::uint64_t sent = 0;
   std::vector<WordScanner::Piece> pieces;
-  while (bytes.size() >= 3) {
-    const auto wanted = static_cast<std::size_t>(bytes[0] | bytes[1] << 8);
-    const int flags = bytes[2];
-    bytes = bytes.subspan(3);
-    const auto part = bytes.first(std::min(wanted, bytes.size()));
-    bytes = bytes.subspan(part.size());
-    // In memory of its own, so that sanitizers detect reads past its end.
-    const std::vector<std::uint8_t> transfer(part.begin(), part.end());
+  fuzz::for_each_packet(bytes.subspan(1), [&](int flags, const auto& transfer) {
     std::optional<Microseconds> elapsed;
     if ((flags & 2) != 0) elapsed = Microseconds{1} << (flags >> 2) % 40;
     scanner->scan({transfer, (flags & 1) != 0, elapsed}, pieces);
     sent += transfer.size();
     read.take(pieces);
     pieces.clear();
-  }
+  });
   scanner->finish(pieces);
   read.take(pieces);
   const auto& counts = scanner->counts();

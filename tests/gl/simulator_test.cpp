@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "src/core/alpha.hpp"
+#include "src/core/luma.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/gl/kernels.hpp"
 #include "src/gl/point_tracker.hpp"

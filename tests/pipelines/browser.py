@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Headless Chromium, driven through its DevTools pipe."""
-import base64
 import contextlib
 import json
 import os
@@ -89,11 +88,6 @@ class Page:
     def resize(self, width, height):
         self._browser.call("Emulation.setDeviceMetricsOverride", self._session, width=width, height=height,
                            deviceScaleFactor=1, mobile=False)
-
-    def screenshot(self, path):
-        image = self._browser.call("Page.captureScreenshot", self._session)["data"]
-        with open(path, "wb") as file:
-            file.write(base64.b64decode(image))
 
     def close(self):
         self._browser.call("Target.closeTarget", targetId=self._target)

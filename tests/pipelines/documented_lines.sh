@@ -33,7 +33,7 @@ distortion_coefficients: !!opencv-matrix
 CALIBRATION
 /usr/bin/python3 "$SOURCE/tests/formats/bag_files.py" .
 for ending in bag mcap; do mv evt3.$ending walk.$ending; done
-/usr/bin/python3 "$SOURCE/tests/formats/small_files.py" .
+/usr/bin/python3 "$SOURCE/tests/formats/n_mnist.py" .
 mv n-mnist.bin 00002.bin
 for words in EVT2 EVT3; do
   eval "$GST_LAUNCH -q $ball,width=320,height=320 ! eventsim-dvs ! evtenc ! application/x-event-camera,format=$words ! filesink location=camera.${words,,}"

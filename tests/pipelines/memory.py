@@ -106,7 +106,7 @@ def main():
     failed = []
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
-        # In another process, since the memory of a new one counts as that of its children.
+        # In another process, since its children inherit the peak of its memory.
         if os.fork() == 0:
             make_files()
             os._exit(0)

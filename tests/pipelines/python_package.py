@@ -5,7 +5,6 @@
 import copy
 import itertools
 import multiprocessing
-import math
 import os
 import shlex
 import signal
@@ -25,6 +24,7 @@ if not os.path.exists(os.path.join(os.environ["GI_TYPELIB_PATH"], "GstEventCamer
 
 import gst_eventcamera as ec
 import numpy as np
+from PIL import Image
 from gst_eventcamera import pipeline as internals
 from gst_eventcamera import recordings
 from gst_eventcamera.pipeline import Gst, GstEventCamera
@@ -32,7 +32,6 @@ from gst_eventcamera.sources import SINK
 
 FOLDER = tempfile.TemporaryDirectory()
 WIDTH, HEIGHT = 346, 260
-EXTENSIONS = [extension[1:] for extension in recordings.WRITERS]
 
 
 def path_of(name):
@@ -106,12 +105,8 @@ class VideoFrames(unittest.TestCase):
             launch(f"filesrc location={shlex.quote(video)} ! decodebin ! eventsim-dvs ! eventnpyenc"
                    f" ! filesink location={shlex.quote(path_of('expected.npy'))}")
             expected = ec.read(path_of("expected.npy"))
-            with open(path_of("pixels.yaml"), "w", encoding="utf-8") as recipe:
-                recipe.write("videos: pixels.mkv\nsimulator: eventsim-dvs seed=0\n")
-            for name, chunks in (("simulate", ec.simulate(video, "eventsim-dvs")),
-                                 ("data set", ec.Dataset(path_of("pixels.yaml"))[0].events())):
-                with self.subTest(pixels=pixels, name=name):
-                    self.assertTrue(same(ec.join(chunks), expected))
+            with self.subTest(pixels):
+                self.assertTrue(same(ec.join(ec.simulate(video, "eventsim-dvs")), expected))
 
     def test_rotated_video_is_upright(self):
         video = self.make("rotated.mp4", "videotestsrc pattern=ball num-buffers=8"
@@ -144,18 +139,8 @@ class VideoFrames(unittest.TestCase):
         self.assertGreaterEqual(len(chunks), 14)  # an interval a field
 
     def test_a_looping_gif_is_played_once(self):
-        pictures = [bytes(100 * ((x - 4 * i) % 32 < 8) for _ in range(24) for x in range(32)) for i in range(8)]
-        with open(path_of("loop.gif"), "wb") as file:
-            file.write(b"GIF89a" + struct.pack("<HHBBB", 32, 24, 0xf6, 0, 0) + np.repeat(np.arange(128), 3).astype("u1")
-                       .tobytes() + b"\x21\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")
-            for picture in pictures:
-                # Codes of 8 bits stay so if the table is cleared before it grows.
-                codes = b"".join(b"\x80" + picture[i:i + 120] for i in range(0, len(picture), 120)) + b"\x81"
-                file.write(b"\x21\xf9\4\0\4\0\0\0\x2c" + struct.pack("<HHHHB", 0, 0, 32, 24, 0) + b"\7")
-                for i in range(0, len(codes), 255):
-                    file.write(bytes([len(codes[i:i + 255])]) + codes[i:i + 255])
-                file.write(b"\0")
-            file.write(b"\x3b")
+        pictures = [Image.fromarray(np.uint8([[100 * ((x - 4 * i) % 32 < 8) for x in range(32)]] * 24)) for i in range(8)]
+        pictures[0].save(path_of("loop.gif"), save_all=True, append_images=pictures[1:], duration=40, loop=3)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # avdec_gif gives no times
             chunks = list(ec.simulate(path_of("loop.gif"), "eventsim-frame"))
@@ -170,22 +155,6 @@ class Recordings(unittest.TestCase):
         cls.path = path_of("a recording.raw")
         ec.write(cls.path, cls.events)
 
-    def test_every_format_comes_back(self):
-        for extension in EXTENSIONS:
-            with self.subTest(extension):
-                path = path_of(f"events.{extension}")
-                ec.write(path, self.events, width=WIDTH, height=HEIGHT)
-                read = ec.read(path)
-                self.assertEqual(sorted(read["t"]), sorted(self.events["t"]))
-                self.assertEqual(read["p"].sum(), self.events["p"].sum())
-                if extension not in ("csv", "txt", "npy"):  # they have no size
-                    self.assertGreaterEqual(read.width, WIDTH)
-
-    def test_writes_the_formats_of_event_convert(self):
-        done = subprocess.run([os.path.join(os.environ["BUILD"], "pipelines", "event-convert"), "a.raw", "b.none"],
-                              stderr=subprocess.PIPE, text=True, check=False)
-        self.assertEqual(set(done.stderr.split("known are ")[1].split()), set(recordings.WRITERS))
-
     def test_reads_exactly(self):
         read = ec.read(self.path)
         self.assertTrue(same(read, self.events))
@@ -193,10 +162,6 @@ class Recordings(unittest.TestCase):
         self.assertEqual(read.dtype.names, ("t", "x", "y", "p"))
         self.assertEqual([read[name].dtype for name in "txyp"], [np.int64, np.uint16, np.uint16, bool])
         self.assertIs(type(read["t"]), np.ndarray)
-
-    def test_reads_a_part(self):
-        self.assertTrue(same(ec.read(self.path, 0.25, 0.5), self.events.between(0.25, 0.5)))
-        self.assertTrue(same(ec.read(self.path, start=1.7), self.events.between(1.7, 9)))
 
     def test_windows_partition_the_recording(self):
         stream = ec.stream(self.path, window=0.03)
@@ -241,15 +206,8 @@ class Recordings(unittest.TestCase):
             self.assertEqual((len(part), part.width, part.height), (0, WIDTH, HEIGHT))
             self.assertEqual((len(stream.between(start, end)), list(stream.between(start, end))), (0, []))
         self.assertEqual(list(stream[:3].between(1, 2)), [])
-        self.assertTrue(same(ec.read(self.path, 1.5, float("inf")), self.events.between(1.5, 9)))
-
-    def test_learns_the_duration_once(self):
-        stream = ec.stream(self.path, window=0.05)
-        with unittest.mock.patch.object(recordings, "duration_of", side_effect=recordings.duration_of) as duration:
-            for i in (0, 3, -1):
-                self.assertGreater(len(stream[i]), 0)
-            self.assertEqual(len(stream[-3:]), 3)
-        self.assertEqual(duration.call_count, 1)
+        for start, end in ((0.25, 0.5), (1.5, float("inf"))):
+            self.assertTrue(same(ec.read(self.path, start, end), self.events.between(start, min(end, 9))))
 
     def test_learns_durations_that_are_estimates_or_not_known(self):
         events = ec.Events(6_000_100, WIDTH, HEIGHT)
@@ -281,18 +239,6 @@ class Recordings(unittest.TestCase):
         tracemalloc.stop()
         self.assertEqual(count, 500_000)
         self.assertLess(peak, 1_000_000)  # all events take 8 MB
-
-    def test_knows_labels(self):
-        buffer = Gst.Buffer.new_wrapped(bytes(3 * 8))
-        buffer.pts = buffer.duration = 0
-        labels = [GstEventCamera.Label() for _ in range(3)]
-        labels[1].object_class, labels[1].cause = 300, GstEventCamera.Cause.LEAK
-        GstEventCamera.buffer_add_event_camera_label_meta(buffer, labels)
-        caps = Gst.Caps.from_string("application/x-event-camera,format=XYTP,width=4,height=4,framerate=0/1")
-        events = internals.events_of(Gst.Sample.new(buffer, caps, None, None))
-        self.assertEqual(list(events.object_class), [0, 300, 0])
-        self.assertEqual(list(events[1:].cause), [int(GstEventCamera.Cause.LEAK), 0])
-        self.assertIsNone(self.events.cause)
 
     def test_tells_the_time_that_it_read(self):
         late = self.events.copy()
@@ -384,22 +330,13 @@ class Recordings(unittest.TestCase):
         self.assertTrue(same(ec.read(path), events))
         stream = ec.stream(path)
         with self.assertWarnsRegex(ec.PipelineWarning, "pause of .* s: its windows are skipped"):
-            self.assertEqual([len(window) for window in list(stream) if len(window)], [2, 1])
+            windows = list(stream)
+        self.assertLess(len(windows), 10)
+        self.assertEqual([len(window) for window in windows if len(window)], [2, 1])
+        self.assertTrue(windows[-1].start <= 2**50 / 1e6 < windows[-1].end)
         with self.assertRaisesRegex(TypeError, "windows, most of them in pauses"):
             len(stream)
         self.assertEqual(len(stream[-1]), 1)
-
-    def test_skips_the_windows_of_long_pauses(self):
-        events = self.events[:4].copy()
-        events["t"] = 0, 10, 86_400_000_000, 200_000_000_000
-        path = path_of("pauses.csv")
-        ec.write(path, events)
-        with self.assertWarnsRegex(ec.PipelineWarning, "pause of .* s: its windows are skipped"):
-            windows = list(ec.stream(path))
-        self.assertLess(len(windows), 10)
-        self.assertEqual([len(window) for window in windows if len(window)], [2, 1, 1])
-        later = [window for window in windows if len(window)][1]
-        self.assertTrue(later.start <= 86_400 < later.end)
 
     def test_takes_paths_of_any_type(self):
         path = path_of("bytes.csv")
@@ -409,10 +346,6 @@ class Recordings(unittest.TestCase):
         for wrong in (lambda: ec.read("a\0b"), lambda: ec.write("a\0b.csv", self.events)):
             with self.assertRaisesRegex(ValueError, "null byte"):
                 wrong()
-        with self.assertRaises(TypeError):
-            ec.stream(path)[1.5]  # pylint: disable=expression-not-assigned
-        with self.assertRaises(ValueError):
-            ec.stream(path).between(math.nan)
 
     def test_joins_chunks(self):
         events = self.labelled(3000)
@@ -451,17 +384,6 @@ class Recordings(unittest.TestCase):
 
 
 class Simulators(unittest.TestCase):
-    def test_simulates_a_video(self):
-        video = path_of("ball.mkv")
-        subprocess.run([os.environ["GST_LAUNCH"], "-q", "videotestsrc", "pattern=ball", "num-buffers=20", "!",
-                        "video/x-raw,format=GRAY8,framerate=25/1", "!", "matroskamux", "!",
-                        "filesink", "location=" + video], check=True)
-        chunks = list(ec.simulate(video, "eventsim-dvs seed=7"))
-        self.assertEqual(len(chunks), 19)
-        self.assertAlmostEqual(chunks[3].start, 3 * 0.04, places=2)
-        again = list(ec.simulate(video, "eventsim-dvs seed=7"))
-        self.assertTrue(all(same(a, b) for a, b in zip(chunks, again, strict=True)))
-
     def test_an_interval_without_events_is_a_chunk(self):
         chunks = list(ec.live("videotestsrc pattern=black num-buffers=4 ! eventsim-frame"))
         self.assertEqual([len(chunk) for chunk in chunks], [0, 0, 0])
@@ -540,11 +462,6 @@ class Videos(unittest.TestCase):
         self.assertAlmostEqual(self.played("slow.mkv"), 4)
         self.assertAlmostEqual(self.played("sound.mkv"), 2.96, places=2)
 
-    def test_may_not_be_cut_off(self):
-        self.make("whole.mkv", 100, "25/1", "audiotestsrc samplesperbuffer=4410 num-buffers=40 ! mux.")
-        os.truncate(path_of("whole.mkv"), os.path.getsize(path_of("whole.mkv")) // 3)
-        with self.assertRaisesRegex(ec.PipelineError, "corrupt: its frames end 2.* s before"):
-            self.played("whole.mkv")
 
 
 class Tensors(unittest.TestCase):
@@ -595,23 +512,12 @@ class Failures(unittest.TestCase):
         self.expect(ec.PipelineError, 'No such file "/nowhere"', lambda: ec.read("/nowhere"))
         self.expect(ec.PipelineError, "the name /nowhere/lat\\xfcin.npz is not UTF-8; rename it",
                     lambda: ec.read("/nowhere/lat\udcfcin.npz"))
-        self.expect(ec.PipelineError, "lat\\xfcin.npz is not UTF-8; rename it",
-                    lambda: ec.write(path_of("lat\udcfcin.npz"), random_events(10, 1000)))
         self.expect(ec.PipelineError, 'no element "nothing"', lambda: list(ec.live("videotestsrc ! nothing")))
-        self.expect(ec.PipelineError, "can't handle caps application/x-event-camera",
-                    lambda: list(ec.live("videotestsrc num-buffers=3")))
-        self.expect(ec.PipelineError, "No such file or directory", lambda: ec.write("/nowhere/out.raw", random_events(9, 9)))
         self.expect(ec.PipelineError, "2048x2048 pixels",
                     lambda: ec.write(path_of("wide.raw"), random_events(9, 9, pixels=(3000, 9))))
-        self.expect(ec.PipelineError, "eventsim-dvs denoise=-3: it must be from -1 to 255",
-                    lambda: ec.simulate("/nowhere", "identity ! eventsim-dvs denoise=-3"))
-
-    def test_of_writing_many_events_are_exceptions(self):
         full = path_of("full.raw")
         os.symlink("/dev/full", full)
         self.expect(ec.PipelineError, "No space left", lambda: ec.write(full, random_events(3_000_000, 3_000_000)))
-        self.expect(ec.PipelineError, "2048x2048 pixels",
-                    lambda: ec.write(path_of("wide.raw"), random_events(3_000_000, 3_000_000, pixels=(3000, 9))))
 
     def test_of_elements_that_go_on_are_warnings(self):
         path = path_of("corrupt.dat")
@@ -668,7 +574,6 @@ class Failures(unittest.TestCase):
         events = random_events(100, 1000)
         self.expect(ValueError, "extension", lambda: ec.write(path_of("x.mp4"), events))
         self.expect(ValueError, "sorted", lambda: ec.write(path_of("x.raw"), events[::-1]))
-        self.expect(ValueError, "outside", lambda: ec.write(path_of("x.raw"), events, 10, 10))
         late = events.copy()
         for t in (2**52 + 1, 2**62, 2**63 - 1):
             late["t"][-1] = t
@@ -679,7 +584,6 @@ class Failures(unittest.TestCase):
             self.expect(ValueError, f"{bins} bins", lambda: ec.voxel_grid(events, bins))
         for width in (16385, -1, 2.5, "9"):
             self.expect(ValueError, "from 1 to 16384", lambda: ec.voxel_grid(events, 1, width))
-            self.expect(ValueError, "from 1 to 16384", lambda: ec.write(path_of("x.npz"), events, height=width))
         self.expect(ValueError, "window", lambda: ec.stream("x", window=0))
 
 

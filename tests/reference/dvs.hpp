@@ -97,7 +97,7 @@ Image<double> deblurred(const Image<Pixel>& frame, int bits, int iterations, con
 ///   region   one of 4x4, by equal numbers of blocks: m = median of d
 ///   gain     g = exp(median of m), if there are 8 regions, 1.01 <= max(g, 1/g) <= 1.25, and 3/4 of
 ///            the regions have |m - ln g| <= |ln g| / 2; 1 otherwise
-/// Light is that of DvsPixel; a median is the upper one of two.
+/// Light as in DvsPixel; of two values in the middle, the median is the upper one.
 template <class Pixel>
 double exposure_gain(const ImageView<Pixel>& last, const ImageView<Pixel>& now, int bits,
                      bool linear_light) {
@@ -279,7 +279,7 @@ class DvsPixel {
         noise_left_(random_.exponential(number, Random::Purpose::first_noise)) {}
 
   /// Events until the next frame, `microseconds` later.
-  /// Its exposure is `gain` times that of the first frame.
+  /// Its exposure is `gain` times the first frame's.
   std::vector<TimedEvent> push(double luma, int microseconds, double gain = 1) {
     std::vector<TimedEvent> events;
     std::uint64_t draw = interval_++ << 16;

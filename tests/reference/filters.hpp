@@ -127,7 +127,7 @@ struct Flicker {
   int stop_threshold;
 };
 
-/// The events of pixels while they flicker, or those of all others.
+/// The events of pixels while they flicker, or all others.
 inline Events flicker(const Events& events, const Flicker& sought, bool keeps_flicker) {
   struct Pixel {
     AbsoluteEvent first_of_phase;

@@ -34,33 +34,6 @@ TEST(Accumulator, DrawsGrey) {
             (std::vector<int>{128, 0, 255, 7, 7, 7, 7, 7, 64, 128, 128, 7, 7, 7, 7, 7}));
 }
 
-TEST(Accumulator, DrawsColoursWhereTheLayoutHasThem) {
-  const auto& colours = palette(PaletteName::red_blue);
-  const auto bytes = draw({.bytes = 4, .red = 2, .green = 1, .blue = 0}, PaletteName::red_blue);
-  const auto pixel = [&](int x, int y) {
-    const auto* p = bytes.data() + y * 17 + x * 4;
-    return std::array{p[2], p[1], p[0], p[3]};
-  };
-  const auto is = [](const Colour& colour) {
-    return std::array<int, 4>{colour.red, colour.green, colour.blue, 255};
-  };
-  EXPECT_EQ(pixel(0, 0), is(colours.none));
-  EXPECT_EQ(pixel(1, 0), is(colours.off));
-  EXPECT_EQ(pixel(2, 0), is(colours.on));
-  EXPECT_EQ(pixel(0, 1), is(colours.both));
-  EXPECT_EQ(bytes[12], 7);  // nothing beyond the row
-}
-
-TEST(Accumulator, BeginsAnewAfterDrawing) {
-  Accumulator accumulator(3, 2);
-  accumulator.add(few_events);
-  std::vector<std::byte> out(6);
-  ThreadPool threads;
-  accumulator.draw(palette(PaletteName::grey), {}, out.data(), 3, threads);
-  accumulator.draw(palette(PaletteName::grey), {}, out.data(), 3, threads);
-  EXPECT_TRUE(std::ranges::all_of(out, [](std::byte b) { return b == std::byte{128}; }));
-}
-
 /// Random events in buckets by step and band; a fraction `share` of the pixels fires per step.
 StepBuckets events_by_chance(int width, int height, double share) {
   std::minstd_rand random(static_cast<unsigned>(width));

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "src/core/sensor_size.hpp"
@@ -63,16 +64,13 @@ TEST(Thumbnail, ShowsTheLastPolarity) {
   EXPECT_EQ(rows_of(thumbnail.draw())[0], "o...");
 }
 
-TEST(Thumbnail, IsNotLargerThanTheSensor) {
-  const auto picture = Thumbnail({3, 2}, 256).draw();
-  EXPECT_EQ(picture.width(), 3);
-  EXPECT_EQ(picture.height(), 2);
-}
-
-TEST(Thumbnail, HasPixelsOfANarrowSensor) {
-  const auto picture = Thumbnail({max_side, 1}, 256).draw();
-  EXPECT_EQ(picture.width(), 256);
-  EXPECT_EQ(picture.height(), 1);
+TEST(Thumbnail, FitsTheSensor) {
+  const auto size_of = [](SensorSize sensor) {
+    const auto picture = Thumbnail(sensor, 256).draw();
+    return std::pair(picture.width(), picture.height());
+  };
+  EXPECT_EQ(size_of({3, 2}), std::pair(3, 2));
+  EXPECT_EQ(size_of({max_side, 1}), std::pair(256, 1));
 }
 
 TEST(Thumbnail, SkipsEventsOutsideTheSensor) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Denoising equals its plain reference on every SIMD target of this processor.
-#include "src/simulate/denoise.hpp"
+#include "src/simulate/denoiser.hpp"
 
 #include <gtest/gtest.h>
 

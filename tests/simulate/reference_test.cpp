@@ -37,11 +37,6 @@ struct Case {
   int threads;
 };
 
-void PrintTo(const Case& c, std::ostream* out) {
-  *out << c.width << "x" << c.height << " " << c.bits << " bits, n = " << c.interpolated_frames
-       << ", picture " << static_cast<int>(c.picture) << ", " << c.threads << " threads";
-}
-
 /// Image with garbage between its rows.
 template <class Pixel>
 class Padded {
@@ -186,15 +181,6 @@ class Equality : public testing::TestWithParam<Case> {
   LumaFormat format;
   std::vector<LumaView> views;
 };
-
-TEST(Targets, AreTestedOneByOne) {
-  int count = 0;
-  targets::for_each([&](const char* target) {
-    std::printf("%s\n", target);
-    ++count;
-  });
-  EXPECT_GT(count, 0);
-}
 
 TEST_P(Equality, WithTheReference) {
   if (GetParam().bits > 8)

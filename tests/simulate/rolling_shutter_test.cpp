@@ -9,14 +9,12 @@
 #include <cstdlib>
 #include <functional>
 #include <memory>
-#include <ostream>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "src/dvs/dvs_simulator.hpp"
-#include "src/measure/event_matcher.hpp"
 #include "src/simulate/dense_simulator.hpp"
 #include "src/simulate/diff_simulator.hpp"
 #include "src/simulate/frame_simulator.hpp"
@@ -53,10 +51,6 @@ const Method methods[] = {
      }},
 };
 
-void PrintTo(const Method& method, std::ostream* out) {
-  *out << method.name;
-}
-
 /// Delay of a row, microseconds.
 Microseconds delay_of(int y, int height, Nanoseconds readout) {
   const int rows_before = readout < 0 ? height - 1 - y : y;
@@ -67,7 +61,7 @@ bool is_earlier(const AbsoluteEvent& a, const AbsoluteEvent& b) {
   return std::tuple(a.t, a.y(), a.x, a.y_p) < std::tuple(b.t, b.y(), b.x, b.y_p);
 }
 
-/// Collects the events of a simulator, with absolute times, until those of its late rows.
+/// Collects the events of a simulator, late rows included, with absolute times.
 class Recording {
  public:
   explicit Recording(std::unique_ptr<Simulator> simulator) : simulator_(std::move(simulator)) {}
@@ -241,76 +235,6 @@ TEST(RollingShutter, SpreadsTheLoadOfTheReadout) {
     return recording.events.size();
   };
   EXPECT_GT(4 * count_with(30'000'000), 5 * count_with(0));
-}
-
-/// A texture in 16 bits that moves to the right and down, once all rows of a first frame have been
-/// read.
-class MovingTexture {
- public:
-  static constexpr int width = 120;
-  static constexpr int height = 100;
-
-  static Image<std::uint16_t> at(Nanoseconds time, Nanoseconds readout) {
-    Image<std::uint16_t> frame(width, height);
-    for (int y = 0; y < height; ++y) {
-      const Microseconds seen = time / 1000 + delay_of(y, height, readout);
-      const double t = static_cast<double>(std::max(Microseconds{0}, seen - start)) / 1e6;
-      const auto row = scene::texture<std::uint16_t>(width, 1, 16, -speed_x * t, y - speed_y * t);
-      std::copy_n(row.row(0), width, frame.row(y));
-    }
-    return frame;
-  }
-
- private:
-  static constexpr Microseconds start = 40'000;
-  static constexpr double speed_x = 40;  ///< pixels per second
-  static constexpr double speed_y = 30;
-};
-
-/// Events between times at which all rows are being seen.
-std::vector<AbsoluteEvent> events_of_texture(Nanoseconds frame_time, Nanoseconds shutter_of_camera,
-                                             Nanoseconds shutter_of_simulator) {
-  const auto settings = settings_of(DvsPreset::ideal);
-  Recording recording(make_dvs({MovingTexture::width, MovingTexture::height, 16},
-                               {.response = settings.response, .upsampling = Upsampling::motion}));
-  for (Nanoseconds time = 0; time < 500'000'000; time += frame_time) {
-    const auto frame = MovingTexture::at(time, shutter_of_camera);
-    recording.push(scene::luma(frame.view(), 16), time, {.rolling_shutter = shutter_of_simulator});
-  }
-  recording.finish();
-  std::erase_if(recording.events,
-                [](const auto& event) { return event.t < 100'000 || event.t > 400'000; });
-  return recording.events;
-}
-
-/// Share of the events of both streams with a match within a millisecond.
-double matches_of(const std::vector<AbsoluteEvent>& reference,
-                  const std::vector<AbsoluteEvent>& candidate) {
-  EventMatcher matcher(MovingTexture::width, MovingTexture::height);
-  auto next = candidate.begin();
-  for (const auto& event : reference) {
-    for (; next != candidate.end() && next->t <= event.t; ++next)
-      matcher.add(StreamRole::candidate, *next);
-    matcher.add(StreamRole::reference, event);
-  }
-  for (; next != candidate.end(); ++next) matcher.add(StreamRole::candidate, *next);
-  const double a = matcher.figures(StreamRole::reference).shares[0];
-  const double b = matcher.figures(StreamRole::candidate).shares[0];
-  return 2 * a * b / (a + b);
-}
-
-TEST(RollingShutter, MatchesAFinelyRenderedSceneAsAGlobalShutterDoes) {
-  constexpr Nanoseconds frame_time = 33'333'333;
-  const auto scene = events_of_texture(2'000'000, 0, 0);
-  ASSERT_GT(scene.size(), 10'000U);
-  const double global = matches_of(scene, events_of_texture(frame_time, 0, 0));
-  EXPECT_GT(global, 0.75);
-  for (const Nanoseconds readout : {20'000'000, -20'000'000, 30'000'000}) {
-    const double rolling = matches_of(scene, events_of_texture(frame_time, readout, readout));
-    const double unaware = matches_of(scene, events_of_texture(frame_time, readout, 0));
-    EXPECT_NEAR(rolling, global, 0.01) << readout;
-    EXPECT_LT(unaware, global - 0.2) << readout;
-  }
 }
 
 }  // namespace

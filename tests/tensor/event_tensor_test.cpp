@@ -88,20 +88,6 @@ TEST(EventTensor, EqualsTheReference) {
   });
 }
 
-TEST(EventTensor, SharesAVoxelBetweenTwoBins) {
-  EventTensor tensor(2, 1, {.bins = 3});
-  const std::vector events = {AbsoluteEvent::at(0, 0, 100, Polarity::on),
-                              AbsoluteEvent::at(1, 0, 125, Polarity::off),
-                              AbsoluteEvent::at(0, 0, 300, Polarity::on)};
-  EXPECT_EQ(written<float>(tensor, events, 400), (std::vector<float>{1, -0.75F, 0, -0.25F, 1, 0}));
-}
-
-TEST(EventTensor, PutsEventsOfOneInstantIntoTheFirstBin) {
-  EventTensor tensor(1, 1, {.bins = 4});
-  const std::vector events(5, AbsoluteEvent::at(0, 0, 100, Polarity::off));
-  EXPECT_EQ(written<float>(tensor, events, 100), (std::vector<float>{-5, 0, 0, 0}));
-}
-
 TEST(EventTensor, RemembersATimeSurfaceUntilReset) {
   EventTensor tensor(1, 1,
                      {.representation = Representation::time_surface,

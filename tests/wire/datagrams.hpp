@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "src/wire/datagram_packer.hpp"
-#include "src/wire/datagram_unpacker.hpp"
+#include "src/wire/datagrams.hpp"
 
 namespace eventcamera::datagrams {
 

@@ -5,11 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <random>
+#include <map>
 #include <stdexcept>
 
 #include "src/core/byte_order.hpp"
-#include "tests/formats/random_events.hpp"
+#include "tests/formats/recordings.hpp"
 
 namespace eventcamera {
 namespace {
@@ -150,14 +150,6 @@ TEST_P(Captures, AreRejectedWhereCutOff) {
   EXPECT_EQ(receiver.events, events);
 }
 
-/// Those of the formats for which `holds`.
-template <class Holds>
-std::vector<datagrams::Variant> formats_for(const Holds& holds) {
-  auto formats = datagrams::all();
-  std::erase_if(formats, [&](const auto& variant) { return !holds(variant.settings.format); });
-  return formats;
-}
-
 std::string name_of(const testing::TestParamInfo<datagrams::Variant>& tested) {
   auto name = tested.param.name;
   std::ranges::replace(name, '-', '_');
@@ -167,29 +159,11 @@ std::string name_of(const testing::TestParamInfo<datagrams::Variant>& tested) {
 class EveryFormat : public testing::TestWithParam<datagrams::Variant> {};
 INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(datagrams::all()), name_of);
 
-class TimedFormat : public testing::TestWithParam<datagrams::Variant> {};
-INSTANTIATE_TEST_SUITE_P(, TimedFormat, testing::ValuesIn(formats_for([](DatagramFormat format) {
-                           return format != spif;
-                         })),
-                         name_of);
-
-/// Formats with times of 32 bits.
-class WrappingFormat : public testing::TestWithParam<datagrams::Variant> {};
-INSTANTIATE_TEST_SUITE_P(, WrappingFormat, testing::ValuesIn(formats_for([](DatagramFormat format) {
-                           return format == spif_timestamps || format == t32_x16_y15_on1 ||
-                                  format == jaer;
-                         })),
-                         name_of);
-
-/// Pauses of up to half an hour, and many events of the same time.
-std::vector<AbsoluteEvent> random_stream(unsigned seed, Microseconds start) {
-  return random_events::make({640, 480}, 20'000, seed, start, {1'800'000'000});
-}
-
 TEST_P(EveryFormat, BringsEveryEvent) {
   const auto& settings = GetParam().settings;
   for (unsigned seed = 0; seed < 4; ++seed) {
-    auto sent = random_stream(seed, 1'000'000);
+    // Pauses of up to half an hour, and many events of the same time.
+    auto sent = recordings::random_events({640, 480}, 20'000, seed, 1'000'000, 1'800'000'000);
     Receiver receiver(settings);
     std::size_t count = 0;
     for (const auto& packet : datagrams::packets_of(settings, sent)) {
@@ -210,22 +184,15 @@ TEST_P(EveryFormat, KeepsToItsSizes) {
   const auto& settings = GetParam().settings;
   std::vector<AbsoluteEvent> events(1000, AbsoluteEvent::at(1, 2, 1234, on));
   const auto packets = datagrams::packets_of(settings, events);
-  const auto full = [&]() -> std::size_t {
-    switch (settings.format) {
-      case spif:
-        return 128;  // 512 bytes, what AEStream reads
-      case spif_timestamps:
-        return 128;  // 1024 bytes, what spiffer reads
-      case t64_x16_y16_on8:
-      case t32_x16_y15_on1:
-        return 100;
-      case es:
-        return (1400 - 8) / 5;
-      case jaer:
-        return settings.has_sequence_number ? 174 : 175;
-    }
-    return 0;
-  }();
+  // AEStream reads 512 bytes of spif, and spiffer 1024 with times.
+  const std::map<DatagramFormat, std::size_t> sizes{
+      {spif, 128},
+      {spif_timestamps, 128},
+      {t64_x16_y16_on8, 100},
+      {t32_x16_y15_on1, 100},
+      {es, 278},
+      {jaer, settings.has_sequence_number ? 174 : 175}};
+  const auto full = sizes.at(settings.format);
   ASSERT_EQ(packets.size(), (events.size() + full - 1) / full);
   auto left = events.size();
   for (const auto& packet : packets) {
@@ -235,14 +202,16 @@ TEST_P(EveryFormat, KeepsToItsSizes) {
   }
 }
 
+std::vector<AbsoluteEvent> events_at(std::initializer_list<Microseconds> times) {
+  std::vector<AbsoluteEvent> events;
+  for (const auto t : times) events.push_back(AbsoluteEvent::at(1, 2, t, on));
+  return events;
+}
+
 TEST_P(EveryFormat, LetsNoEventWait) {
   const auto packer = make_datagram_packer(GetParam().settings);
   packer->set_max_span(1000);
-  std::vector<AbsoluteEvent> events;
-  for (const Microseconds t : {5000, 5999, 6000, 6001, 9000}) {
-    events.push_back(AbsoluteEvent::at(1, 2, t, on));
-  }
-  const auto packets = datagrams::packets_of(*packer, events);
+  const auto packets = datagrams::packets_of(*packer, events_at({5000, 5999, 6000, 6001, 9000}));
   ASSERT_EQ(packets.size(), 3);
   EXPECT_EQ(packets[0].events, 3);
   EXPECT_EQ(packets[1].first, 6001);
@@ -251,23 +220,19 @@ TEST_P(EveryFormat, LetsNoEventWait) {
 
 TEST_P(EveryFormat, SendsAFullDatagramAtOnce) {
   const auto packer = make_datagram_packer(GetParam().settings);
-  const std::vector<AbsoluteEvent> events(1000, AbsoluteEvent::at(1, 2, 1234, on));
+  const auto event = AbsoluteEvent::at(1, 2, 1234, on);
   std::size_t sent = 0;
-  std::size_t given = 0;
-  for (const auto& event : events) {
-    ++given;
+  for (std::size_t given = 1; given <= 1000; ++given)
     packer->pack({&event, 1}, [&](const Datagram& datagram) {
       sent += datagram.events;
       EXPECT_EQ(sent, given);
     });
-  }
   EXPECT_GT(sent, 700);
-  EXPECT_EQ(packer->waiting_since().has_value(), sent < events.size());
+  EXPECT_EQ(packer->waiting_since().has_value(), sent < 1000);
 }
 
 TEST_P(EveryFormat, StartsADatagramWhereTimeGoesBack) {
-  const std::vector events{AbsoluteEvent::at(1, 2, 9000, on), AbsoluteEvent::at(1, 2, 8000, on)};
-  const auto packets = datagrams::packets_of(GetParam().settings, events);
+  const auto packets = datagrams::packets_of(GetParam().settings, events_at({9000, 8000}));
   ASSERT_EQ(packets.size(), 2);
   EXPECT_EQ(packets[1].first, 8000);
 }
@@ -282,16 +247,15 @@ TEST_P(EveryFormat, RejectsEventsOutsideTheSensor) {
     settings.width = width;
     settings.height = height;
     Receiver receiver(settings);
-    EXPECT_STREQ(receiver.take(packets.at(0).bytes, arrival).fault,
-                 "an event lies outside the sensor");
+    EXPECT_NE(receiver.take(packets.at(0).bytes, arrival).fault, nullptr);
     EXPECT_TRUE(receiver.events.empty());
   }
 }
 
 TEST_P(EveryFormat, DropsWhatIsLate) {
   const auto& settings = GetParam().settings;
-  std::vector<AbsoluteEvent> events;
-  for (int i = 0; i < 2000; ++i) events.push_back(AbsoluteEvent::at(1, 2, 1000 + i, on));
+  std::vector<AbsoluteEvent> events(2000, AbsoluteEvent::at(1, 2, 1000, on));
+  for (int i = 0; i < 2000; ++i) events[static_cast<std::size_t>(i)].t += i;
   const auto packets = datagrams::packets_of(settings, events);
   Receiver receiver(settings);
   receiver.take(packets[0].bytes, 1);
@@ -304,28 +268,28 @@ TEST_P(EveryFormat, DropsWhatIsLate) {
   EXPECT_EQ(receiver.events.size(), packets[3].events);
 }
 
-TEST_P(TimedFormat, FollowsASenderThatStartsOver) {
+TEST_P(EveryFormat, FollowsASenderThatStartsOver) {
   const auto& settings = GetParam().settings;
-  const std::vector events{AbsoluteEvent::at(1, 2, 60'000'000, on)};
+  if (settings.format == spif) return;  // it has no times
   Receiver receiver(settings);
   const auto packer = make_datagram_packer(settings);
-  receiver.take(datagrams::packets_of(*packer, events).at(0).bytes);
-  const std::vector again{AbsoluteEvent::at(3, 4, 10, off)};
-  const auto reception = receiver.take(datagrams::packets_of(*packer, again).at(0).bytes);
-  EXPECT_TRUE(reception.restarted);
+  receiver.take(datagrams::packets_of(*packer, events_at({60'000'000})).at(0).bytes);
+  const auto again = events_at({10});
+  EXPECT_TRUE(receiver.take(datagrams::packets_of(*packer, again).at(0).bytes).restarted);
   EXPECT_EQ(receiver.events, again);
 }
 
-TEST_P(WrappingFormat, FollowsWrapsDuringHoursOfSilence) {
+/// Times of 32 bits wrap.
+TEST_P(EveryFormat, FollowsHoursOfSilence) {
   const auto& settings = GetParam().settings;
+  if (settings.format == spif || settings.format == es) return;
   constexpr Microseconds hour = 3'600'000'000;
   Receiver receiver(settings);
   const auto packer = make_datagram_packer(settings);
-  std::vector<AbsoluteEvent> sent;
-  for (const Microseconds t : {Microseconds{1000}, hour, 4 * hour, 24 * hour}) {
-    sent.push_back(AbsoluteEvent::at(1, 2, t, on));
-    const auto packets = datagrams::packets_of(*packer, {&sent.back(), 1});
-    EXPECT_FALSE(receiver.take(packets.at(0).bytes, 777 + t + t / 100'000).restarted);
+  const auto sent = events_at({1000, hour, 4 * hour, 24 * hour});
+  for (const auto& event : sent) {
+    const auto packets = datagrams::packets_of(*packer, {&event, 1});
+    EXPECT_FALSE(receiver.take(packets.at(0).bytes, 777 + event.t + event.t / 100'000).restarted);
   }
   EXPECT_TRUE(receiver.all == sent);
 }
@@ -338,22 +302,21 @@ TEST(Datagrams, OfSpifMayStateTimesOfSomeEvents) {
   EXPECT_EQ(untimed.events,
             (std::vector{AbsoluteEvent::at(1, 1, 77, off), AbsoluteEvent::at(2, 2, 77, off)}));
   Receiver timed({.format = spif_timestamps, .width = 640, .height = 480});
-  EXPECT_STREQ(timed.take(mixed, 77).fault, "an event has no time");
+  EXPECT_NE(timed.take(mixed, 77).fault, nullptr);
 }
 
 TEST(Datagrams, WithImpossibleTimesAreRejected) {
   Receiver t64({.format = t64_x16_y16_on8, .width = 640, .height = 480});
-  EXPECT_STREQ(t64.take({0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0}).fault, "a time is out of range");
-  EXPECT_STREQ(t64.take({0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2}).fault,
-               "a polarity is neither 0 nor 1");
+  EXPECT_NE(t64.take({0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0}).fault, nullptr);
+  EXPECT_NE(t64.take({0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2}).fault, nullptr);  // polarity
   Receiver stream({.format = es, .width = 640, .height = 480});
-  EXPECT_STREQ(stream.take({0, 0, 0, 0, 0, 0, 0, 1}).fault, "a time is out of range");
+  EXPECT_NE(stream.take({0, 0, 0, 0, 0, 0, 0, 1}).fault, nullptr);
   // Steps of half an hour.
   Bytes leaps;
   for (std::uint8_t i = 0; i < 8; ++i)
     leaps += Bytes{0, 0, 0, static_cast<std::uint8_t>(i * 0x70), 1, 0, 2, 0};
   Receiver t32({.format = t32_x16_y15_on1, .width = 640, .height = 480});
-  EXPECT_STREQ(t32.take(leaps).fault, "its events are more than 71 minutes apart");
+  EXPECT_NE(t32.take(leaps).fault, nullptr);
 }
 
 /// A datagram of jAER with an event at `t`.
@@ -402,16 +365,15 @@ TEST(Jaer, BelievesAJumpOnlyIfItGoesOn) {
 }
 
 TEST(Jaer, SkipsSamplesAndExternalEvents) {
-  Receiver receiver({.format = jaer, .width = 346, .height = 260, .has_sequence_number = false});
-  EXPECT_EQ(receiver.take({0x80, 0, 0x01, 0x23, 0, 0, 0, 1, 0, 0, 0x04, 0, 0, 0, 0, 1}).fault,
+  Receiver receiver(davis);
+  EXPECT_EQ(receiver
+                .take({0,    0, 0,    1,                 //
+                       0x80, 0, 0x01, 0x23, 0, 0, 0, 1,  //
+                       0,    0, 0x04, 0,    0, 0, 0, 1})
+                .fault,
             nullptr);
   EXPECT_TRUE(receiver.events.empty());
-}
-
-TEST(Jaer, MaySendANumberOnly) {
-  Receiver receiver(davis);
-  EXPECT_EQ(receiver.take({0, 0, 0, 1}).fault, nullptr);
-  EXPECT_EQ(receiver.take({0, 0, 0, 3}).lost, 1);
+  EXPECT_EQ(receiver.take({0, 0, 0, 3}).lost, 1) << "a number only";
 }
 
 TEST(Jaer, HasAddressesForSomeSensorsOnly) {

@@ -46,7 +46,7 @@ class Device {
     return descriptor_ >= 0 && ioctl(descriptor_, request, &argument) >= 0;
   }
 
-  /// Its number, which entities of media devices state, too.
+  /// Device number, which the entities of media devices also state.
   std::optional<dev_t> number() const {
     struct stat status {};
     if (descriptor_ < 0 || fstat(descriptor_, &status) != 0) return std::nullopt;
@@ -122,8 +122,7 @@ std::string value_of(const Device& device, const char* name) {
   return {};
 }
 
-/// Fills in the sensor, of which there should be one, if one of the media device's entities is the
-/// video device.
+/// Fills in the media device's sensor, if one of its entities is the video device.
 void find_sensor(const Device& media, dev_t video, VideoDevice& found) {
   bool is_of_video = false;
   std::optional<media_entity_desc> sensor;

@@ -4,11 +4,11 @@
  * @title: evtparse
  * @short_description: finds the words of a live event camera
  *
- * Turns what an event camera sends into EVT words for evtdec: the padded GRAY8 buffers of
- * Prophesee's V4L2 drivers, and the bytes of a serial line or a socket. The sensor has the
- * size #GstEvtParse:width x #GstEvtParse:height and words of #GstEvtParse:format, unless the
- * input's caps state the format: their field `format` may be EVT2, EVT21, EVT3 or EVT4, or one of
- * the drivers' fourccs, PSEE (EVT2), PSE1 (EVT2.1 of the legacy byte order), PSE2 (EVT2.1) or PSE3
+ * Finds the EVT words of a live event camera for evtdec, in the padded GRAY8 buffers of Prophesee's
+ * V4L2 drivers, or the bytes of a serial line or a socket. The sensor has the size
+ * #GstEvtParse:width x #GstEvtParse:height and words of #GstEvtParse:format, unless the input's
+ * caps state the format: their field `format` may be EVT2, EVT21, EVT3 or EVT4, or one of the
+ * drivers' fourccs, PSEE (EVT2), PSE1 (EVT2.1 of the legacy byte order), PSE2 (EVT2.1) or PSE3
  * (EVT3).
  *
  * In a V4L2 buffer, words end at a marker, and the bytes past it are ignored. Other bytes may begin
@@ -88,7 +88,7 @@ class CameraBuffers {
   explicit CameraBuffers(Framing framing) : framing_(framing) {}
 
   /// Returns the transfer of a buffer of a segment, which holds `bytes`. Valid as long as these,
-  /// and until the next call. May throw.
+  /// and until the next call.
   Transfer transfer_of(GstBuffer* buffer, std::span<const guint8> bytes,
                        const GstSegment& segment) {
     const auto arrival = arrival_of(buffer, segment);
@@ -160,9 +160,9 @@ class CameraSegment {
     is_due_ |= clock_.arrive(sent, static_cast<Nanoseconds>(arrival), after_gap);
   }
 
-  /// Pushes a segment from `start` before data of these times, unless the last segment still holds.
-  /// Returns the running time of `start` if it did. Data before running time 0, as in a first
-  /// transfer, is late: the next data corrects the mapping.
+  /// Pushes a segment from `start` before data of these times, unless the last segment is still
+  /// valid. Returns the running time of `start` if it did. Data before running time 0, as in a
+  /// first transfer, is late: the next data corrects the mapping.
   std::optional<GstClockTime> begin(GstPad* src, guint32 seqnum, GstClockTime start,
                                     GstClockTime end) {
     std::optional<GstClockTime> mapped;
@@ -311,7 +311,7 @@ static bool start_stream(GstEvtParse* self) {
       sensor.height > max_words_side) {
     post_message(self, GST_MESSAGE_ERROR,
                  {GST_RESOURCE_ERROR_SETTINGS,
-                  "Cannot read this camera: its caps do not tell the format of its words and the "
+                  "Cannot read this camera: its caps do not state the format of its words and the "
                   "size of its sensor. Set format, width and height."},
                  "format=" + std::to_string(settings.format) + ", " + in_pixels(sensor));
     return false;
@@ -358,7 +358,7 @@ static GstBuffer* buffer_of(WordScanner::Piece&& piece) {
   return buffer;
 }
 
-/// Pushes the pieces of a transfer. May throw.
+/// Pushes the pieces of a transfer.
 static GstFlowReturn push_pieces(GstEvtParse* self) {
   auto& priv = *self->priv;
   auto& state = *priv.stream->state;
@@ -419,7 +419,6 @@ static void note_transfer(GstEvtParse* self, GstClockTime arrival) {
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
 }
 
-/// May throw.
 static GstFlowReturn handle_transfer(GstEvtParse* self, GstBuffer* buffer,
                                      std::span<const guint8> bytes) {
   auto& priv = *self->priv;
@@ -574,10 +573,10 @@ static void gst_evt_parse_class_init(GstEvtParseClass* klass) {
                        "Width of the sensor (pixels); 0 = as in the caps", 0, max_words_side);
   properties.add_fixed(&Settings::height, "height",
                        "Height of the sensor (pixels); 0 = as in the caps", 0, max_words_side);
-  properties.add_fixed(&Settings::latency, "latency",
-                       "Minimum time that live sinks wait for an event; they wait longer if a "
-                       "transfer takes longer (ns)",
-                       0, GST_SECOND);
+  properties.add_fixed(
+      &Settings::latency, "latency",
+      "Minimum latency of live sinks, which rises to the duration of the longest transfer (ns)", 0,
+      GST_SECOND);
   install_stats(
       object_class,
       [](GObject* object) { return structure_of(GST_EVT_PARSE(object)->priv->stats.copy()); },

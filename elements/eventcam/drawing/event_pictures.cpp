@@ -33,31 +33,31 @@ EventPictures::EventPictures(GstAggregator* element, GstDebugCategory* category)
 /* events */
 
 /// Adds the events of a buffer up to `end`, or all if there is none. Returns true if these were
-/// all. May throw.
+/// all.
 bool EventPictures::add_events(const MappedEvents& mapped, const EventInterval& interval,
                                std::optional<GstClockTime> end, GstBuffer* buffer) {
-  const auto rest = mapped.events().subspan(std::min(*taken_, mapped.events().size()));
-  if (*taken_ == 0)
+  const auto rest = mapped.events().subspan(std::min(*processed_, mapped.events().size()));
+  if (*processed_ == 0)
     GST_LOG_OBJECT(main_pad(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, rest.size(),
                    GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
   const auto due = end && *end < interval.end
                        ? events_until(rest, mapped.start(), static_cast<Microseconds>(*end / 1000))
                        : rest;
-  *taken_ += due.size();
+  *processed_ += due.size();
   state_->renderer.configure(render_settings());
   warn(state_->renderer.add(due, mapped.start(), length_of(interval)), buffer);
   return due.size() == rest.size();
 }
 
 void EventPictures::drop_buffer() {
-  taken_.reset();
+  processed_.reset();
   gst_aggregator_pad_drop_buffer(main_pad());
 }
 
 /// Starts over if a buffer is too far from the last one, and starts the pictures if there are none
-/// yet. May throw.
+/// yet.
 void EventPictures::advance_to(GstBuffer* buffer, const EventInterval& interval) {
-  if (!taken_) {
+  if (!processed_) {
     const bool returns =
         GST_BUFFER_IS_DISCONT(buffer) && interval.start + event_resolution < known_;
     const bool leaps = times_ && interval.start > times_->events().end + max_pause;
@@ -67,7 +67,7 @@ void EventPictures::advance_to(GstBuffer* buffer, const EventInterval& interval)
           returns ? "goes back" : "leaps", GST_TIME_ARGS(known_), GST_TIME_ARGS(interval.start));
       start_over();
     }
-    taken_ = 0;
+    processed_ = 0;
   }
   const GstClockTime segment_start = segment_of(main_pad()).start;
   if (!times_ && state_->has_framerate() &&
@@ -76,17 +76,16 @@ void EventPictures::advance_to(GstBuffer* buffer, const EventInterval& interval)
 }
 
 /// Adds the events of a buffer that are due, and pushes the picture that this completes, if any.
-/// May throw.
 GstFlowReturn EventPictures::handle_buffer(GstBuffer* buffer) {
   auto interval = interval_of(buffer);
   if (!interval) {
-    warn(interval_fault(buffer), buffer);
+    warn(event_fault(buffer), buffer);
     drop_buffer();
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
   if (gst_buffer_get_size(buffer) == 0 && interval->end - interval->start > max_pause &&
       state_->has_framerate()) {
-    if (!taken_)
+    if (!processed_)
       warn_of_pause_(
           element(),
           {GST_STREAM_ERROR_FAILED,
@@ -102,7 +101,7 @@ GstFlowReturn EventPictures::handle_buffer(GstBuffer* buffer) {
   {
     const MappedEvents mapped(buffer);
     if (!mapped) {
-      warn(EventFault::partial_event, buffer);
+      warn(event_fault(buffer), buffer);
       drop_buffer();
       return GST_AGGREGATOR_FLOW_NEED_DATA;
     }
@@ -155,19 +154,17 @@ GstClockTime EventPictures::next_time() {
 
 /* pictures */
 
-/// Skips a picture that sinks would drop anyway. False if it must be drawn.
-bool EventPictures::skip(const EventInterval& picture) {
-  const auto time = running_time(main_pad(), picture.start);
-  if (!qos.count_skipped(time)) return false;
+/// Skips a picture that sinks would drop anyway.
+void EventPictures::skip(const EventInterval& picture, GstClockTime running_time,
+                         GstClockTimeDiff lateness) {
   discontinuous_ = true;
   GST_DEBUG_OBJECT(element(), "downstream is late: skipped the picture at %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(picture.start));
   const GstSegment segment = segment_of(main_pad());
   const GstClockTime stream_time =
       gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, picture.start);
-  gst_element_post_message(GST_ELEMENT(element()),
-                           qos.message(GST_ELEMENT(element()), picture, *time, stream_time));
-  return true;
+  gst_element_post_message(GST_ELEMENT(element()), qos.skip(GST_ELEMENT(element()), picture,
+                                                            running_time, stream_time, lateness));
 }
 
 GstFlowReturn EventPictures::draw(const EventInterval& events, GstBuffer* buffer) {
@@ -199,10 +196,15 @@ GstFlowReturn EventPictures::acquire_buffer(GstBuffer** buffer) {
   return result;
 }
 
-/// Draws the state at the end of an interval and pushes it. May throw.
+/// Draws the state at the end of an interval and pushes it.
 GstFlowReturn EventPictures::push_picture(const EventInterval& events,
                                           const EventInterval& picture) {
-  if (skip(picture)) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  const auto time = running_time(main_pad(), picture.start);
+  if (const auto lateness = qos.lateness(time)) {
+    skip(picture, *time, *lateness);
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
+  qos.count_drawn();
   GstBuffer* acquired = nullptr;
   GstFlowReturn result = acquire_buffer(&acquired);
   if (result != GST_FLOW_OK) return result;
@@ -221,7 +223,7 @@ GstFlowReturn EventPictures::push_picture(const EventInterval& events,
   return push(std::move(buffer));
 }
 
-/// Draws the next picture and pushes it. May throw.
+/// Draws the next picture and pushes it.
 GstFlowReturn EventPictures::push_next_picture() {
   const EventInterval events = times_->events();
   const EventInterval picture = times_->picture();
@@ -236,7 +238,7 @@ bool EventPictures::has_begun_picture() const {
   return state_ && state_->video && times_ && known_ > times_->events().start + event_resolution;
 }
 
-/// Pushes the incomplete last picture before a change. May throw.
+/// Pushes the incomplete last picture before a change.
 void EventPictures::drain() {
   if (has_begun_picture()) push_next_picture();
 }
@@ -297,12 +299,12 @@ void EventPictures::handle_segment(const GstSegment& segment) {
   start_over();
 }
 
-/// Forgets all events, because the next input is discontinuous. May throw.
+/// Forgets all events, because the next input is discontinuous.
 void EventPictures::start_over() {
   if (state_) state_->renderer.reset();
   discontinuous_ |= times_.has_value();
   times_.reset();
-  taken_.reset();
+  processed_.reset();
   known_ = 0;
   waiting_since_.reset();
 }

@@ -29,27 +29,23 @@ class PictureQos {
       earliest_ = late > 0 ? time + factor * static_cast<GstClockTime>(late) : 0;
   }
 
-  /// Counts a picture as drawn or skipped. Returns true if it is skipped, because too late; a
-  /// picture without a running time never is.
-  bool count_skipped(std::optional<GstClockTime> running_time) {
-    GstClockTime earliest = 0;
-    {
-      const std::lock_guard lock(mutex_);
-      earliest = earliest_;
-    }
-    const bool is_late = running_time && *running_time < earliest;
-    ++(is_late ? skipped_ : drawn_);
-    if (is_late) lateness_ = GST_CLOCK_DIFF(*running_time, earliest);
-    return is_late;
+  /// Time by which a picture is too late; none if it is in time or has no running time.
+  std::optional<GstClockTimeDiff> lateness(std::optional<GstClockTime> running_time) {
+    const std::lock_guard lock(mutex_);
+    if (!running_time || *running_time >= earliest_) return std::nullopt;
+    return GST_CLOCK_DIFF(*running_time, earliest_);
   }
 
-  /// The message that reports the last late picture.
-  GstMessage* message(GstElement* element, const EventInterval& picture, GstClockTime running_time,
-                      GstClockTime stream_time) const {
+  void count_drawn() { ++drawn_; }
+
+  /// Counts a late picture as skipped. Returns a message that reports it.
+  GstMessage* skip(GstElement* element, const EventInterval& picture, GstClockTime running_time,
+                   GstClockTime stream_time, GstClockTimeDiff lateness) {
+    ++skipped_;
     GstMessage* const message =
         gst_message_new_qos(GST_OBJECT(element), FALSE, running_time, stream_time, picture.start,
                             picture.end - picture.start);
-    gst_message_set_qos_values(message, lateness_, 1, 1'000'000);
+    gst_message_set_qos_values(message, lateness, 1, 1'000'000);
     gst_message_set_qos_stats(message, GST_FORMAT_BUFFERS, drawn_, skipped_);
     return message;
   }
@@ -64,7 +60,6 @@ class PictureQos {
  private:
   std::mutex mutex_;           ///< guards earliest_; make no calls while holding it
   GstClockTime earliest_ = 0;  ///< running time before which pictures are too late
-  GstClockTimeDiff lateness_ = 0;
   guint64 drawn_ = 0;
   guint64 skipped_ = 0;
 };
@@ -119,7 +114,7 @@ class EventPictures : public EventAggregator {
     times_.emplace(start, *state_->video, segment_of(main_pad()).rate);
   }
   void begin_now();
-  bool skip(const EventInterval& picture);
+  void skip(const EventInterval& picture, GstClockTime running_time, GstClockTimeDiff lateness);
   bool has_begun_picture() const;
   GstFlowReturn acquire_buffer(GstBuffer** buffer);
   GstFlowReturn draw(const EventInterval& events, GstBuffer* buffer);
@@ -129,7 +124,7 @@ class EventPictures : public EventAggregator {
   GstDebugCategory* const category_;
   std::optional<State> state_;
   std::optional<FrameTimes> times_;  // interval of the next picture, once the first event is near
-  std::optional<gsize> taken_;       // number of processed events of the first queued buffer
+  std::optional<gsize> processed_;   // number of processed events of the first queued buffer
   GstClockTime known_ = 0;           // time up to which events are complete
   std::optional<GstClockTime> waiting_since_;  // for the first event; running time
   bool discontinuous_ = false;                 // the next picture is discontinuous

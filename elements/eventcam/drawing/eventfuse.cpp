@@ -161,7 +161,7 @@ class EventFuse final : public FramesWithEvents {
     return {std::max(start, segment_of(main_pad()).start), end};
   }
 
-  /// Passes the first queued frame to the filter, and pushes the next picture. May throw.
+  /// Passes the first queued frame to the filter, and pushes the next picture.
   GstFlowReturn handle_frame(GstBuffer* frame, bool timed_out) {
     const EventInterval interval = is_shown_ ? shown_ : interval_of_frame(frame);
     // Before the segment, or an erroneous time, after which pictures would wrap around.
@@ -195,7 +195,7 @@ class EventFuse final : public FramesWithEvents {
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
 
-  /// Passes a frame to the filter. Returns false after reporting why it cannot. May throw.
+  /// Passes a frame to the filter. Returns false after reporting why it cannot.
   bool show(GstBuffer* buffer, GstClockTime start) {
     const VideoFrame frame(*video_, buffer, GST_MAP_READ);
     if (!frame) {
@@ -216,8 +216,7 @@ class EventFuse final : public FramesWithEvents {
     return true;
   }
 
-  /// Pushes the next picture, once all events before it are known or the deadline has passed. May
-  /// throw.
+  /// Pushes the next picture, once all events before it are known or the deadline has passed.
   GstFlowReturn push_next_picture(bool timed_out) {
     const EventInterval picture = times_->picture();
     const GstSegment segment = segment_of(main_pad());
@@ -228,7 +227,7 @@ class EventFuse final : public FramesWithEvents {
     return push_picture(picture);
   }
 
-  /// Draws the state at the start of an interval and pushes it. May throw.
+  /// Draws the state at the start of an interval and pushes it.
   GstFlowReturn push_picture(const EventInterval& interval) {
     if (!filter_) {  // the size has changed
       discontinuous_ = true;

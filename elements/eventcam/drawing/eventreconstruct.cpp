@@ -6,14 +6,14 @@
  *
  * Turns an event stream into grey video that looks like a frame camera's, with the logarithm of the
  * brightness, at the framerate that downstream requests (default 30/1). No network and no frames
- * are needed. What does not move or change in brightness is grey, because it has no events.
+ * are needed. Static areas are grey, because they have no events.
  *
  * The events of each pixel pass a temporal high pass that counts events instead of time, as in
  * FIBAR (arXiv 2510.20071), and each event pulls its pixel towards the neighbours. The picture is
  * smoothed by a Gaussian, and its contrast is adjusted. docs/reconstruction.md has the equations.
  *
- * Pictures start, continue and end like those of #GstEventRender. Players show this element's video
- * instead where its rank is higher: GST_PLUGIN_FEATURE_RANK=eventreconstruct:MAX.
+ * Pictures start, continue and end as in #GstEventRender. Players show this element's video instead
+ * where its rank is higher: GST_PLUGIN_FEATURE_RANK=eventreconstruct:MAX.
  *
  * ## Example launch line
  * |[
@@ -59,8 +59,8 @@ DEFINE_EVENT_AGGREGATOR(GstEventReconstruct, gst_event_reconstruct, EVENT_RECONS
 static void gst_event_reconstruct_class_init(GstEventReconstructClass* klass) {
   Properties<aggregator_settings<EventReconstruct>> properties(G_OBJECT_CLASS(klass));
   properties.add(&Reconstruction::Settings::cutoff, "cutoff",
-                 "Period of the temporal high pass: more shows larger and slower structures, and "
-                 "traces longer (events of a pixel)",
+                 "Period of the temporal high pass; higher values show larger and slower "
+                 "structures, and longer traces (events of a pixel)",
                  Reconstruction::min_cutoff, 1e6);
   properties.add(&Reconstruction::Settings::smoothing, "smoothing",
                  "Standard deviation of the Gaussian that smooths the picture (pixels; 0 = none)",

@@ -19,12 +19,12 @@
  * Pictures have the size of the sensor. A sensor of more than 8 million pixels is drawn at half its
  * size, or a third, and so on.
  *
- * Pictures continue without events: through GAP events and, from a live source, by the clock. Of a
- * pause of more than a minute there are pictures for a second only, with one warning. At framerate
- * 0/1 each buffer of events becomes one picture.
+ * Pictures continue without events: through GAP events and, from a live source, by the clock. A
+ * pause of more than a minute has pictures for one second only, with a warning. At framerate 0/1
+ * each buffer of events becomes one picture.
  *
- * Played slower, at a rate below 1, there are as many pictures a second as before, each of a
- * shorter interval. Events cannot be drawn backwards: a seek at a negative rate is refused.
+ * Slow motion, at a rate below 1, has the same framerate, with pictures of shorter intervals.
+ * Events cannot be drawn backwards: a seek at a negative rate is refused.
  *
  * ## Example launch line
  * |[

@@ -84,38 +84,38 @@ std::span<const Event> FramesWithEvents::in_running_time(std::span<const Event> 
 }
 
 /// Adds the events of a buffer, whose `interval` is in running time, up to running time `end`.
-/// Returns true if these were all. May throw.
+/// Returns true if these were all.
 bool FramesWithEvents::add_events(GstBuffer* buffer, const EventInterval& interval,
                                   GstClockTime end) {
   const MappedEvents mapped(buffer);
   if (!mapped) {
-    warn(EventFault::partial_event, buffer);
+    warn(event_fault(buffer), buffer);
     return true;
   }
   const auto origin = static_cast<Microseconds>(interval.start / 1000);
   const double rate = segment_of(events_pad_).rate;
-  const auto rest = mapped.events().subspan(std::min(taken_, mapped.events().size()));
-  if (taken_ == 0)
+  const auto rest = mapped.events().subspan(std::min(processed_, mapped.events().size()));
+  if (processed_ == 0)
     GST_LOG_OBJECT(events_pad_, "%" G_GSIZE_FORMAT " events at running time %" GST_TIME_FORMAT,
                    rest.size(), GST_TIME_ARGS(interval.start));
   const auto length = static_cast<double>(static_cast<Microseconds>(end / 1000) - origin) * rate;
   const auto due =
       end < interval.end ? events_until(rest, 0, static_cast<Microseconds>(length)) : rest;
-  taken_ += due.size();
+  processed_ += due.size();
   warn(add(in_running_time(due, rate), origin, length_of(interval)), buffer);
   return due.size() == rest.size();
 }
 
 /// Adds the events of the first queued buffer up to running time `end`. Returns true if more are
-/// needed to reach `end`. May throw.
+/// needed to reach `end`.
 bool FramesWithEvents::handle_buffer(GstBuffer* buffer, GstClockTime end) {
   const auto interval = interval_of(buffer);
   const auto running = interval ? running_interval(events_pad_, *interval) : std::nullopt;
   if (!interval)
-    warn(interval_fault(buffer), buffer);
+    warn(event_fault(buffer), buffer);
   else if (!running)
     GST_LOG_OBJECT(events_pad_, "outside the segment: dropped %" GST_PTR_FORMAT, buffer);
-  if (begun_.get() != buffer) taken_ = 0;
+  if (begun_.get() != buffer) processed_ = 0;
   if (running) {
     if (running->start >= end) return false;
     if (!add_events(buffer, *running, end)) {

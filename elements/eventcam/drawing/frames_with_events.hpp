@@ -27,13 +27,12 @@ class FramesWithEvents : public EventAggregator {
  protected:
   /// Forgets the frames and events so far, because a size changes or the input is discontinuous.
   virtual void start_over() noexcept = 0;
-  /// Adds events; `origin` is a running time. Returns the numbers of dropped ones. May throw.
+  /// Adds events; `origin` is a running time. Returns the numbers of dropped ones.
   virtual eventcamera::InvalidEvents add(std::span<const eventcamera::Event> events,
                                          eventcamera::Microseconds origin,
                                          eventcamera::Microseconds length) = 0;
 
   /// Adds the events up to running time `end`. Returns true if no more are expected before `end`.
-  /// May throw.
   bool add_events_until(GstClockTime end);
 
   std::optional<GstVideoInfo> video_;
@@ -52,7 +51,7 @@ class FramesWithEvents : public EventAggregator {
   GstAggregatorPad* const events_pad_ = pad("event_sink");
 
   OwnedBuffer begun_;                       // first queued buffer, if some events were processed
-  gsize taken_ = 0;                         // number of these
+  gsize processed_ = 0;                     // number of its processed events
   std::vector<eventcamera::Event> scaled_;  // in_running_time()
   WarnOnce warn_of_missing_;
 };

@@ -93,8 +93,6 @@ DEFINE_EVENT_ELEMENT(GstAedatMux, gst_aedat_mux, AEDAT_MUX, GstAggregator, GST_T
 
 constexpr const char* any_pad = "sink_%u";
 
-/* properties */
-
 /* input */
 
 enum class Kind { events, video, unknown };
@@ -176,7 +174,7 @@ static GstFlowReturn push_bytes(GstAedatMux* self, AedatFile::Bytes bytes, bool 
   return gst_aggregator_finish_buffer(GST_AGGREGATOR(self), buffer);
 }
 
-/// Sends the caps, with the header as streamheader for late joiners. May throw.
+/// Sends the caps, with the header as streamheader for late joiners.
 static void send_caps(GstAedatMux* self, const AedatFile::Bytes& header) {
   const OwnedBuffer buffer(copied_buffer(std::as_bytes(std::span(header))));
   const OwnedCaps caps = with_stream_header(
@@ -193,7 +191,7 @@ static void send_segment(GstAedatMux* self, guint64 position) {
   gst_aggregator_update_segment(GST_AGGREGATOR(self), &segment);
 }
 
-/// Writes the header. May throw.
+/// Writes the header.
 static GstFlowReturn begin_file(GstAedatMux* self) {
   self->priv->has_header = true;
   Aedat4Settings settings;
@@ -207,7 +205,7 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
   return push_bytes(self, std::move(header), true);
 }
 
-/// Writes the end of the file, and patches the header. May throw.
+/// Writes the end of the file, and patches the header.
 static GstFlowReturn end_file(GstAedatMux* self) {
   auto& file = self->priv->file;
   const GstFlowReturn result = push_bytes(self, file.finish());
@@ -237,7 +235,7 @@ static Microseconds frame_time(GstAedatMux* self, GstBuffer* frame, GstClockTime
   return self->priv->file.time_of(time);
 }
 
-/// Writes the earliest buffer. May throw.
+/// Writes the earliest buffer.
 static GstFlowReturn write_next(GstAedatMux* self) {
   auto& file = self->priv->file;
   GstClockTime time = 0;
@@ -289,7 +287,7 @@ static OwnedEvent pop_segment_ends(GstAedatMux* self) {
   return done;
 }
 
-/// Writes the header, the earliest buffer, or the end of a segment or file. May throw.
+/// Writes the header, the earliest buffer, or the end of a segment or file.
 static GstFlowReturn write_some(GstAedatMux* self) {
   auto& file = self->priv->file;
   const bool ended = std::ranges::all_of(sink_pads(self), is_at_end);
@@ -377,7 +375,7 @@ static GstFlowReturn sink_event_pre_queue(GstAggregator* aggregator, GstAggregat
   return PARENT_AGGREGATOR_CLASS->sink_event_pre_queue(aggregator, pad, event);
 }
 
-/// Writes the triggers and IMU samples if too many wait for a buffer. May throw.
+/// Writes the triggers and IMU samples if too many wait for a buffer.
 static GstFlowReturn write_waiting(GstAedatMux* self) {
   auto& file = self->priv->file;
   if (!file.is_full()) return GST_FLOW_OK;

@@ -80,8 +80,6 @@ DEFINE_EVENT_ELEMENT(GstEventHdf5Sink, gst_event_hdf5_sink, EVENT_HDF5_SINK, Gst
                      GST_TYPE_BASE_SINK, eventhdf5sink, GST_RANK_NONE,
                      "writer of HDF5 files of events")
 
-/* properties */
-
 /* the file */
 
 static bool is_full(const std::exception& error) {

@@ -1,13 +1,20 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// The elements that read event files: a table of formats for GstEventReader.
+#include <memory>
+#include <utility>
+
 #include "elements/eventcam/files/es_origin.hpp"
 #include "features.hpp"
+#include "gst/base/types.hpp"
+#include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/eventreader.hpp"
 #include "gst/recording/evt_caps.hpp"
 #include "src/formats/atis/atis_bin.hpp"
+#include "src/formats/corruption.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/es/es.hpp"
+#include "src/formats/event_table.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/text/csv_decoder.hpp"
@@ -28,11 +35,56 @@ using namespace eventcamera;
 
 namespace {
 
+/// Time unit and columns of a table. Throws UnsupportedFormat.
+TableSettings table_settings(const FormatSettings& settings) {
+  TableSettings table;
+  if (settings.time_unit > 0) table.unit = static_cast<TimeUnit>(settings.time_unit - 1);
+  if (settings.column_order.empty()) return table;
+  auto columns = columns_of(settings.column_order);
+  if (!columns)
+    throw UnsupportedFormat("column-order \"" + settings.column_order +
+                            "\" must have each of t, x, y and p once, and '-' for others");
+  table.columns = *std::move(columns);
+  return table;
+}
+
+/// For formats whose files may not state the sensor size.
+void add_sensor_size(FormatProperties& properties) {
+  properties.add_fixed([](FormatSettings& settings) -> int& { return settings.sensor.width; },
+                       "width",
+                       "Width of the sensor in pixels, for files that do not state it; needs "
+                       "height. 0: of the smallest known sensor that contains the events",
+                       0, GST_EVENT_CAMERA_MAX_SIDE);
+  properties.add_fixed([](FormatSettings& settings) -> int& { return settings.sensor.height; },
+                       "height",
+                       "Height of the sensor in pixels, for files that do not state it; needs "
+                       "width. 0: of the smallest known sensor that contains the events",
+                       0, GST_EVENT_CAMERA_MAX_SIDE);
+}
+
+/// For tables.
+void add_table_properties(FormatProperties& properties) {
+  add_sensor_size(properties);
+  properties.add_fixed(
+      &FormatSettings::time_unit, "time-unit",
+      "Unit of the times in the file; needed if the file is refused because its "
+      "time unit is ambiguous",
+      enum_type<int>("GstEventTimeUnit",
+                     {{0, "As stated in the file, or detected from its first rows", "auto"},
+                      {1, "Seconds", "seconds"},
+                      {2, "Milliseconds", "milliseconds"},
+                      {3, "Microseconds", "microseconds"},
+                      {4, "Nanoseconds", "nanoseconds"}}));
+  properties.add_fixed(&FormatSettings::column_order, "column-order",
+                       "Meaning of the columns: one letter t, x, y or p each, - for others, as in "
+                       "xytp; empty = as stated in the file, or detected from its first rows");
+}
+
 /// Creates a decoder of a table.
 template <class TableDecoder>
 std::unique_ptr<Decoder> make_table_decoder(const GstCaps* /*caps*/,
                                             const FormatSettings& settings) {
-  return std::make_unique<TableDecoder>(settings.table());
+  return std::make_unique<TableDecoder>(table_settings(settings));
 }
 
 /// For words without a header, takes format and size from the caps; files have a header.
@@ -266,7 +318,7 @@ static const EventReaderFormat npz = {
     .add_properties = add_table_properties,
     .make_decoder =
         [](const GstCaps*, const FormatSettings& settings) {
-          return make_npz_decoder(settings.table());
+          return make_npz_decoder(table_settings(settings));
         },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_reader_type(npz))
@@ -311,11 +363,13 @@ static const EventReaderFormat hdf5 = {
     .add_properties =
         [](FormatProperties& properties) {
           add_table_properties(properties);
-          add_events_path(properties);
+          properties.add_fixed(&FormatSettings::events_path, "events-path",
+                               "Path of the events in the file: of a dataset or a group, such as "
+                               "prophesee/right; empty = the first events");
         },
     .make_decoder =
         [](const GstCaps*, const FormatSettings& settings) {
-          return make_hdf5_decoder({settings.events_path, settings.table()});
+          return make_hdf5_decoder({settings.events_path, table_settings(settings)});
         },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, event_reader_type(hdf5))
@@ -400,6 +454,12 @@ GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_re
  *
  * Since: 0.1
  */
+static void add_topics(FormatProperties& properties) {
+  properties.add_fixed(&FormatSettings::topics, "topics",
+                       "Topics of events and images to read, separated by commas; empty = the "
+                       "first topic of events in the file, and all of images");
+}
+
 static std::unique_ptr<Decoder> make_bag_decoder(const GstCaps* /*caps*/,
                                                  const FormatSettings& settings) {
   return std::make_unique<BagDecoder>(settings.topics);

@@ -12,13 +12,13 @@
  * 0/1.
  *
  * Only triggers of #GstEventCut:input with this #GstEventCut:edge cut; all are passed on, ahead of
- * their window. Events before the first of them and after the last are dropped; `stats` counts
- * them. So are the events of a window that a seek, a new segment, another sensor size or time that
- * goes back interrupts, and those of windows of more than 71 minutes. A window has at most 16777216
+ * their window. Events before the first trigger and after the last are dropped, and so are windows
+ * of more than 71 minutes, and a window that is interrupted by a seek, a new segment, another
+ * sensor size or time that goes back; `stats` counts these events. A window has at most 16777216
  * events; further ones are skipped with a warning.
  *
- * A window is output once it is complete. The latency is the longest window so far, but
- * at most a second, since nothing tells when the next trigger comes.
+ * A window is output once it is complete. The latency is the longest window so far, but at most a
+ * second, since the time of the next trigger is unknown.
  *
  * ## Example launch line
  * |[
@@ -153,7 +153,7 @@ static void lengthen_latency(GstEventCut* self, GstClockTime duration) {
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
 }
 
-/// Pushes the window, which holds these events and ends at `end`. May throw.
+/// Pushes the window, which holds these events and ends at `end`.
 static GstFlowReturn push_window(GstEventCut* self, std::span<const AbsoluteEvent> events,
                                  Microseconds end) {
   const auto stream = self->priv->stream.lock();
@@ -186,7 +186,6 @@ static GstFlowReturn push_window(GstEventCut* self, std::span<const AbsoluteEven
 
 /// Pushes the windows that end in the interval, whose events have been added. Before the first
 /// window, a GAP without duration, of which no tensor or picture is made, says that time passes.
-/// May throw.
 static GstFlowReturn advance(GstEventCut* self, const EventInterval& interval) {
   const auto stream = self->priv->stream.lock();
   stream->reached = std::max(stream->reached, interval.end);
@@ -224,9 +223,8 @@ static void start_over_if_earlier(GstEventCut* self, const EventInterval& interv
   start_over(self);
 }
 
-/// Adds the events of a buffer. May throw.
-static void add(GstEventCut* self, const MappedEvents& mapped, Microseconds max_t,
-                GstBuffer* buffer) {
+/// Adds the events of a buffer.
+static void add(GstEventCut* self, const MappedEvents& mapped, GstBuffer* buffer) {
   const auto stream = self->priv->stream.lock();
   const auto labels = labels_of(buffer);
   stream->is_labelled |= !labels.empty();
@@ -237,8 +235,8 @@ static void add(GstEventCut* self, const MappedEvents& mapped, Microseconds max_
     else
       ++excess;
   };
-  const auto invalid =
-      stream->validator->for_each_valid(mapped.events(), mapped.start(), max_t, keep, labels);
+  const auto invalid = stream->validator->for_each_valid(
+      mapped.events(), mapped.start(), length_of(mapped.interval()), keep, labels);
   stream->faults.warn(self, invalid, buffer);
   if (excess > 0)
     stream->warn_of_excess(
@@ -259,30 +257,30 @@ static GstFlowReturn submit_input_buffer(GstBaseTransform* transform, gboolean, 
   if (!stream->validator) return GST_FLOW_NOT_NEGOTIATED;
   const auto events = gst_buffer_get_size(input) / sizeof(Event);
   self->priv->counters.lock()->events += events;
-  const auto interval = interval_of(input);
   const MappedEvents mapped(input);
-  if (!interval || !mapped) {
-    stream->faults.warn(self, interval ? EventFault::partial_event : interval_fault(input), input);
+  if (!mapped) {
+    stream->faults.warn(self, event_fault(input), input);
     self->priv->counters.lock()->rejected += events;
     return GST_FLOW_OK;
   }
+  const auto& interval = mapped.interval();
   GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, events,
-                 GST_TIME_ARGS(interval->start));
+                 GST_TIME_ARGS(interval.start));
   return reported(self, [&] {
-    start_over_if_earlier(self, *interval);
+    start_over_if_earlier(self, interval);
     if (GST_BUFFER_IS_DISCONT(input)) {
-      const auto result = advance(self, {interval->start, interval->start});
+      const auto result = advance(self, {interval.start, interval.start});
       if (result != GST_FLOW_OK) return result;
       stream->is_discontinuous = true;
     }
-    add(self, mapped, length_of(*interval), input);
-    return advance(self, *interval);
+    add(self, mapped, input);
+    return advance(self, interval);
   });
 }
 
 /* events, queries */
 
-/// Passes a GAP as an interval without events. May throw.
+/// Passes a GAP as an interval without events.
 static bool handle_gap(GstEventCut* self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
@@ -294,7 +292,6 @@ static bool handle_gap(GstEventCut* self, GstEvent* event) {
   return advance(self, interval) == GST_FLOW_OK;
 }
 
-/// May throw.
 static void add_triggers(GstEventCut* self, GstEvent* event) {
   auto triggers = triggers_of(event);
   const auto stream = self->priv->stream.lock();
@@ -409,10 +406,8 @@ static void gst_event_cut_class_init(GstEventCutClass* klass) {
                  enum_type<Edge>("GstEventCutEdge", {{Edge::rising, "Rising edges", "rising"},
                                                      {Edge::falling, "Falling edges", "falling"},
                                                      {Edge::both, "Both edges", "both"}}));
-  properties.add(
-      &Settings::input,
-      g_param_spec_int64("input", "Input", "Number of the trigger input to cut at (-1 = all)", -1,
-                         G_MAXUINT16, Settings().input, mutable_playing_flags));
+  properties.add(&Settings::input, "input", "Number of the trigger input to cut at (-1 = all)", -1,
+                 G_MAXUINT16);
   install_stats(object_class, stats_of,
                 "Counts since the start: events (received), dropped-events (outside of windows), "
                 "rejected-events (outside the sensor or out of order), windows (pushed)");

@@ -60,14 +60,12 @@ class Flip final : public EventFilter {
     out_ = out;
     orientation_ = {.transpose = in != out};
   }
-  void stop() override {}
   LabelledEvents filter(LabelledEvents events, Microseconds /*start*/) override {
     // A direction that changes the size applies only after the next negotiation of caps.
     const Orientation wanted = orientation_of(settings.copy().direction);
     if (wanted.size(in_) == out_) orientation_ = wanted;
     return FlipFilter(in_, orientation_).filter(events);
   }
-  void forget() override {}
 
   Guarded<Settings> settings;
 

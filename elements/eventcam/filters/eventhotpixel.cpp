@@ -17,8 +17,8 @@
  * learn once with the lens covered or in front of an even scene, and use that file from then on.
  *
  * Hot pixels belong to the sensor: they are kept through flushes, gaps, new segments, DISCONT and
- * where time goes back. What was counted in the current period is forgotten after a flush and where
- * time goes back.
+ * where time goes back. The counts of the current period are forgotten after a flush and where time
+ * goes back.
  *
  * ## Example launch lines
  * |[
@@ -54,10 +54,6 @@ struct Settings : HotPixelFilter::Settings {
 /// Maximum size of a file, bytes: several million hot pixels.
 constexpr std::size_t max_file_size = std::size_t{64} << 20;
 
-std::vector<PixelPosition> read_hot_pixels(const std::string& location) {
-  return read_named_file("the hot pixels", location, max_file_size, parse_pixel_list);
-}
-
 void write_hot_pixels(const std::string& location, const std::vector<PixelPosition>& pixels) {
   try {
     write_bytes(location, pixel_list_text(pixels));
@@ -70,10 +66,10 @@ class HotPixels final : public EventFilterOf<HotPixelFilter, Settings> {
  public:
   void start(SensorSize in, SensorSize out) override {
     stop();
-    const auto [location, learn] = file();
+    const Settings now = settings.copy();
     std::vector<PixelPosition> pixels;
-    if (!location.empty() && !(learn && !std::filesystem::exists(location)))
-      pixels = read_hot_pixels(location);
+    if (!now.location.empty() && !(now.learn && !std::filesystem::exists(now.location)))
+      pixels = read_named_file("the hot pixels", now.location, max_file_size, parse_pixel_list);
     // After the file: one that cannot be read must not be replaced on stop.
     EventFilterOf::start(in, out);
     outside_.clear();
@@ -88,24 +84,16 @@ class HotPixels final : public EventFilterOf<HotPixelFilter, Settings> {
     if (!core_) return;
     auto pixels = core_->hot_pixels();
     EventFilterOf::stop();  // even if the file cannot be written
-    const auto [location, learn] = file();
-    if (!learn || location.empty() || (pixels == read_ && std::filesystem::exists(location)))
+    const Settings now = settings.copy();
+    if (!now.learn || now.location.empty() ||
+        (pixels == read_ && std::filesystem::exists(now.location)))
       return;
     pixels.insert(pixels.end(), outside_.begin(), outside_.end());
-    write_hot_pixels(location, pixels);
+    write_hot_pixels(now.location, pixels);
   }
 
  private:
-  struct File {
-    std::string location;
-    bool learn;
-  };
-  File file() const {
-    const auto copy = settings.copy();
-    return {copy.location, copy.learn};
-  }
-
-  // Of the file:
+  // Contents of the file:
   std::vector<PixelPosition> read_;     ///< hot pixels of the sensor
   std::vector<PixelPosition> outside_;  ///< of a larger sensor; kept in the file
 };

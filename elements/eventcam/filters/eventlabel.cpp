@@ -155,13 +155,9 @@ class EventLabeller final : public EventAggregator {
     const auto interval = interval_of(buffer);
     const auto start =
         interval ? signed_running_time(main_pad(), interval->start) : std::optional<Nanoseconds>();
-    if (!start) {
-      warn(interval_fault(buffer), buffer);
-      return std::nullopt;
-    }
     const gsize size = gst_buffer_get_size(buffer);
-    if (size % sizeof(Event) != 0) {
-      warn(EventFault::partial_event, buffer);
+    if (!start || size % sizeof(Event) != 0) {
+      warn(event_fault(buffer), buffer);
       return std::nullopt;
     }
     const auto present = labels_of(buffer);
@@ -283,7 +279,7 @@ class EventLabeller final : public EventAggregator {
     if (!all_inside) warn(EventFault::beyond_sensor, head_->buffer.get());
   }
 
-  /// Pushes the head with the classes that are known. May throw.
+  /// Pushes the head with the classes that are known.
   GstFlowReturn push_head() {
     const GstFlowReturn result = label_until(std::numeric_limits<Microseconds>::max());
     if (result != GST_FLOW_OK) return result;

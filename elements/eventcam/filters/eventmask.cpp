@@ -49,7 +49,6 @@ class Mask final : public EventFilter {
   LabelledEvents filter(LabelledEvents events, Microseconds /*start*/) override {
     return mask_ ? mask_->filter(events) : events;
   }
-  void forget() override {}
 
   Guarded<Settings> settings;
 

@@ -293,7 +293,7 @@ class EventMerge final : public EventAggregator {
   }
 
   /// Loads the next queued interval of a pad if it is not loaded yet. Returns false if there is
-  /// none. May throw.
+  /// none.
   bool load(const OwnedAggregatorPad& pad) {
     auto& stream = stream_of(pad);
     while (const auto buffer = next_buffer(pad.get())) {
@@ -307,7 +307,7 @@ class EventMerge final : public EventAggregator {
           return true;
         }
       } else {
-        warn(interval_fault(buffer.get()), buffer.get());
+        warn(event_fault(buffer.get()), buffer.get());
       }
       gst_aggregator_pad_drop_buffer(pad.get());
     }
@@ -315,13 +315,12 @@ class EventMerge final : public EventAggregator {
     return false;
   }
 
-  /// Loads the events of a queued buffer. Returns false if it cannot be mapped as events. May
-  /// throw.
+  /// Loads the events of a queued buffer. Returns false if it cannot be mapped as events.
   bool load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer, Microseconds length) {
     auto& stream = stream_of(pad);
     const MappedEvents mapped(buffer);
     if (!mapped) {
-      warn(EventFault::partial_event, buffer);
+      warn(event_fault(buffer), buffer);
       return false;
     }
     GST_LOG_OBJECT(pad.get(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
@@ -371,7 +370,7 @@ class EventMerge final : public EventAggregator {
     set_segment(timeline.segment(first, pads));
   }
 
-  /// Pushes the events of an interval. May throw.
+  /// Pushes the events of an interval.
   GstFlowReturn push_interval(const MergedInterval& interval, EventMerger::Inputs inputs) {
     if (!gst_pad_has_current_caps(GST_AGGREGATOR_SRC_PAD(element()))) return GST_FLOW_OK;
     const auto start = static_cast<GstClockTime>(interval.start) * GST_USECOND;
@@ -496,16 +495,12 @@ static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
   return TRUE;
 }
 
-static Guarded<Settings>& settings_of(GObject* object) {
-  return aggregator_impl<EventMerge>(object).settings;
-}
-
 static void gst_event_merge_init(GstEventMerge* self) {
   gst_event_aggregator_make<EventMerge>(GST_EVENT_AGGREGATOR(self));
 }
 
 static void gst_event_merge_class_init(GstEventMergeClass* klass) {
-  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  Properties<aggregator_settings<EventMerge>> properties(G_OBJECT_CLASS(klass));
   properties.add_fixed(&Settings::min_streams, "min-streams",
                        "Number of linked streams that the output needs to start; live sources wait "
                        "for them no longer than the latency",

@@ -85,8 +85,8 @@ static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection, GstCaps* caps, G
 static void gst_event_scale_class_init(GstEventScaleClass* klass) {
   Properties<gst_event_scale_settings> properties(G_OBJECT_CLASS(klass));
   properties.add(&Settings::min_events, "min-events",
-                 "Number of events of a polarity for which an output pixel fires once, at the time "
-                 "of the last one (events)",
+                 "Number of events of a polarity per event of an output pixel, which fires at the "
+                 "time of the last one (events)",
                  1, ScaleFilter::max_min_events);
   set_metadata(klass, "Event scaler", "Filter", "Scales the sensor");
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);

@@ -75,7 +75,6 @@ class Undistort final : public EventFilter {
   LabelledEvents filter(LabelledEvents events, Microseconds /*start*/) override {
     return core_ ? core_->filter(events) : events;
   }
-  void forget() override {}
 
   Guarded<Settings> settings;
 

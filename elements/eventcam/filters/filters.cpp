@@ -85,7 +85,7 @@ static void gst_event_anti_flicker_class_init(GstEventAntiFlickerClass* klass) {
  *   since its last event of equal polarity, and τ the correlation time, 32 ms by default; the sum
  *   is at least #GstEventDenoise:threshold;
  * - `dwf`, double window filter: at least one of the last 36 events that were kept, or of the last
- * 36 that were dropped, is at most #GstEventDenoise:search-distance away.
+ *   36 that were dropped, is at most #GstEventDenoise:search-distance away.
  *
  * Compared in docs/filters.md. The state of the pixels is reset by a flush, by time that goes back,
  * and if another method or #GstEventDenoise:match-polarity is set; it is kept through gaps, new

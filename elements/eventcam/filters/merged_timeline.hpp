@@ -72,7 +72,7 @@ class MergedTimeline {
   static GstSegment longest_segment(const OwnedAggregatorPad& of,
                                     std::span<const OwnedAggregatorPad> pads);
   /// Segment of the output: the longest segment of the stream that starts first. Start and stop of
-  /// the last seek replace its own, as not all streams may reach them.
+  /// the last seek replace its start and stop, which not all streams may reach.
   GstSegment segment(const OwnedAggregatorPad& first,
                      std::span<const OwnedAggregatorPad> pads) const;
 

@@ -15,12 +15,12 @@
  * - `map-correlation` (#gdouble): Pearson correlation of the events per pixel;
  * - `rate-correlation` (#gdouble): Pearson correlation of the events per millisecond;
  * - `interval-distance` (#gdouble): Wasserstein distance between the logarithms of the times
- * between successive events of a pixel, in decades: 0.3 if one stream's are twice as long;
- * accurate to 0.02; 0 if either stream has none;
+ *   between successive events of a pixel, in decades: 0.3 if one stream's are twice as long;
+ *   accurate to 0.02; 0 if either stream has none;
  * - `reference-matches`, `candidate-matches` (#GstStructure): the fractions of the events of each
  *   stream that have a match in the other, of the same polarity, at the same pixel or next to it
  *   (#gdouble, `within-1ms`, `within-5ms`, `within-10ms`), and `nearest-distance` (#guint64): the
- * mean time to the nearest such event, in ns; events without one count as 10 ms;
+ *   mean time to the nearest such event, in ns; events without one count as 10 ms;
  * - `noise-ceiling` (#GstStructure): `rate-correlation`, `interval-distance` and `matches` of a
  *   second recording of the reference's scene, estimated from two halves of its events, chosen by
  *   chance (split halves, Spearman-Brown); a good simulator can come out slightly above, since a
@@ -192,7 +192,7 @@ class EventCompare final : public EventAggregator {
     sensor = next;
     // At once, because aggregate() waits for both streams, and a source whose size changes may wait
     // for one of them. Before the comparison, caps may change until there are events.
-    return !has_begun || has_one_size();
+    return !has_begun || expect_one_size();
   }
 
   GstFlowReturn aggregate(bool) override {
@@ -200,7 +200,7 @@ class EventCompare final : public EventAggregator {
       if (!reported_) conclude();
       return GST_FLOW_EOS;
     }
-    return has_one_size() ? aggregate_next() : GST_FLOW_NOT_NEGOTIATED;
+    return expect_one_size() ? aggregate_next() : GST_FLOW_NOT_NEGOTIATED;
   }
 
   Guarded<ReportFiles> settings;
@@ -226,23 +226,18 @@ class EventCompare final : public EventAggregator {
            !is_over(StreamRole::reference);
   }
 
-  /// Starts the comparison once both sensors, of one size, are known. Returns true if it is
-  /// running. May throw.
-  bool begin() {
+  /// Starts the comparison once both sensors, of one size, are known.
+  void begin() {
     const auto& reference = sensors_[StreamRole::reference];
-    const auto& candidate = sensors_[StreamRole::candidate];
-    if (!reference || !candidate) return false;
-    if (!comparison_) {
-      GST_DEBUG_OBJECT(element(), "comparing sensors of %dx%d pixels", reference->width,
-                       reference->height);
-      comparison_.emplace(reference->width, reference->height);
-      concluded_ = true;
-    }
-    return true;
+    if (comparison_ || !reference || !sensors_[StreamRole::candidate]) return;
+    GST_DEBUG_OBJECT(element(), "comparing sensors of %dx%d pixels", reference->width,
+                     reference->height);
+    comparison_.emplace(reference->width, reference->height);
+    concluded_ = true;
   }
 
   /// False, after an error message, if both sensors are known and differ.
-  bool has_one_size() const {
+  bool expect_one_size() const {
     const auto& reference = sensors_[StreamRole::reference];
     const auto& candidate = sensors_[StreamRole::candidate];
     if (reference && candidate && *reference != *candidate) {
@@ -256,31 +251,28 @@ class EventCompare final : public EventAggregator {
     return true;
   }
 
-  /// Adds a buffer to the comparison. May throw.
+  /// Adds a buffer to the comparison.
   void compare(StreamRole role, GstBuffer* buffer) {
-    const auto interval = interval_of(buffer);
     const MappedEvents mapped(buffer);
-    if (!interval || !mapped) {
-      warn(interval ? EventFault::partial_event : interval_fault(buffer), buffer);
-      return;
-    }
+    if (!mapped) return warn(event_fault(buffer), buffer);
+    const auto& interval = mapped.interval();
     GST_LOG_OBJECT(pads_[role], "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
-                   mapped.events().size(), GST_TIME_ARGS(interval->start));
+                   mapped.events().size(), GST_TIME_ARGS(interval.start));
     const GstSegment segment = segment_of(pads_[role]);
-    const auto clipped = clip(*interval, segment);
+    const auto clipped = clip(interval, segment);
     if (!clipped) return;
-    const auto [events, labels] = ClippedEvents(mapped, buffer, *interval, *clipped);
+    const auto [events, labels] = ClippedEvents(mapped, buffer, *clipped);
     if (!events.empty()) concluded_ = reported_ = false;
-    const auto skipped = comparison_->add(
-        role, events, stream_time(segment, interval->start) / 1000,
-        stream_time(segment, clipped->start), stream_time(segment, clipped->end), labels);
+    const auto skipped = comparison_->add(role, events, stream_time(segment, interval.start) / 1000,
+                                          stream_time(segment, clipped->start),
+                                          stream_time(segment, clipped->end), labels);
     warn(skipped, buffer);
   }
 
-  /// Processes the next buffer of either stream. May throw.
+  /// Processes the next buffer of either stream.
   GstFlowReturn aggregate_next() {
-    const bool comparing = begin();
-    const auto behind = comparing ? comparison_->behind() : StreamRole::candidate;
+    begin();
+    const auto behind = comparison_ ? comparison_->behind() : StreamRole::candidate;
     if (behind == StreamRole::reference && !is_over(StreamRole::reference)) {
       const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pads_[StreamRole::reference]));
       if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -300,7 +292,7 @@ class EventCompare final : public EventAggregator {
     {
       const auto buffer = next_buffer(main_pad());
       if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
-      if (comparing && behind == StreamRole::candidate)
+      if (comparison_ && behind == StreamRole::candidate)
         compare(StreamRole::candidate, buffer.get());
     }
     OwnedBuffer passed(gst_aggregator_pad_pop_buffer(main_pad()));
@@ -309,7 +301,7 @@ class EventCompare final : public EventAggregator {
                : push(std::move(passed));
   }
 
-  /// Posts and writes the statistics, as of empty streams if there is no comparison yet.
+  /// Posts and writes the statistics, of empty streams if there is no comparison yet.
   void conclude() {
     concluded_ = reported_ = true;
     const StreamComparison nothing(1, 1);

@@ -153,8 +153,7 @@ static void post(GstEventStats* self, GstStructure* structure) {
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_element(GST_OBJECT(self), structure));
 }
 
-/// Reports the statistics of the whole stream, as of an empty one if no caps were received.
-/// May throw.
+/// Reports the statistics of the whole stream, which is empty if no caps were received.
 static void conclude(GstEventStats* self, const ReportFiles& files) {
   Measurement nothing(1, 1);
   auto& measurement = self->priv->stream->measurement ? *self->priv->stream->measurement : nothing;
@@ -169,13 +168,13 @@ static bool has_news(Private& priv) {
   return priv.stream->measurement && !priv.stream->measurement->concluded;
 }
 
-/// Starts measuring a sensor of this size. May throw.
+/// Starts measuring a sensor of this size.
 static void measure(GstEventStats* self, int width, int height) {
   GST_DEBUG_OBJECT(self, "counting the events of %dx%d pixels", width, height);
   self->priv->stream->measurement.emplace(width, height);
 }
 
-/// Starts over with the same sensor, if it is known. May throw.
+/// Starts over with the same sensor, if it is known.
 static void start_over(GstEventStats* self) {
   if (const auto& measurement = self->priv->stream->measurement)
     measure(self, measurement->width, measurement->height);
@@ -213,18 +212,19 @@ static void post_if_due(GstEventStats* self, Measurement& measurement) {
   measurement.recent.restart();
 }
 
-/// Counts the events of a buffer that are in the clipped part of the whole interval. May throw.
+/// Counts the events of a buffer that are in the clipped part of its interval.
 static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buffer,
-                  const EventInterval& whole, const EventInterval& clipped) {
+                  const EventInterval& clipped) {
   const MappedEvents mapped(buffer);
   if (!mapped) {
-    self->priv->stream->faults.warn(self, EventFault::partial_event, buffer);
+    self->priv->stream->faults.warn(self, event_fault(buffer), buffer);
     return;
   }
-  const auto [events, labels] = ClippedEvents(mapped, buffer, whole, clipped);
+  const auto [events, labels] = ClippedEvents(mapped, buffer, clipped);
   const bool is_labelled = !labels.empty();
   const auto skipped = measurement.validator.for_each_valid(
-      events, stream_time(GST_BASE_TRANSFORM(self)->segment, whole.start) / 1000, length_of(whole),
+      events, stream_time(GST_BASE_TRANSFORM(self)->segment, mapped.interval().start) / 1000,
+      length_of(mapped.interval()),
       [&](const AbsoluteEvent& event) {
         measurement.concluded = false;
         const auto interval = measurement.last_times.update(event);
@@ -242,7 +242,7 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
   auto& measurement = self->priv->stream->measurement;
   const auto interval = interval_of(buffer);
   if (!interval) {
-    self->priv->stream->faults.warn(self, interval_fault(buffer), buffer);
+    self->priv->stream->faults.warn(self, event_fault(buffer), buffer);
     return GST_FLOW_OK;
   }
   if (!measurement) return GST_FLOW_NOT_NEGOTIATED;
@@ -253,13 +253,12 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
   if (!clipped) return GST_FLOW_OK;
   return reported(self, [&] {
     cover(self, *clipped);
-    count(self, *measurement, buffer, *interval, *clipped);
+    count(self, *measurement, buffer, *clipped);
     post_if_due(self, *measurement);
     return GST_FLOW_OK;
   });
 }
 
-/// May throw.
 static void handle_gap(GstEventStats* self, GstEvent* event) {
   auto& measurement = self->priv->stream->measurement;
   GstClockTime start = 0;

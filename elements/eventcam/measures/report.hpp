@@ -25,12 +25,12 @@ inline std::optional<EventInterval> clip(EventInterval interval, const GstSegmen
 }
 
 /// The events of a buffer, and their labels if it has any, that are in the clipped part of its
-/// whole interval. They live as long as the buffer is mapped.
+/// interval. They live as long as the buffer is mapped.
 struct ClippedEvents {
-  ClippedEvents(const MappedEvents& mapped, GstBuffer* buffer, const EventInterval& whole,
-                const EventInterval& clipped)
+  ClippedEvents(const MappedEvents& mapped, GstBuffer* buffer, const EventInterval& clipped)
       : labels(labels_of(buffer)) {
     const auto all = mapped.events();
+    const auto& whole = mapped.interval();
     const auto time_of = [&](const auto& event) { return whole.start + event.t * GST_USECOND; };
     const auto first = std::ranges::find_if(
         all, [&](const auto& event) { return time_of(event) + event_resolution > clipped.start; });
@@ -70,7 +70,7 @@ void put_figures(GstStructure* structure, const eventcamera::StreamFigures& figu
 /// Sets the fields of labelled events by cause; none if no event has a label.
 void put_causes(GstStructure* structure, const eventcamera::CauseCounts& causes);
 
-/// Checks that the folders of these files exist. Posts an error and returns false if not.
+/// False, after an error message, if a folder of these files does not exist.
 bool can_report(gpointer element, const ReportFiles& files);
 
 /// Writes `figures` as JSON (nested structures as objects, arrays as arrays) and the image, and

@@ -7,7 +7,7 @@
 
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
-#include "src/wire/datagram_settings.hpp"
+#include "src/wire/datagrams.hpp"
 
 /// Counts of datagrams. Losses are known only if datagrams have a sequence number.
 struct DatagramCounts {

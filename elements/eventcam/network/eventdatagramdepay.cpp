@@ -56,7 +56,7 @@
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
 #include "src/core/sensor_size.hpp"
-#include "src/wire/datagram_unpacker.hpp"
+#include "src/wire/datagrams.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_depay_debug);
 #define GST_CAT_DEFAULT event_datagram_depay_debug
@@ -170,7 +170,7 @@ static bool push_caps(GstEventDatagramDepay* self) {
   return state.has_caps;
 }
 
-/// Buffer of the events of the interval from start to end. May throw.
+/// Buffer of the events of the interval from start to end.
 static GstBuffer* buffer_of(std::span<const AbsoluteEvent> events, Microseconds start,
                             Microseconds end) {
   std::vector<Event> stream;
@@ -183,7 +183,7 @@ static GstBuffer* buffer_of(std::span<const AbsoluteEvent> events, Microseconds 
   return buffer;
 }
 
-/// Pushes the events of a datagram. May throw.
+/// Pushes the events of a datagram.
 static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& reception,
                           GstClockTime arrival) {
   auto& priv = *self->priv;
@@ -256,7 +256,7 @@ static void log_late(GstEventDatagramDepay* self, GstClockTime arrival) {
                     GST_TIME_ARGS(arrival));
 }
 
-/// Receives a datagram with these bytes. May throw.
+/// Receives a datagram with these bytes.
 static GstFlowReturn receive(GstEventDatagramDepay* self, GstBuffer* datagram,
                              std::span<const std::uint8_t> bytes, GstClockTime arrival) {
   auto& priv = *self->priv;

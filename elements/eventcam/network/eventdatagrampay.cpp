@@ -44,7 +44,7 @@
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
-#include "src/wire/datagram_packer.hpp"
+#include "src/wire/datagrams.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_pay_debug);
 #define GST_CAT_DEFAULT event_datagram_pay_debug
@@ -102,7 +102,7 @@ static Report report_of(const std::exception& error) {
   return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to send the events."};
 }
 
-/// Keeps a datagram until push(). May throw.
+/// Keeps a datagram until push().
 static void keep(Private& priv, const Datagram& datagram) {
   OwnedBuffer buffer(copied_buffer(std::as_bytes(datagram.bytes)));
   GST_BUFFER_PTS(buffer.get()) = static_cast<GstClockTime>(datagram.first) * GST_USECOND;
@@ -132,7 +132,7 @@ static GstFlowReturn push(Private& priv) {
 
 static void flush_late(GstObject* element);
 
-/// Limits the time that a new incomplete datagram waits. May throw.
+/// Limits the time that a new incomplete datagram waits.
 static void set_timer(Private& priv) {
   const auto since = priv.stream->packer ? priv.stream->packer->waiting_since() : std::nullopt;
   if (since == priv.stream->timed) return;
@@ -212,21 +212,16 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   auto& priv = *self->priv;
   const OwnedBuffer buffer(received);
   if (!priv.stream->packer) return GST_FLOW_NOT_NEGOTIATED;
-  const auto interval = interval_of(received);
-  if (!interval) {
-    priv.stream->faults.warn(self, interval_fault(received), received);
-    return GST_FLOW_OK;
-  }
   const MappedEvents mapped(received);
   if (!mapped) {
-    priv.stream->faults.warn(self, EventFault::partial_event, received);
+    priv.stream->faults.warn(self, event_fault(received), received);
     return GST_FLOW_OK;
   }
   return pack(self, [&](DatagramPacker& packer, const auto& send) {
     collect(self, received, mapped);
     packer.set_max_span(max_span(priv.settings.copy().max_latency));
     packer.pack(priv.stream->events, send);
-    if (is_flush_due(self, *interval)) packer.flush(send);
+    if (is_flush_due(self, mapped.interval())) packer.flush(send);
   });
 }
 

@@ -141,7 +141,6 @@ static Report no_memory(const std::exception&) {
   return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
 }
 
-/// May throw.
 static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
   const auto start = static_cast<GstClockTime>(interval.start);
   const auto duration = static_cast<GstClockTime>(interval.duration);

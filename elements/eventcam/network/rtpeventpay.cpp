@@ -202,7 +202,7 @@ static GstBuffer* make_packet(GstRtpEventPay* self, std::span<const std::uint8_t
   return packet;
 }
 
-/// Sends the pending interval. May throw.
+/// Sends the pending interval.
 static void send(GstRtpEventPay* self) {
   auto& priv = *self->priv;
   if (!priv.stream->state || priv.stream->state->pending.empty()) return;
@@ -275,7 +275,7 @@ static bool is_due(GstRtpEventPay* self, Nanoseconds last_duration) {
 }
 
 /// Adds an interval, and sends the pending events if they are due. Returns the events that cannot
-/// be sent. May throw.
+/// be sent.
 static InvalidEvents add_interval(GstRtpEventPay* self, EventInterval interval,
                                   std::span<const Event> events) {
   auto& priv = *self->priv;
@@ -295,13 +295,6 @@ static InvalidEvents add_interval(GstRtpEventPay* self, EventInterval interval,
 
 /* streaming */
 
-/// Skips a buffer that cannot be sent.
-static GstFlowReturn reject(GstRtpEventPay* self, EventFault fault, GstBuffer* buffer) {
-  self->priv->stream->faults.warn(self, fault, buffer);
-  self->priv->sent.lock()->rejected += gst_buffer_get_size(buffer) / sizeof(Event);
-  return GST_FLOW_OK;
-}
-
 static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* received) {
   auto* self = GST_RTP_EVENT_PAY(payload);
   auto& priv = *self->priv;
@@ -310,15 +303,16 @@ static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* receiv
   constexpr guint max_csrc_count = 15;
   priv.stream->csrc_count = static_cast<guint8>(
       std::min(gst_rtp_base_payload_get_source_count(payload, received), max_csrc_count));
-  const auto interval = interval_of(received);
-  if (!interval || interval->start > static_cast<GstClockTime>(max_rtp_start))
-    return reject(self, interval_fault(received), received);
   const MappedEvents mapped(received);
-  if (!mapped) return reject(self, EventFault::partial_event, received);
+  if (!mapped || mapped.interval().start > static_cast<GstClockTime>(max_rtp_start)) {
+    priv.stream->faults.warn(self, event_fault(received), received);
+    priv.sent.lock()->rejected += gst_buffer_get_size(received) / sizeof(Event);
+    return GST_FLOW_OK;
+  }
   GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, mapped.events().size(),
-                 GST_TIME_ARGS(interval->start));
+                 GST_TIME_ARGS(mapped.interval().start));
   return reported(self, [&] {
-    const auto rejected = add_interval(self, *interval, mapped.events());
+    const auto rejected = add_interval(self, mapped.interval(), mapped.events());
     priv.sent.lock()->rejected += rejected.outside + rejected.unsorted;
     priv.stream->faults.warn(self, rejected, received);
   });

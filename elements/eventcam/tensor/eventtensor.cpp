@@ -29,7 +29,7 @@
  * - `voxel-grid`: each event adds its polarity, +1 or -1, to the two nearest of
  *   #GstEventTensor:bins instants, in proportion to their closeness. The first instant is the time
  *   of the first event of the window, the last instant the time of the last event (Zhu et al., CVPR
- * 2019; E2VID).
+ *   2019; E2VID).
  * - `histogram`: the number of OFF (channel 0) and of ON events (channel 1) of each pixel.
  * - `time-surface`: a value that decays with the age of the last OFF (channel 0) and the last ON
  *   event (channel 1) at the end of the window, from 1; 0 where there was none (Lagorce et al.,
@@ -203,7 +203,7 @@ static GstFlowReturn drain_before_jump(GstEventTensor* self, const EventInterval
   return drain(self);
 }
 
-/// Adds an interval, and pushes the tensors of the windows that it completes. May throw.
+/// Adds an interval, and pushes the tensors of the windows that it completes.
 static GstFlowReturn add(GstEventTensor* self, std::span<const Event> events, Microseconds base,
                          const EventInterval& interval, GstBuffer* buffer) {
   auto& priv = *self->priv;
@@ -241,20 +241,15 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   priv.stream->discontinuous |= GST_BUFFER_IS_DISCONT(received);
   const auto gap_result = std::exchange(priv.stream->gap_result, GST_FLOW_OK);
   if (gap_result != GST_FLOW_OK) return gap_result;
-  const auto interval = interval_of(received);
-  if (!interval || interval->end > max_tensor_time) {
-    priv.stream->faults.warn(self, interval_fault(received), received);
-    return GST_FLOW_OK;
-  }
   const MappedEvents mapped(received);
-  if (!mapped) {
-    priv.stream->faults.warn(self, EventFault::partial_event, received);
+  if (!mapped || mapped.interval().end > max_tensor_time) {
+    priv.stream->faults.warn(self, event_fault(received), received);
     return GST_FLOW_OK;
   }
   GST_LOG_OBJECT(priv.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
-                 mapped.events().size(), GST_TIME_ARGS(interval->start));
+                 mapped.events().size(), GST_TIME_ARGS(mapped.interval().start));
   return catch_exceptions(self, no_memory, [&] {
-    return add(self, mapped.events(), mapped.start(), *interval, received);
+    return add(self, mapped.events(), mapped.start(), mapped.interval(), received);
   });
 }
 
@@ -273,7 +268,7 @@ static bool handle_gap(GstEventTensor* self, GstEvent* event) {
     priv.stream->warn_of_pause(
         self, {GST_STREAM_ERROR_FAILED, "The events pause; skipping the tensors of long pauses."},
         "pause of " + std::to_string(duration / GST_SECOND) + " s");
-    // One window ends what has begun; the next events start over.
+    // Ends the current window; the next events start over.
     duration = static_cast<GstClockTime>(priv.stream->state->format.windows.duration);
   }
   priv.stream->gap_result = catch_exceptions(self, no_memory, [&] {
@@ -298,7 +293,7 @@ static bool post_unless_accepted(GstEventTensor* self, GstCaps* caps) {
   return false;
 }
 
-/// Starts over for a sensor. May throw.
+/// Starts over for a sensor.
 static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
   auto& priv = *self->priv;
   priv.stream->state.reset();

@@ -86,7 +86,8 @@ static GstTensorDataType data_type_of(ElementType type) {
   return GST_TENSOR_DATA_TYPE_UINT8;
 }
 
-/// A buffer of the same memory: a meta that refers to its own buffer would never be freed.
+/// Returns a buffer of the same memory, because a meta that refers to its own buffer is never
+/// freed.
 static GstBuffer* same_memory(GstBuffer* buffer) {
   GstBuffer* const same = gst_buffer_new();
   for (guint i = 0; i < gst_buffer_n_memory(buffer); ++i)

@@ -16,7 +16,6 @@
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/recording/frame_buffer.hpp"
-#include "gst/recording/reader/event_reader.hpp"
 #include "gst/recording/sensor_events.hpp"
 
 GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
@@ -234,12 +233,15 @@ class ReaderPad {
 };
 
 ReaderOutput::ReaderOutput(GstElement* element, GstPad* sink, const EventReaderFormat& format,
-                           Guarded<FormatSettings>& settings, ReaderTimeline& timeline)
+                           Guarded<FormatSettings>& settings, ReaderTimeline& timeline,
+                           GstPadEventFunction src_event, GstPadQueryFunction src_query)
     : element_(element),
       sink_(sink),
       format_(format),
       settings_(settings),
       timeline_(timeline),
+      src_event_(src_event),
+      src_query_(src_query),
       warn_of_assumption_(event_reader_debug) {}
 
 ReaderOutput::~ReaderOutput() {
@@ -377,14 +379,8 @@ ReaderPad& ReaderOutput::pad_of(std::size_t index) {
       GST_ELEMENT_GET_CLASS(element_),
       format_.has_many_streams ? (kind + std::string("%u")).c_str() : "src");
   found = pads_.emplace_back(std::make_unique<ReaderPad>(templ, name, GST_CAT_DEFAULT)).get();
-  gst_pad_set_event_function(
-      found->get(), +[](GstPad* pad, GstObject* parent, GstEvent* event) {
-        return event_reader_of(parent).src_event(pad, event);
-      });
-  gst_pad_set_query_function(
-      found->get(), +[](GstPad* pad, GstObject* parent, GstQuery* query) {
-        return event_reader_of(parent).src_query(pad, query);
-      });
+  gst_pad_set_event_function(found->get(), src_event_);
+  gst_pad_set_query_function(found->get(), src_query_);
   return *found;
 }
 

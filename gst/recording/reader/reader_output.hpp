@@ -29,7 +29,8 @@ class ReaderOutput {
  public:
   /// All arguments must outlive this object.
   ReaderOutput(GstElement* element, GstPad* sink, const EventReaderFormat& format,
-               Guarded<FormatSettings>& settings, ReaderTimeline& timeline);
+               Guarded<FormatSettings>& settings, ReaderTimeline& timeline,
+               GstPadEventFunction src_event, GstPadQueryFunction src_query);
   ~ReaderOutput();
   ReaderOutput(const ReaderOutput&) = delete;
   ReaderOutput& operator=(const ReaderOutput&) = delete;
@@ -100,6 +101,8 @@ class ReaderOutput {
   const EventReaderFormat& format_;
   Guarded<FormatSettings>& settings_;
   ReaderTimeline& timeline_;
+  GstPadEventFunction src_event_;
+  GstPadQueryFunction src_query_;
   std::shared_ptr<eventcamera::RecordingReader> recording_;
 
   std::vector<std::unique_ptr<ReaderPad>> pads_;

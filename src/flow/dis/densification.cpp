@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/dis/densification.hpp"
+#include "src/flow/dis/patches.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "src/flow/dis/densification.hpp"
-#include "src/flow/dis/inverse_search.hpp"
 #include "src/flow/scratch.hpp"
 
 namespace eventcamera {

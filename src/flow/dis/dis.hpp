@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "src/flow/dense_flow.hpp"
-#include "src/flow/dis/patch_grid.hpp"
+#include "src/flow/dis/patches.hpp"
 #include "src/flow/dis/pyramid.hpp"
 #include "src/flow/dis/variational_refinement.hpp"
 #include "src/flow/resampling.hpp"

@@ -69,8 +69,8 @@ class SplitPlane {
   AlignedFloats values_;
 };
 
-/// Several values per pixel, split like in SplitPlane. They are interleaved in blocks, so that all
-/// of them are read as one stream.
+/// Several values per pixel, split like in SplitPlane. They are interleaved in blocks, and thus
+/// read as one stream.
 template <int values>
 class SplitPlanes {
  public:

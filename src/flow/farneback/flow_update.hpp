@@ -41,7 +41,7 @@ class FlowUpdate {
   /// of faint textures.
   static constexpr double regularization = 1e-4;
 
-  /// Columns of flow needed on each side of those that are filled: `reach`, aligned. Columns before
+  /// Columns of flow needed on each side of the filled columns: `reach`, aligned. Columns before
   /// them, up to a multiple of 16, are read too, but have no effect.
   static constexpr int margin = 8;
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "src/flow/lucas_kanade/pyramid.hpp"
-#include "src/flow/lucas_kanade/scharr_gradients.hpp"
 #include "src/flow/lucas_kanade/search.hpp"
 
 namespace eventcamera {

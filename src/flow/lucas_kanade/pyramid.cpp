@@ -63,6 +63,36 @@ void halve_row(const Image<std::uint8_t>& image, int y, std::uint8_t* out, int w
 
 // NOLINTEND(clang-analyzer-core.uninitialized.Assign)
 
+using Values = hn::CappedTag<std::int16_t, 16>;
+
+/// Computes columns left ... right - 1 of a row of both gradients, and up to a vector more.
+void gradient_row(const Image<std::uint8_t>& image, int y, int left, int right, std::int16_t* out_x,
+                  std::int16_t* out_y) {
+  const Values values;
+  const int lanes = static_cast<int>(hn::Lanes(values));
+  const auto ten = hn::Set(values, 10);
+  const auto three = hn::Set(values, 3);
+  const auto width = hn::Set(values, static_cast<std::int16_t>(image.width()));
+  for (int x = left; x < right; x += lanes) {
+    const auto load = [&](int row, int column) {
+      return hn::PromoteTo(values, hn::LoadU(Bytes(), image.row(row) + column));
+    };
+    const auto weigh = [&](auto outer, auto middle) {
+      return hn::Add(hn::Mul(outer, three), hn::Mul(middle, ten));
+    };
+    const auto difference = [&](int row) { return hn::Sub(load(row, x + 1), load(row, x - 1)); };
+    const auto smooth = [&](int row) {
+      return weigh(hn::Add(load(row, x - 1), load(row, x + 1)), load(row, x));
+    };
+    const auto column = iota(values, static_cast<std::int16_t>(x));
+    const auto within = hn::And(hn::Lt(hn::Set(values, -1), column), hn::Lt(column, width));
+    const auto dx = weigh(hn::Add(difference(y - 1), difference(y + 1)), difference(y));
+    const auto dy = hn::Sub(smooth(y + 1), smooth(y - 1));
+    hn::StoreU(hn::IfThenElseZero(within, dx), values, out_x + x - left);
+    hn::StoreU(hn::IfThenElseZero(within, dy), values, out_y + x - left);
+  }
+}
+
 }  // namespace
 }  // namespace eventcamera::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -71,6 +101,7 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 
 HWY_EXPORT(halve_row);
+HWY_EXPORT(gradient_row);
 
 namespace {
 
@@ -124,8 +155,7 @@ void Pyramid::shape(int width, int height) {
   }
 }
 
-/// Computes the rows of a level: make_row(y) writes one, unless it is black, and returns whether it
-/// is.
+/// Computes the rows of a level: make_row(y) writes one, or returns true if it is black.
 template <class MakeRow>
 void Pyramid::build_level(std::size_t level, ThreadPool& threads, const MakeRow& make_row) {
   auto& image = levels_[level];
@@ -160,6 +190,21 @@ void Pyramid::build(const ImageView<std::uint8_t>& image, ThreadPool& threads,
         HWY_DYNAMIC_DISPATCH(halve_row)(from, y, levels_[level].row(y), levels_[level].width());
       return black;
     });
+  }
+}
+
+void ScharrGradients::compute(const Image<std::uint8_t>& image, const Box& box) {
+  box_ = box;
+  const int right = std::min(box.right, image.width() + margin);
+  for (int y = box.top; y < box.bottom; ++y) {
+    auto* out_x = x_.row(y - box.top);
+    auto* out_y = y_.row(y - box.top);
+    if (y >= 0 && y < image.height()) {
+      HWY_DYNAMIC_DISPATCH(gradient_row)(image, y, box.left, right, out_x, out_y);
+    } else {
+      std::fill_n(out_x, box.width(), std::int16_t{0});
+      std::fill_n(out_y, box.width(), std::int16_t{0});
+    }
   }
 }
 

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "src/flow/dense_flow.hpp"
-#include "src/flow/lucas_kanade/scharr_gradients.hpp"
+#include "src/flow/lucas_kanade/pyramid.hpp"
 
 namespace eventcamera {
 

@@ -9,7 +9,6 @@
 
 #include "src/core/byte_order.hpp"
 #include "src/formats/aedat/aedat4_flatbuffer.hpp"
-#include "src/formats/aedat/aedat4_info_node.hpp"
 #include "src/formats/chunker.hpp"
 
 namespace eventcamera {

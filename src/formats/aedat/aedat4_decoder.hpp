@@ -10,7 +10,6 @@
 
 #include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_elements.hpp"
-#include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/byte_queue.hpp"
 #include "src/formats/decoder.hpp"
 

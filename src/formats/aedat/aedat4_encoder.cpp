@@ -9,7 +9,6 @@
 
 #include "src/core/sensor_size.hpp"
 #include "src/formats/aedat/aedat4.fbs.h"
-#include "src/formats/aedat/aedat4_info_node.hpp"
 
 namespace eventcamera {
 
@@ -22,25 +21,17 @@ constexpr std::size_t max_events = 4096;
 /// FlatBufferBuilder is a class or an alias, depending on the version of FlatBuffers.
 class Aedat4Builder : public flatbuffers::FlatBufferBuilder {};
 
-Aedat4Compressor::Aedat4Compressor(Aedat4Compression compression) {
-  if (compression == Aedat4Compression::none) return;
+FrameCompressor make_aedat4_compressor(Aedat4Compression compression) {
+  if (compression == Aedat4Compression::none) return FrameCompressor(std::nullopt);
   const bool is_high =
       compression == Aedat4Compression::lz4_high || compression == Aedat4Compression::zstd_high;
-  compressor_.emplace(codec_of(compression),
-                      is_high ? FrameCompressor::Level::high : FrameCompressor::Level::standard);
-}
-
-void Aedat4Compressor::compress(std::span<const std::uint8_t> content,
-                                std::vector<std::uint8_t>& out) {
-  if (compressor_)
-    compressor_->compress(content, out);
-  else
-    out.insert(out.end(), content.begin(), content.end());
+  return FrameCompressor(codec_of(compression),
+                         is_high ? FrameCompressor::Level::high : FrameCompressor::Level::standard);
 }
 
 Aedat4Encoder::Aedat4Encoder(Aedat4Settings settings)
     : settings_(std::move(settings)),
-      compressor_(settings_.compression),
+      compressor_(make_aedat4_compressor(settings_.compression)),
       builder_(std::make_unique<Aedat4Builder>()) {
   if (!is_side(settings_.size.width) || !is_side(settings_.size.height))
     throw std::invalid_argument("AEDAT4 supports sensors of 1x1 to 16384x16384 pixels");

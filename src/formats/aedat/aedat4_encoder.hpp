@@ -9,24 +9,14 @@
 #include <vector>
 
 #include "src/formats/aedat/aedat4.hpp"
-#include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/encoder.hpp"
 
 namespace eventcamera {
 
 class Aedat4Builder;
 
-/// Compresses packets.
-class Aedat4Compressor {
- public:
-  explicit Aedat4Compressor(Aedat4Compression compression);
-
-  /// Appends the compressed `content` to `out`.
-  void compress(std::span<const std::uint8_t> content, std::vector<std::uint8_t>& out);
-
- private:
-  std::optional<FrameCompressor> compressor_;  ///< none: packets are stored as they are
-};
+/// Creates a compressor of packets.
+FrameCompressor make_aedat4_compressor(Aedat4Compression compression);
 
 /// Settings of an AEDAT4 file.
 struct Aedat4Settings {
@@ -79,7 +69,7 @@ class Aedat4Encoder final : public Encoder {
                     std::vector<std::uint8_t>& out);
 
   Aedat4Settings settings_;
-  Aedat4Compressor compressor_;
+  FrameCompressor compressor_;
   std::unique_ptr<Aedat4Builder> builder_;
   std::vector<AbsoluteEvent> held_;
   std::uint64_t position_ = 0;        ///< of the next bytes in the file

@@ -109,7 +109,8 @@ bool FrameDecompressor::grow(std::size_t payload, std::size_t limit) {
   return true;
 }
 
-FrameCompressor::FrameCompressor(FrameCodec codec, Level level) : codec_(codec), level_(level) {
+FrameCompressor::FrameCompressor(std::optional<FrameCodec> codec, Level level)
+    : codec_(codec), level_(level) {
   if (codec != FrameCodec::zstd) return;
   zstd_.reset(ZSTD_createCCtx());
   if (!zstd_) throw std::bad_alloc();
@@ -119,6 +120,10 @@ FrameCompressor::FrameCompressor(FrameCodec codec, Level level) : codec_(codec),
 
 void FrameCompressor::compress(std::span<const std::uint8_t> content,
                                std::vector<std::uint8_t>& out) {
+  if (!codec_) {
+    out.insert(out.end(), content.begin(), content.end());
+    return;
+  }
   const auto at = out.size();
   std::size_t size = 0;
   if (codec_ == FrameCodec::lz4) {

@@ -77,19 +77,19 @@ class FrameDecompressor {
   ExpansionLimit expansion_;
 };
 
-/// Compresses frames.
+/// Compresses frames; without a codec, leaves them as they are.
 class FrameCompressor {
  public:
   /// Compression levels.
   enum class Level : std::uint8_t { standard, high };
 
-  explicit FrameCompressor(FrameCodec codec, Level level = Level::standard);
+  explicit FrameCompressor(std::optional<FrameCodec> codec, Level level = Level::standard);
 
   /// Appends the compressed `content` to `out`.
   void compress(std::span<const std::uint8_t> content, std::vector<std::uint8_t>& out);
 
  private:
-  FrameCodec codec_;
+  std::optional<FrameCodec> codec_;
   Level level_;
   std::unique_ptr<ZSTD_CCtx_s, CompressionDeleter> zstd_;
 };

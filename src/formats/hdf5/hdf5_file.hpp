@@ -34,7 +34,7 @@ class Hdf5Output {
   /// failure.
   Hdf5Handle create();
 
-  /// Commits what the library has flushed, in the background: syncs the new bytes, then writes the
+  /// Commits flushed data in the background: syncs the new bytes, then writes the
   /// held ones. Waits for an earlier commit.
   void start_commit();
   bool is_committing() const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Decoders of the HDF5 filters of chunks, because those of the library trust sizes in the chunk.
+// Decoders of the HDF5 filters of chunks, because the library's trust sizes in the chunk.
 #pragma once
 
 #include <cstddef>

@@ -3,10 +3,7 @@
 
 #include <hdf5.h>
 
-#include <array>
-#include <cstdint>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <utility>
 
@@ -65,16 +62,15 @@ class Hdf5Session {
   void* print_data_ = nullptr;
 };
 
-/// Reads a string attribute of a group or dataset.
-std::optional<std::string> read_text_attribute(hid_t object, const char* name);
-
-/// Reads an integer attribute of a group or dataset.
-std::optional<std::int64_t> read_number_attribute(hid_t object, const char* name);
-
-/// Reads an attribute of two integers.
-std::optional<std::array<std::int64_t, 2>> read_pair_attribute(hid_t object, const char* name);
-
 /// Writes a string attribute, of variable length as Metavision readers expect. False on failure.
-bool write_text_attribute(hid_t object, const char* name, const std::string& text);
+inline bool write_text_attribute(hid_t object, const char* name, const std::string& text) {
+  const Hdf5Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  if (H5Tset_size(type.get(), H5T_VARIABLE) < 0) return false;
+  const Hdf5Handle attribute(
+      H5Acreate2(object, name, type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  const char* const begin = text.c_str();
+  return attribute && H5Awrite(attribute.get(), type.get(), static_cast<const void*>(&begin)) >= 0;
+}
 
 }  // namespace eventcamera

@@ -15,16 +15,17 @@
 
 namespace eventcamera {
 
+/// Closes the file while no other thread uses the library.
 struct Hdf5Reader::File {
-  File() = default;
-  File(File&&) = default;
-  File& operator=(File&&) = delete;
+  explicit File(Hdf5Handle opened) : handle(std::move(opened)) {}
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+
   ~File() {
     const Hdf5Session session;
     handle = {};
   }
 
-  std::unique_ptr<ByteSource> bytes;  ///< null if not owned by the reader
   Hdf5Handle handle;
 };
 
@@ -113,7 +114,7 @@ class Hdf5Decoder final : public Decoder {
   std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
   std::vector<AbsoluteEvent> events_;
   std::vector<Trigger> triggers_;
-  bool events_due_ = false;  ///< events_ are to be returned
+  bool events_due_ = false;  ///< next() returns events_
   Microseconds triggers_until_ = std::numeric_limits<Microseconds>::min();  ///< time of the last
   bool opened_ = false;  ///< opened, not collected
 };
@@ -188,26 +189,12 @@ class Hdf5Triggers {
 };
 
 Hdf5Reader::Hdf5Reader(std::unique_ptr<ByteSource> bytes, const Hdf5Selection& selection)
-    : Hdf5Reader(
-          [&] {
-            File file;
-            file.handle = open_source(*bytes);
-            file.bytes = std::move(bytes);
-            return file;
-          }(),
-          selection) {}
+    : Hdf5Reader(*bytes, selection) {
+  bytes_ = std::move(bytes);
+}
 
 Hdf5Reader::Hdf5Reader(ByteSource& bytes, const Hdf5Selection& selection)
-    : Hdf5Reader(
-          [&] {
-            File file;
-            file.handle = open_source(bytes);
-            return file;
-          }(),
-          selection) {}
-
-Hdf5Reader::Hdf5Reader(File file, const Hdf5Selection& selection)
-    : file_(std::make_unique<File>(std::move(file))) {
+    : file_(std::make_unique<File>(open_source(bytes))) {
   const Hdf5Session session;
   const auto id = file_->handle.get();
   table_ = Hdf5Table::open(id, selection);

@@ -60,10 +60,10 @@ class Hdf5Reader {
 
  private:
   struct File;
-  Hdf5Reader(File file, const Hdf5Selection& selection);
 
   void fill();
 
+  std::unique_ptr<ByteSource> bytes_;  ///< null if not owned by the reader
   std::unique_ptr<File> file_;
   SensorSize size_;
   bool has_labels_ = false;

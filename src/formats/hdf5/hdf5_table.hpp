@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,15 +10,10 @@
 #include "src/core/sensor_size.hpp"
 #include "src/formats/corruption.hpp"
 #include "src/formats/event_table.hpp"
-#include "src/formats/hdf5/hdf5_dataset.hpp"
 #include "src/formats/hdf5/hdf5_format.hpp"
-#include "src/formats/table_sample.hpp"
-#include "src/formats/unwrapped_clock.hpp"
+#include "src/formats/hdf5/hdf5_handle.hpp"
 
 namespace eventcamera {
-
-/// Sensor size in the attributes of a group or file; 0x0 if there is none.
-SensorSize size_of_attributes(hid_t object);
 
 /// Events of an HDF5 file of any layout, as rows.
 class Hdf5Table {
@@ -57,28 +51,5 @@ class Hdf5Table {
   std::uint64_t rows_ = 0, claimed_rows_ = 0;
   std::string others_;  ///< paths of other events in the file
 };
-
-/// Column numbers of t, x, y and p.
-using ColumnOrder = std::array<std::size_t, event_columns>;
-
-/// Creates the table of a dataset with the numbers of each event in a row: v2e, MVSEC, Metavision
-/// without compression, and others. Detects the order and the unit unless they are known. Throws
-/// UnsupportedFormat.
-std::unique_ptr<Hdf5Table> make_row_table(Hdf5Format format, Hdf5Dataset events,
-                                          const std::string& path, SensorSize size,
-                                          std::optional<ColumnOrder> order,
-                                          std::optional<TimeUnit> unit);
-
-/// Datasets of a group that hold the columns t, x, y and p.
-struct ColumnDatasets {
-  std::string group;                 ///< empty or with a final slash
-  std::array<std::string, 4> names;  ///< by EventColumn
-  std::optional<TimeUnit> unit;      ///< in the name of the times
-  std::optional<TimeUnit> set_unit;  ///< by the user
-};
-
-/// Creates the table of columns: the DSEC layout, and others without its index. Throws
-/// UnsupportedFormat.
-std::unique_ptr<Hdf5Table> make_dsec_table(hid_t file, const ColumnDatasets& datasets);
 
 }  // namespace eventcamera

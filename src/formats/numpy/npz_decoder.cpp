@@ -15,23 +15,8 @@ namespace eventcamera {
 
 namespace {
 
+/// Bytes of elements read at once, at least one element.
 constexpr std::size_t block_size = std::size_t{1} << 16;
-constexpr std::size_t rows_at_once = std::size_t{1} << 12;
-
-/// Source of elements for an NpyDecoder.
-class Elements {
- public:
-  virtual ~Elements() = default;
-  Elements(const Elements&) = delete;
-  Elements& operator=(const Elements&) = delete;
-
-  /// Returns the next bytes, valid until the next call; empty at the end. Nothing if the archive is
-  /// corrupt.
-  virtual std::optional<std::span<const std::uint8_t>> next() = 0;
-
- protected:
-  Elements() = default;
-};
 
 /// Array of the archive, with its file positioned after the header.
 struct ArrayFile {
@@ -55,36 +40,17 @@ ArrayFile open_array(ZipArchive& archive, std::size_t index) {
   }
 }
 
-/// Single array of events.
-class WholeArray final : public Elements {
- public:
-  explicit WholeArray(ArrayFile array) : array_(std::move(array)) {}
-
-  std::optional<std::span<const std::uint8_t>> next() override {
-    block_ = std::exchange(array_.rest, {});
-    if (!block_.empty()) return block_;
-    block_.resize(block_size);
-    const auto count = array_.entry.read(block_);
-    if (!count) return std::nullopt;
-    return std::span(block_).first(*count);
-  }
-
- private:
-  ArrayFile array_;
-  std::vector<std::uint8_t> block_;
-};
-
 /// Joins arrays to elements of t, x, y and p, or of these and labels.
-class JoinedColumns final : public Elements {
+class JoinedColumns {
  public:
-  /// Adds an array with these columns.
+  /// Adds an array with these columns, or a whole array of events without any.
   void add(ArrayFile array, std::span<const EventColumn> columns) {
     for (std::size_t i = 0; i < columns.size(); ++i) {
       auto& field = header_.fields[static_cast<std::size_t>(columns[i])] = array.header.columns[i];
       field.offset += header_.element_bytes;
     }
     header_.element_bytes += array.header.element_bytes;
-    // More than there are if an array is shorter, which NpyDecoder reports.
+    // Too many if another array is shorter, which NpyDecoder reports.
     header_.count = std::max(header_.count, array.header.count);
     arrays_.push_back(std::move(array));
   }
@@ -95,8 +61,11 @@ class JoinedColumns final : public Elements {
     return header;
   }
 
-  std::optional<std::span<const std::uint8_t>> next() override {
-    std::size_t rows = rows_at_once;
+  /// Returns the next bytes, valid until the next call; empty at the end. Nothing if the archive is
+  /// corrupt.
+  std::optional<std::span<const std::uint8_t>> next() {
+    const auto rows_at_once = std::max<std::size_t>(1, block_size / header_.element_bytes);
+    auto rows = rows_at_once;
     for (auto& [entry, header, rest] : arrays_) {
       const auto had = rest.size();
       const auto wanted = rows_at_once * header.element_bytes;
@@ -108,6 +77,7 @@ class JoinedColumns final : public Elements {
       }
       rows = std::min(rows, rest.size() / header.element_bytes);
     }
+    if (arrays_.size() == 1) return joined_ = std::exchange(arrays_.front().rest, {});
     joined_.resize(rows * header_.element_bytes);
     std::size_t offset = 0;
     for (auto& [entry, header, rest] : arrays_) {
@@ -152,62 +122,88 @@ int extent_in(ZipArchive& archive, std::size_t index) {
   }
 }
 
-/// An open archive.
-class Archive {
+/// The events of an archive.
+class NpzDecoder final : public Decoder {
  public:
-  /// Throws UnsupportedFormat.
-  Archive(ByteSource& source, TableSettings settings) : archive_(source) {
-    if (settings.size == SensorSize{}) settings.size = stated_size();
-    if (!open_columns(settings)) open_first_array(settings);
+  explicit NpzDecoder(const TableSettings& settings) : settings_(settings) {}
+
+  void push(std::span<const std::uint8_t> piece) override { collected_.push(piece); }
+
+  void drain() override {
+    bytes_ = collected_.finish();
+    open(*bytes_);
   }
 
-  /// Reads the next events. False at the end.
-  bool read(Decoded& out) {
-    if (ended_) return false;
-    const auto bytes = elements_->next();
+  /// Throws UnsupportedFormat.
+  bool open(ByteSource& source) override {
+    archive_.emplace(source);
+    if (settings_.size == SensorSize{}) settings_.size = stated_size();
+    if (!open_columns()) open_first_array();
+    streams_.front().size = decoder_->size();
+    return true;
+  }
+
+  std::optional<Item> next() override {
+    while (decoder_ && !ended_) {
+      decoded_.events.clear();
+      read();
+      streams_.front().labelled = decoder_->streams().front().labelled;
+      if (!decoded_.events.empty()) return EventItem{0, decoded_.events};
+    }
+    return std::nullopt;
+  }
+
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const Corruption& corruption() const override { return corruption_; }
+  bool is_table() const override { return true; }
+
+  /// Arrays can only be decompressed from their start.
+  std::optional<SeekPoint> seek_point_before(Microseconds /*t*/) const override {
+    return std::nullopt;
+  }
+  void restart(const SeekPoint& /*seek_point*/) override {}
+
+ private:
+  /// Reads the next events.
+  void read() {
+    const auto bytes = joined_.next();
     ended_ = !bytes || bytes->empty();
     try {
       if (ended_)
-        decoder_->finish(out);
+        decoder_->finish(decoded_);
       else
-        decoder_->decode(*bytes, out);
+        decoder_->decode(*bytes, decoded_);
     } catch (const UnsupportedFormat& error) {
       throw UnsupportedFormat(error_prefix_ + error.what());
     }
     corruption_ = decoder_->corruption();
     if (size_unreadable_) corruption_.note(0, "the arrays width and height are not a sensor size");
     if (!bytes) corruption_.note(0, "the ZIP archive cannot be unpacked further");
-    return true;
   }
 
-  SensorSize size() const { return decoder_->size(); }
-  bool has_labels() const { return decoder_->streams().front().labelled; }
-  const Corruption& corruption() const { return corruption_; }
-
- private:
   /// Size in the arrays width and height; 0x0 if it is missing or not one of a sensor.
   SensorSize stated_size() {
     const auto width = index_of("width");
     const auto height = index_of("height");
     if (!width || !height) return {};
-    const SensorSize size{extent_in(archive_, *width), extent_in(archive_, *height)};
+    const SensorSize size{extent_in(*archive_, *width), extent_in(*archive_, *height)};
     size_unreadable_ = size.width == 0 || size.height == 0;
     return size_unreadable_ ? SensorSize{} : size;
   }
 
   std::optional<std::size_t> index_of(std::string_view array) const {
-    const auto& names = archive_.names();
+    const auto& names = archive_->names();
     const auto found = std::ranges::find(names, array, array_name);
     if (found == names.end()) return std::nullopt;
     return static_cast<std::size_t>(found - names.begin());
   }
 
   /// Opens arrays t, x, y and p, or t, xy (of two columns) and p. False unless all of them exist.
-  bool open_columns(const TableSettings& settings) {
+  bool open_columns() {
     std::array<std::optional<std::size_t>, all_columns> indices;
     std::optional<TimeUnit> unit;
-    for (std::size_t i = 0; i < archive_.names().size(); ++i) {
-      const auto name = column_named(array_name(archive_.names()[i]));
+    for (std::size_t i = 0; i < archive_->names().size(); ++i) {
+      const auto name = column_named(array_name(archive_->names()[i]));
       if (!name) continue;
       auto& index = indices[static_cast<std::size_t>(name->column)];
       if (index) continue;
@@ -222,7 +218,7 @@ class Archive {
     for (const auto column : {EventColumn::t, EventColumn::x, EventColumn::y, EventColumn::p})
       parts.push_back({indices[static_cast<std::size_t>(column)], {column}});
     if (!parts[1].index && !parts[2].index) {
-      const auto& names = archive_.names();
+      const auto& names = archive_->names();
       const auto xy = std::ranges::find_if(names, [](const std::string& name) {
         const auto array = array_name(name);
         return array == "xy" || array.ends_with("_xy");
@@ -231,117 +227,69 @@ class Archive {
       parts[1] = {static_cast<std::size_t>(xy - names.begin()), {EventColumn::x, EventColumn::y}};
       parts.erase(parts.begin() + 2);
     }
-    auto joined = std::make_unique<JoinedColumns>();
     for (const auto& [index, columns] : parts)
       if (!index) return false;
     for (const auto& [index, columns] : parts) {
-      auto array = open_array(archive_, *index);
+      auto array = open_array(*archive_, *index);
       if (array.header.columns.size() != columns.size() || array.header.by_columns)
-        throw UnsupportedFormat(archive_.names()[*index] +
+        throw UnsupportedFormat(archive_->names()[*index] +
                                 " in the NumPy archive must have one column" +
                                 (columns.size() > 1 ? " for x and one for y" : ""));
-      joined->add(std::move(array), columns);
+      joined_.add(std::move(array), columns);
     }
-    add_labels(std::span(indices).subspan(event_columns), *joined);
-    decoder_ = std::make_unique<NpyDecoder>(joined->header(unit), settings);
-    elements_ = std::move(joined);
+    add_labels(std::span(indices).subspan(event_columns));
+    decoder_ = std::make_unique<NpyDecoder>(joined_.header(unit), settings_);
     return true;
   }
 
   /// Opens the arrays cause and class, if both are there and have a number for each event.
-  void add_labels(std::span<const std::optional<std::size_t>> indices, JoinedColumns& joined) {
+  void add_labels(std::span<const std::optional<std::size_t>> indices) {
     std::vector<ArrayFile> labels;
     for (const auto& index : indices) {
       if (!index) return;
       try {
-        labels.push_back(open_array(archive_, *index));
+        labels.push_back(open_array(*archive_, *index));
       } catch (const UnsupportedFormat&) {
         return;
       }
       const auto& header = labels.back().header;
-      if (header.columns.size() != 1 || header.count < joined.header({}).count) return;
+      if (header.columns.size() != 1 || header.count < joined_.header({}).count) return;
     }
     constexpr EventColumn columns[] = {EventColumn::cause, EventColumn::object_class};
     for (std::size_t i = 0; i < labels.size(); ++i)
-      joined.add(std::move(labels[i]), std::span(columns).subspan(i, 1));
+      joined_.add(std::move(labels[i]), std::span(columns).subspan(i, 1));
   }
 
   /// Opens the first array that may be one of events.
-  void open_first_array(const TableSettings& settings) {
+  void open_first_array() {
     std::string cause;
-    for (std::size_t i = 0; i < archive_.names().size(); ++i) {
-      if (array_name(archive_.names()[i]).empty()) continue;
+    for (std::size_t i = 0; i < archive_->names().size(); ++i) {
+      if (array_name(archive_->names()[i]).empty()) continue;
       try {
-        auto array = open_array(archive_, i);
+        auto array = open_array(*archive_, i);
         if (array.header.columns.size() == 1) continue;
-        decoder_ = std::make_unique<NpyDecoder>(array.header, settings);
-        elements_ = std::make_unique<WholeArray>(std::move(array));
-        error_prefix_ = archive_.names()[i] + ": ";
+        decoder_ = std::make_unique<NpyDecoder>(array.header, settings_);
+        joined_.add(std::move(array), {});
+        error_prefix_ = archive_->names()[i] + ": ";
         return;
       } catch (const UnsupportedFormat& error) {
-        cause = std::string("; of ") + archive_.names()[i] + ": " + error.what();
+        cause = std::string("; of ") + archive_->names()[i] + ": " + error.what();
       }
     }
     throw UnsupportedFormat("the NumPy archive has neither arrays t, x, y and p nor one of events" +
                             cause);
   }
 
-  ZipArchive archive_;
-  std::unique_ptr<Elements> elements_;
+  TableSettings settings_;
+  CollectedBytes collected_{"a NumPy archive"};
+  std::unique_ptr<ByteSource> bytes_;  ///< collected bytes
+  std::optional<ZipArchive> archive_;  ///< set once it can be read
+  JoinedColumns joined_;
   std::unique_ptr<NpyDecoder> decoder_;
   std::string error_prefix_;  ///< name of the array of events
   Corruption corruption_;
   bool size_unreadable_ = false;
   bool ended_ = false;
-};
-
-/// The events of an archive.
-class NpzDecoder final : public Decoder {
- public:
-  explicit NpzDecoder(const TableSettings& settings) : settings_(settings) {}
-
-  void push(std::span<const std::uint8_t> piece) override { collected_.push(piece); }
-
-  void drain() override {
-    bytes_ = collected_.finish();
-    open(*bytes_);
-  }
-
-  bool open(ByteSource& source) override {
-    archive_ = std::make_unique<Archive>(source, settings_);
-    streams_.front().size = archive_->size();
-    return true;
-  }
-
-  std::optional<Item> next() override {
-    do {
-      decoded_.events.clear();
-      if (!archive_ || !archive_->read(decoded_)) return std::nullopt;
-    } while (decoded_.events.empty());
-    streams_.front().labelled = archive_->has_labels();
-    return EventItem{0, decoded_.events};
-  }
-
-  const std::vector<StreamInfo>& streams() const override { return streams_; }
-
-  const Corruption& corruption() const override {
-    static const Corruption none;
-    return archive_ ? archive_->corruption() : none;
-  }
-
-  bool is_table() const override { return true; }
-
-  /// Arrays can only be decompressed from their start.
-  std::optional<SeekPoint> seek_point_before(Microseconds /*t*/) const override {
-    return std::nullopt;
-  }
-  void restart(const SeekPoint& /*seek_point*/) override {}
-
- private:
-  TableSettings settings_;
-  CollectedBytes collected_{"a NumPy archive"};
-  std::unique_ptr<ByteSource> bytes_;  ///< collected bytes
-  std::unique_ptr<Archive> archive_;   ///< set once it can be read
   std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
   Decoded decoded_;
 };

@@ -261,10 +261,8 @@ constexpr const char* first_message_of =
 constexpr const char* last_message = "SELECT id, timestamp FROM messages ORDER BY id DESC LIMIT 1";
 constexpr std::int64_t before_all = std::numeric_limits<std::int64_t>::min();
 
-/// Reads ROS 2 bags that are SQLite databases (github.com/ros2/rosbag2,
-/// rosbag2_storage_sqlite3): the tables topics and messages, whose rows are in the order of their
-/// recording. A pushed file is collected in memory, up to 256 MiB, and read at its end, because
-/// databases need random access. The position of a seek point is the ID of a message.
+/// A pushed file is collected in memory, up to 256 MiB, and read at its end, because databases need
+/// random access. The position of a seek point is the ID of a message.
 class Db3File final : public BagFile {
  public:
   explicit Db3File(AddTopic add_topic) : BagFile(std::move(add_topic)) {}
@@ -288,7 +286,7 @@ class Db3File final : public BagFile {
   std::optional<BagMessage> next() override {
     while (messages_ && messages_->next()) {
       const auto id = messages_->integer(0);
-      if (last_read_ && id <= *last_read_) {  // a few pages could refer to each other for ever
+      if (last_read_ && id <= *last_read_) {  // pages may refer to each other in a cycle
         corruption_.note(0, "a database with a page in two places");
         messages_.reset();
         break;
@@ -356,7 +354,7 @@ class Db3File final : public BagFile {
           "this SQLite database is not a ROS 2 bag: it has no ordinary tables topics and messages");
     auto rows =
         database_->query("SELECT id, name, type, serialization_format FROM topics ORDER BY id");
-    // Counts rows: a few pages could refer to each other for ever.
+    // Counts rows, because pages may refer to each other in a cycle.
     for (std::size_t count = 0; count < max_topics && rows.next(); ++count) {
       BagTopic topic{rows.text(1), ros1_type(rows.text(2)), {}};
       if (rows.text(3) == "cdr") topic.serialization = RosSerialization::cdr;

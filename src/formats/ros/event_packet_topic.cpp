@@ -177,7 +177,7 @@ class MonoPackets {
   std::span<const std::uint8_t> rest_;
 };
 
-/// Events of iniVation's cameras, encodings libcaer and libcaer_cmp. Their times are those of ROS.
+/// Events of iniVation's cameras, encodings libcaer and libcaer_cmp. Their times are ROS times.
 class LibcaerPackets {
  public:
   LibcaerPackets(bool is_compressed, SensorSize size, Corruption& corruption)

@@ -104,19 +104,22 @@ std::uint64_t nanoseconds(Microseconds t) {
   return static_cast<std::uint64_t>(t) * 1000;
 }
 
-/// Size of a packet's encoding in the message, with its zero.
+/// Name of the encoding in a message, with its final zero.
 constexpr std::string_view name_of(BagEvents events) {
   return events == BagEvents::evt3 ? std::string_view("evt3\0", 5) : std::string_view("mono\0", 5);
 }
 
+/// By BagCompression.
+constexpr std::optional<FrameCodec> codecs[] = {std::nullopt, FrameCodec::lz4, FrameCodec::zstd};
+
 class McapEncoder final : public Encoder {
  public:
   McapEncoder(const McapSettings& settings, const std::string& start)
-      : Encoder(start), settings_(settings), position_(start.size()), words_(settings.size.width) {
-    if (settings.compression != BagCompression::none)
-      compressor_.emplace(settings.compression == BagCompression::lz4 ? FrameCodec::lz4
-                                                                      : FrameCodec::zstd);
-  }
+      : Encoder(start),
+        settings_(settings),
+        position_(start.size()),
+        compressor_(codecs[static_cast<std::size_t>(settings.compression)]),
+        words_(settings.size.width) {}
 
   std::uint64_t pending() const override { return events_in_chunk_; }
 
@@ -258,10 +261,7 @@ class McapEncoder final : public Encoder {
       fields.put(compression());
       fields.put(std::uint64_t{0});
       const auto content_at = out.size();
-      if (compressor_)
-        compressor_->compress(chunk_, out);
-      else
-        out.insert(out.end(), chunk_.begin(), chunk_.end());
+      compressor_.compress(chunk_, out);
       chunk.stored_size = out.size() - content_at;
       put_little_endian(chunk.stored_size, out.data() + content_at - sizeof chunk.stored_size);
     });
@@ -365,7 +365,7 @@ class McapEncoder final : public Encoder {
 
   McapSettings settings_;
   std::uint64_t position_;  ///< of the next chunk in the file
-  std::optional<FrameCompressor> compressor_;
+  FrameCompressor compressor_;
 
   std::vector<std::uint8_t> chunk_;  ///< records of the chunk being written
   std::vector<Message> messages_;    ///< messages of the chunk

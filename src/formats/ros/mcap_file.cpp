@@ -60,7 +60,7 @@ bool begins_chunk(std::span<const std::uint8_t> bytes) {
          size == chunk_fields + chunk.compression.size() + chunk.stored_size;
 }
 
-/// True for records that hold nothing of messages and channels.
+/// True for records without messages or channels.
 bool is_skipped(std::uint8_t opcode) {
   constexpr std::uint8_t first_private = 0x80;
   return (opcode >= static_cast<std::uint8_t>(McapOpcode::message_index) &&
@@ -68,7 +68,6 @@ bool is_skipped(std::uint8_t opcode) {
          opcode >= first_private;
 }
 
-/// Reads MCAP files, with and without chunks, summary and index.
 class McapFile final : public ChunkedBagFile {
  public:
   explicit McapFile(AddTopic add_topic)

@@ -94,7 +94,6 @@ bool is_compression(std::string_view name) {
   return name == "none" || name == "bz2" || name == "lz4";
 }
 
-/// Reads ROS 1 bags, version 2.0: wiki.ros.org/Bags/Format/2.0.
 class RosbagFile final : public ChunkedBagFile {
  public:
   explicit RosbagFile(AddTopic add_topic)

@@ -73,7 +73,7 @@ class EventArrayDecoder final : public TopicDecoder {
 struct ImageEncoding {
   std::string_view name;
   PixelFormat format;
-  bool is_rgb = false;  ///< red is to change places with blue
+  bool is_rgb = false;  ///< red and blue must be swapped
 };
 constexpr ImageEncoding encodings[] = {
     {"mono8", PixelFormat::grey8},      {"8UC1", PixelFormat::grey8},

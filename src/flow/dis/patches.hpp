@@ -1,12 +1,29 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <vector>
+
 #include "src/core/image.hpp"
 #include "src/flow/dense_flow.hpp"
-#include "src/flow/dis/patch_grid.hpp"
 #include "src/flow/dis/pyramid.hpp"
+#include "src/flow/dis/split_plane.hpp"
 
 namespace eventcamera {
+
+/// Overlapping square patches of an image, in rows and columns. The last row and column end at or
+/// before the border.
+struct PatchGrid {
+  PatchGrid(int width, int height, int side_, int stride_)
+      : side(side_),
+        stride(stride_),
+        columns(1 + (width - side_) / stride_),
+        rows(1 + (height - side_) / stride_) {}
+
+  int side;  ///< 4 or 8 pixels
+  int stride;
+  int columns;
+  int rows;
+};
 
 /// Inverse search (Kroeger et al., ECCV 2016): finds the patches of a row in the other image by
 /// gradient descent from their flows, and updates these. Compares deviations from the mean, so
@@ -25,5 +42,12 @@ constexpr float better_by = 1;
 void propagate_row(const PatchGrid& grid, const Image<std::uint8_t>& from,
                    const Gradients& gradients, const Image<std::uint8_t>& to, int row,
                    int iterations, const Image<Flow>& found, Flow* flows);
+
+/// Computes rows [first, last) of the dense flow: the mean over the patches that cover a pixel,
+/// weighted by how well they match it. The last patches of a row or column extend to the border.
+/// `sums` is scratch.
+void spread_patches(const PatchGrid& grid, const Image<std::uint8_t>& from,
+                    const Image<std::uint8_t>& to, const Image<Flow>& flows, int first, int last,
+                    std::vector<float>& sums, SplitPlane& x, SplitPlane& y);
 
 }  // namespace eventcamera

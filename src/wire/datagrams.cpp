@@ -1,29 +1,25 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#pragma once
+#include "src/wire/datagrams.hpp"
 
+#include <algorithm>
 #include <array>
-#include <cstddef>
-#include <cstdint>
-#include <limits>
-#include <optional>
-#include <span>
 #include <stdexcept>
-#include <vector>
 
 #include "src/core/address_layout.hpp"
 #include "src/core/byte_order.hpp"
-#include "src/core/event.hpp"
-#include "src/wire/datagram_settings.hpp"
 
-/// Layouts of the datagrams of each format. A layout has
-///
-/// - min_event_size and max_size, in bytes: the minimum size of an event, and the maximum size of
-///   a sent datagram; received ones may have any size;
-/// - begin(first, out): writes the header, if any;
-/// - size_of(event): bytes that write() would write;
-/// - write(event, out): writes an event;
-/// - read(bytes, in): reads a received datagram, and returns why it is invalid, or null.
-namespace eventcamera::datagram_layouts {
+namespace eventcamera {
+
+namespace {
+
+// Layouts of the datagrams of each format. A layout has
+//
+// - min_event_size and max_size, in bytes: the minimum size of an event, and the maximum size of
+//   a sent datagram; received ones may have any size;
+// - begin(first, out): writes the header, if any;
+// - size_of(event): bytes that write() would write;
+// - write(event, out): writes an event;
+// - read(bytes, in): reads a received datagram, and returns why it is invalid, or null.
 
 /// Unwraps 32-bit times in microseconds: each is assumed to be less than half the range (36
 /// minutes) from the expected time.
@@ -48,7 +44,7 @@ class WrappedTime {
 };
 
 /// Largest time that fits into 64-bit nanoseconds.
-inline constexpr Microseconds max_time = std::numeric_limits<Nanoseconds>::max() / 1000;
+constexpr Microseconds max_time = std::numeric_limits<Nanoseconds>::max() / 1000;
 
 /// A datagram being written.
 class Writer {
@@ -69,12 +65,12 @@ class Writer {
 };
 
 using Fault = const char*;
-inline constexpr Fault partial_event = "it ends in a partial event";
-inline constexpr Fault outside = "an event lies outside the sensor";
-inline constexpr Fault no_header = "it is shorter than its header";
-inline constexpr Fault no_time = "an event has no time";
-inline constexpr Fault time_range = "a time is out of range";
-inline constexpr Fault not_boolean = "a polarity is neither 0 nor 1";
+constexpr Fault partial_event = "it ends in a partial event";
+constexpr Fault outside = "an event lies outside the sensor";
+constexpr Fault no_header = "it is shorter than its header";
+constexpr Fault no_time = "an event has no time";
+constexpr Fault time_range = "a time is out of range";
+constexpr Fault not_boolean = "a polarity is neither 0 nor 1";
 
 /// Contents of a received datagram.
 struct Reading {
@@ -93,7 +89,7 @@ struct Reading {
   }
 };
 
-inline bool is_on(const AbsoluteEvent& event) {
+bool is_on(const AbsoluteEvent& event) {
   return event.polarity() == Polarity::on;
 }
 
@@ -337,4 +333,175 @@ auto with_layout(const DatagramSettings& settings, const Use& use) {
   throw std::invalid_argument("unknown datagram format");
 }
 
-}  // namespace eventcamera::datagram_layouts
+template <class Layout>
+class PackerOf final : public DatagramPacker {
+ public:
+  explicit PackerOf(const Layout& layout) : layout_(layout) {}
+
+  void pack(std::span<const AbsoluteEvent> events, const Send& send) override {
+    for (const auto& event : events) {
+      if (count_ > 0 && !is_next(event)) flush(send);
+      if (count_ == 0) {
+        first_ = event.t;
+        layout_.begin(event.t, bytes_);
+      }
+      layout_.write(event, bytes_);
+      last_ = event.t;
+      ++count_;
+      if (bytes_.size() + Layout::min_event_size > Layout::max_size) flush(send);
+    }
+  }
+
+  void flush(const Send& send) override {
+    if (count_ == 0) return;
+    send({bytes_.bytes(), count_, first_, last_});
+    drop();
+  }
+
+  void drop() noexcept override {
+    bytes_.clear();
+    count_ = 0;
+  }
+
+  std::optional<Microseconds> waiting_since() const override {
+    if (count_ == 0) return std::nullopt;
+    return first_;
+  }
+
+ private:
+  /// True if the event may join the incomplete datagram.
+  bool is_next(const AbsoluteEvent& event) const {
+    return event.t >= last_ && event.t - first_ <= max_span_ &&
+           bytes_.size() + layout_.size_of(event) <= Layout::max_size;
+  }
+
+  Layout layout_;
+  Writer bytes_;
+  std::size_t count_ = 0;
+  Microseconds first_ = 0;
+  Microseconds last_ = 0;
+};
+
+/// Tracks 31-bit sequence numbers, like RFC 3550: a jump is accepted only once the next number
+/// confirms it, so a stray datagram neither disturbs the stream nor counts as loss.
+class SequenceTracker {
+ public:
+  enum class Verdict : std::uint8_t { next, late, stray, restarted };
+  struct Result {
+    Verdict verdict = Verdict::next;
+    std::uint32_t lost = 0;  ///< numbers missing before this one
+  };
+
+  Result update(std::uint32_t number) {
+    number &= mask;
+    const auto ahead = (number - next_.value_or(number)) & mask;
+    if (ahead <= max_lost) return accept(number, Verdict::next, ahead);
+    if (number == after_stray_) return accept(number, Verdict::restarted, 0);
+    if (mask - ahead < max_late) return {Verdict::late};
+    after_stray_ = (number + 1) & mask;
+    return {Verdict::stray};
+  }
+
+ private:
+  static constexpr std::uint32_t mask = 0x7fff'ffff;
+  static constexpr std::uint32_t max_lost = 1 << 16;
+  static constexpr std::uint32_t max_late = 100;
+
+  Result accept(std::uint32_t number, Verdict verdict, std::uint32_t lost) {
+    next_ = (number + 1) & mask;
+    after_stray_.reset();
+    return {verdict, lost};
+  }
+
+  std::optional<std::uint32_t> next_;
+  std::optional<std::uint32_t> after_stray_;  ///< number that confirms a jump
+};
+
+/// Maximum delay by the network; an older datagram means that the sender has restarted.
+constexpr Microseconds max_delay = 1'000'000;
+
+template <class Layout>
+class UnpackerOf final : public DatagramUnpacker {
+ public:
+  UnpackerOf(const Layout& layout, int width, int height)
+      : layout_(layout), width_(width), height_(height) {}
+
+  Reception unpack(std::span<const std::uint8_t> bytes, std::optional<Microseconds> arrival,
+                   std::vector<AbsoluteEvent>& events) override {
+    const auto reception = receive(bytes, arrival, events);
+    if (reception.fault != nullptr || reception.late) events.clear();
+    return reception;
+  }
+
+ private:
+  Reception receive(std::span<const std::uint8_t> bytes, std::optional<Microseconds> arrival,
+                    std::vector<AbsoluteEvent>& events) {
+    Reading reading{events, width_, height_, arrival, clock_};
+    if (arrival && arrival_) reading.clock.pass(*arrival - *arrival_);
+    if (const auto* fault = read(bytes, reading)) return {.fault = fault};
+
+    Reception reception;
+    if (reading.sequence_number) {
+      const auto [verdict, lost] = sequence_.update(*reading.sequence_number);
+      if (verdict == SequenceTracker::Verdict::stray)
+        return {.fault = "its sequence number does not continue the stream"};
+      if (verdict == SequenceTracker::Verdict::late) return {.late = true};
+      reception.restarted = verdict == SequenceTracker::Verdict::restarted;
+      reception.lost = lost;
+    }
+    if (events.empty()) return reception;
+    reception.restarted |= events.front().t < latest_ - max_delay;
+    if (reception.restarted) {
+      reading.clock = {};
+      if (const auto* fault = read(bytes, reading)) return {.fault = fault};
+    }
+    const auto earliest = reception.restarted ? 0 : latest_;
+    if (events.front().t < 0) return {.fault = time_range};
+    reception.late = events.front().t < earliest;
+    if (reception.late) return reception;
+    latest_ = events.back().t;
+    clock_ = reading.clock;
+    arrival_ = arrival;
+    return reception;
+  }
+
+  /// Reads the events of a datagram, and sorts them.
+  const char* read(std::span<const std::uint8_t> bytes, Reading& reading) const {
+    reading.events.clear();
+    if (const auto* fault = layout_.read(bytes, reading)) return fault;
+    auto& events = reading.events;
+    const auto by_time = [](const AbsoluteEvent& a, const AbsoluteEvent& b) { return a.t < b.t; };
+    if (!std::ranges::is_sorted(events, by_time)) std::ranges::stable_sort(events, by_time);
+    if (events.empty()) return nullptr;
+    if (events.back().t > max_time) return time_range;
+    if (events.back().t - events.front().t > max_datagram_span)
+      return "its events are more than 71 minutes apart";
+    return nullptr;
+  }
+
+  Layout layout_;
+  int width_;
+  int height_;
+  SequenceTracker sequence_;
+  WrappedTime clock_;
+  std::optional<Microseconds> arrival_;  ///< of the last datagram with events
+  Microseconds latest_ = 0;              ///< time of the last event
+};
+
+}  // namespace
+
+std::unique_ptr<DatagramPacker> make_datagram_packer(const DatagramSettings& settings) {
+  return with_layout(settings,
+                     []<class Layout>(const Layout& layout) -> std::unique_ptr<DatagramPacker> {
+                       return std::make_unique<PackerOf<Layout>>(layout);
+                     });
+}
+
+std::unique_ptr<DatagramUnpacker> make_datagram_unpacker(const DatagramSettings& settings) {
+  return with_layout(
+      settings, [&]<class Layout>(const Layout& layout) -> std::unique_ptr<DatagramUnpacker> {
+        return std::make_unique<UnpackerOf<Layout>>(layout, settings.width, settings.height);
+      });
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Parsers of a piece of bytes; the environment variable FORMAT names one of them.
+#include <hdf5.h>
+
+#include <cstdlib>
+#include <functional>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "gst/simulator/camera_profile.hpp"
+#include "src/filter/camera_calibration.hpp"
+#include "src/filter/hot_pixel_filter.hpp"
+#include "src/filter/pixel_mask.hpp"
+#include "src/filter/undistort_filter.hpp"
+#include "src/formats/aedat/aedat2_decoder.hpp"
+#include "src/formats/aedat/aedat3_decoder.hpp"
+#include "src/formats/atis/atis_bin.hpp"
+#include "src/formats/dat/dat.hpp"
+#include "src/formats/es/es.hpp"
+#include "src/formats/evt/raw.hpp"
+#include "src/formats/file_formats.hpp"
+#include "src/formats/hdf5/ecf.hpp"
+#include "src/formats/hdf5/hdf5_filters.hpp"
+#include "src/formats/hdf5/hdf5_handle.hpp"
+#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/numpy/npy_decoder.hpp"
+#include "src/formats/numpy/npz.hpp"
+#include "src/formats/text/csv_decoder.hpp"
+#include "tests/fuzz/fuzz_decoder.hpp"
+#include "tests/fuzz/small_hdf5.hpp"
+
+namespace {
+
+using namespace fuzz;
+
+using Input = std::span<const std::uint8_t>;
+using Parser = std::function<void(Input)>;
+
+std::string_view text_of(Input bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+template <class Make>
+Parser decoder_of(const Make& make, std::size_t events_per_byte = 1) {
+  return [make, events_per_byte](Input bytes) { check_decoder(make, bytes, events_per_byte); };
+}
+
+template <class Decoder>
+Parser decoder_class() {
+  return decoder_of([] { return std::make_unique<Decoder>(); });
+}
+
+Parser words(EvtFormat format) {
+  return decoder_of([format] { return make_evt_decoder(format, {640, 480}); }, 6);
+}
+
+/// Versions 1.0 and 2.0, as the first line says.
+void aedat2(Input bytes) {
+  constexpr std::size_t version_at = 9;
+  const bool is_first = bytes.size() > version_at && bytes[version_at] == '1';
+  const auto version = is_first ? Aedat2Version::one : Aedat2Version::two;
+  check_decoder([version] { return std::make_unique<Aedat2Decoder>(SensorSize{}, version); }, bytes,
+                1);
+}
+
+/// Whatever a file says, events stay within the sensor.
+void calibration(Input bytes) {
+  constexpr SensorSize sensor{6, 4};
+  try {
+    const UndistortFilter filter(sensor, parse_calibration(text_of(bytes)));
+    std::vector<Event> events;
+    for (int y = 0; y < sensor.height; ++y)
+      for (int x = 0; x < sensor.width; ++x) events.push_back(Event::at(x, y, 0, Polarity::on));
+    for (const auto& event : filter.filter({events, {}}).events)
+      require(
+          event.x < sensor.width && event.y() < sensor.height && event.polarity() == Polarity::on,
+          "events stay within the sensor");
+  } catch (const std::invalid_argument&) {  // no calibration
+  }
+}
+
+void camera_profile(Input bytes) {
+  try {
+    for (const auto& [name, value] :
+         parse_camera_profile(std::string(text_of(bytes)), "eventsim-dvs"))
+      require(!name.empty() && value.size() <= bytes.size(), "entries come from the text");
+  } catch (const std::runtime_error&) {  // no profile
+  }
+}
+
+void ecf(Input bytes) {
+  std::vector<AbsoluteEvent> events;
+  const bool sound = decode_ecf(bytes, events);
+  require(events.size() <= ecf_max_events, "memory is bounded");
+  require(sound || events.empty(), "a corrupt chunk has no events");
+}
+
+/// Reads part of a file, seeks, and reads again. The library reads everything but the events, and
+/// its version 1.10 has bugs there: run with -fork=1 -ignore_crashes=1 -detect_leaks=0, and look at
+/// crashes with this project's code at the top.
+void hdf5(Input bytes) {
+  try {
+    MemoryBytes source({bytes.begin(), bytes.end()});
+    Hdf5Reader reader(source);
+    // A few compressed bytes can be many events.
+    constexpr std::size_t max_events = 100'000;
+    std::vector<AbsoluteEvent> events;
+    std::vector<Trigger> triggers;
+    while (events.size() < max_events && reader.read(10'000, events) > 0) {
+    }
+    require(events.size() <= max_events + 10'000, "no more is read than is asked for");
+    reader.read_triggers(10'000, triggers);
+    if (const auto range = reader.time_range()) reader.seek(range->first / 2 + range->last / 2);
+    reader.read(1, events);
+    require_within(reader.size(), events);
+  } catch (const std::runtime_error&) {
+    // Invalid files must be reported.
+  }
+}
+
+hid_t number_type(unsigned choice) {
+  const hid_t types[] = {H5T_STD_U32LE, H5T_STD_I64BE, H5T_STD_U8LE,
+                         H5T_STD_I16LE, H5T_STD_U64LE, H5T_STD_I8LE};
+  return types[choice % 6];
+}
+
+/// Arbitrary bytes as the chunks of a valid HDF5 file. The first five bytes are the layout, the
+/// filters, the rows of a chunk, the rows of the file, and the number type.
+void hdf5_chunk(Input input) {
+  if (input.size() < 5) return;
+  const std::vector<int> filters = {(input[1] & 2) != 0 ? H5Z_FILTER_SHUFFLE : 0,
+                                    (input[1] & 1) != 0 ? H5Z_FILTER_DEFLATE : 0};
+  const hsize_t chunk = 1U + input[2];
+  const hsize_t rows = 1U + input[3];
+  const auto number = number_type(input[4]);
+  const auto bytes = input.subspan(5);
+  const std::vector chunks = {bytes, bytes.first(bytes.size() / 2), bytes};
+  std::vector<std::uint8_t> image;
+  {
+    const Hdf5Session session;
+    SmallHdf5 file("fuzz");
+    switch (input[0] % 4) {
+      case 0:
+        file.group("events");
+        for (const auto* const name : {"events/t", "events/x", "events/y", "events/p"})
+          file.stored_dataset(name, number, {rows}, chunk, filters, chunks);
+        file.stored_dataset("ms_to_idx", number, {rows}, chunk, filters, chunks);
+        file.stored_dataset("t_offset", number, {1}, chunk, filters, chunks);
+        break;
+      case 1:
+        file.stored_dataset("events", number, {rows, 4}, chunk, filters, chunks);
+        break;
+      default: {
+        file.group("CD");
+        const auto type = metavision_event_type();
+        const bool ecf = input[0] % 4 == 2;
+        file.stored_dataset("CD/events", type.get(), {rows}, chunk,
+                            ecf ? std::vector{ecf_filter} : filters, chunks);
+        write_text_attribute(file.id(), "geometry", "640x480");
+      }
+    }
+    image = file.bytes();
+  }
+  hdf5(image);
+}
+
+/// The first five bytes are three filters, those that are not applied, and the size of a number.
+void hdf5_filters(Input bytes) {
+  constexpr std::size_t before = 5;
+  if (bytes.size() < before) return;
+  constexpr int known[] = {H5Z_FILTER_DEFLATE, H5Z_FILTER_SHUFFLE, H5Z_FILTER_FLETCHER32,
+                           lzf_filter};
+  const int filters[] = {known[bytes[0] % 4], known[bytes[1] % 4], known[bytes[2] % 4]};
+  const std::size_t number_bytes = 1 + bytes[4] % 16;
+  const auto chunk_bytes = 16 * number_bytes;
+  std::vector<std::uint8_t> chunk(bytes.begin() + before, bytes.end());
+  const bool sound = undo_hdf5_filters(filters, bytes[3], number_bytes, chunk_bytes, chunk);
+  require(!sound || chunk.size() == chunk_bytes, "a sound chunk is whole");
+  require(chunk.capacity() <= std::max(bytes.size(), chunk_bytes + 64), "memory is bounded");
+}
+
+void mask(Input bytes) {
+  try {
+    PixelMask::parse_png(text_of(bytes), {8, 4});
+  } catch (const std::runtime_error&) {  // no picture, or of another size
+  }
+}
+
+void npz(Input bytes) {
+  try {
+    MemoryBytes source({bytes.begin(), bytes.end()});
+    const auto reader = make_npz_decoder();
+    reader->open(source);
+    // A few compressed bytes can be many events.
+    constexpr std::size_t max_events = 1'000'000;
+    for (std::size_t count = 0; count < max_events;) {
+      const auto item = reader->next();
+      if (!item) break;
+      const auto events = std::get<EventItem>(*item).events;
+      require(!events.empty() && events.size() <= 65'536, "events come in pieces");
+      count += events.size();
+    }
+    const auto& corruption = reader->corruption();
+    require((corruption.places == 0) == corruption.first.empty(), "corruption says what it is");
+  } catch (const UnsupportedFormat& error) {
+    require(error.what()[0] != 0, "an error says why");
+  }
+}
+
+void pixel_list(Input bytes) {
+  try {
+    const auto pixels = parse_pixel_list(text_of(bytes));
+    require(parse_pixel_list(pixel_list_text(pixels)) == pixels,
+            "a list is read as it was written");
+  } catch (const std::invalid_argument&) {
+  }
+}
+
+Likelihood exact_likelihood(const FileFormat& format, Input bytes) {
+  Likelihood found = Likelihood::none;
+  // In memory of their own, so that sanitizers detect reads past their end.
+  in_pieces(bytes, {}, [&](auto all) { found = likelihood(format, all); });
+  return found;
+}
+
+void recognition(Input bytes) {
+  std::size_t chance = bytes.size();
+  for (const auto byte : bytes) chance = chance * 31 + byte;
+  for (const auto& format : file_formats()) {
+    const auto whole = exact_likelihood(format, bytes);
+    for (const auto count : {chance % (bytes.size() + 1), bytes.size() / 2}) {
+      const auto start = exact_likelihood(format, bytes.first(count));
+      if (start == Likelihood::none || start == whole) continue;
+      require(format.media_type == std::string_view("application/x-event-csv"),
+              "what is recognised stays so as bytes are added");
+    }
+  }
+}
+
+const Parser& parser() {
+  static const std::map<std::string, Parser> parsers = {
+      {"aedat2", aedat2},
+      {"aedat3", decoder_class<Aedat3Decoder>()},
+      {"atis", decoder_of([] {
+         return make_atis_bin_decoder({34, 34});
+       })},
+      {"calibration", calibration},
+      {"camera_profile", camera_profile},
+      {"csv", decoder_class<CsvDecoder>()},
+      {"dat", decoder_of([] { return make_dat_decoder(); })},
+      {"ecf", ecf},
+      {"es", decoder_of([] { return make_event_stream_decoder(); })},
+      {"evt2", words(EvtFormat::evt2)},
+      {"evt21", words(EvtFormat::evt21)},
+      {"evt21_legacy", words(EvtFormat::evt21_legacy)},
+      {"evt3", words(EvtFormat::evt3)},
+      {"evt4", words(EvtFormat::evt4)},
+      {"hdf5", hdf5},
+      {"hdf5_chunk", hdf5_chunk},
+      {"hdf5_filters", hdf5_filters},
+      {"mask", mask},
+      {"npy", decoder_class<NpyDecoder>()},
+      {"npz", npz},
+      {"pixel_list", pixel_list},
+      {"raw", decoder_of([] { return make_prophesee_raw_decoder(); }, 6)},
+      {"recognition", recognition},
+  };
+  static const Parser& chosen = parsers.at(std::getenv("FORMAT"));
+  return chosen;
+}
+
+}  // namespace
+
+/// The library of HDF5 keeps half a megabyte of memory per opened file.
+extern "C" int LLVMFuzzerInitialize(int*, char***) {
+  constexpr int bytes = 16 << 20;
+  H5set_free_list_limits(bytes, bytes, bytes, bytes, bytes, bytes);
+  return 0;
+}
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  parser()({data, size});
+  return 0;
+}
