@@ -339,13 +339,13 @@ class PixelSimulator final : public DvsSimulator {
     const PixelModel& model = pixels_.model();
     const int before = is_second_ ? planes : 0;
     const bool is_prepared = needs_luma() && has_last_;
-    kernel_.run({groups_of(64, format().width), format().height},
-                {&state_, is_prepared ? &scene_ : &grey_[now_].buffer(), &tables_, &events},
-                {format().width, format().height, before, planes - before, model.has_bandwidth(),
-                 model.has_noise(), model.holds_reference(), response_.bits(),
-                 response_.gain() != 1 ? saturated_luma(response_.white()) : response_.white() + 1,
-                 plans_, moves_, max_events, static_cast<int>(whole),
-                 std::bit_cast<int>(static_cast<float>(duration - whole))});
+    kernel_.run(
+        {groups_of(64, format().width), format().height},
+        {&state_, is_prepared ? &scene_ : &grey_[now_].buffer(), &tables_, &events},
+        {format().width, format().height, before, planes - before, model.has_bandwidth(),
+         model.has_noise(), model.holds_reference(), response_.bits(),
+         response_.gain() != 1 ? saturated_luma(response_.white()) : response_.white() + 1, plans_,
+         moves_, max_events, static_cast<int>(whole), static_cast<int>(8 * (duration - whole))});
     sort_.run(sorted, whole);
   }
 

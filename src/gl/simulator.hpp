@@ -19,8 +19,8 @@ namespace eventcamera::gl {
 /// current, except hold_until(), reset(), wait() and drop(). All other functions throw Error and
 /// std::bad_alloc; after that the simulator may only be destroyed.
 ///
-/// Processing of a frame: a LumaKernel turns its texture into a GreyFrame; a method (frame_,
-/// dense_, sparse_ or diff_simulator) compares it with the last one and marks the pixels that fire
+/// Processing of a frame: a LumaKernel turns its texture into a GreyFrame; a method (dense_,
+/// sparse_ or difference_simulators) compares it with the last one and marks the pixels that fire
 /// in each step; an EventList counts, sorts and reads back the marked pixels, or a DrawKernel draws
 /// them. dvs_simulator has its own list, whose events have their own times; EventSort sorts it.
 /// Each kernel is a compute shader (shaders/). Dense flow is computed in farneback, tracks in

@@ -70,8 +70,14 @@ class Comparison {
     texture_.upload(bytes_of(frame));
     const auto start = ours_->last_time().value_or(time);
     ours_->set_flow(flow);
-    add(gl_test::events_until(*ours_, texture_.frame({one, 0, 0, 0}), time, common), start, found_);
-    add(reference_->push(scene::luma(frame), time, common, flow), start, expected_);
+    const auto* made = gl_test::events_until(*ours_, texture_.frame({one, 0, 0, 0}), time, common);
+    const auto* wanted = reference_->push(scene::luma(frame), time, common, flow);
+    if (wanted != nullptr) {
+      const auto size = static_cast<double>(wanted->size());
+      EXPECT_NEAR(static_cast<double>(made->size()), size, 1 + size / 1e3);
+    }
+    add(made, start, found_);
+    add(wanted, start, expected_);
   }
 
   /// Drops an interval before its events are read, and starts over.
@@ -223,6 +229,15 @@ TEST_P(EveryApi, SimulatesThePixelsOfEachPreset) {
       comparison.expect_equal(name + std::string(follows_motion ? ", motion" : ""));
     }
   }
+}
+
+TEST_P(EveryApi, KeepsEventsAtTheEndOfTheirInterval) {
+  Comparison comparison(context, settings_of(DvsPreset::ideal));
+  const auto dark = scene::flat<std::uint8_t>(width, height, 0);
+  const auto noise = scene::noise<std::uint8_t>(width, height, 5, 1);
+  // Pixels reach their first levels again at the end of an interval, a float of which is later.
+  for (int i = 0; i < 5; ++i) comparison.push(i % 2 == 0 ? dark : noise, i * 33'333'334);
+  comparison.expect_equal("events at the end");
 }
 
 /// Settings with every stage on, and many noise events.

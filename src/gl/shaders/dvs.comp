@@ -41,8 +41,8 @@ layout(location = 8) uniform int saturated;  // luma from which a pixel keeps a 
 layout(location = 9) uniform int plans;      // first word of the plan of each tile
 layout(location = 10) uniform int moves;     // scene: this frame, the last one, flow
 layout(location = 11) uniform int max_events;
-layout(location = 12) uniform int end_time;  // of the interval: whole microseconds, bits of the rest
-layout(location = 13) uniform int end_rest;
+layout(location = 12) uniform int end_time;  // of the interval, whole microseconds
+layout(location = 13) uniform int end_rest;  // eighths of a microsecond
 
 // Planes of the state.
 const int target_plane = 0;
@@ -299,7 +299,7 @@ void fire(float crossed, int polarity) {
   next_time = whole + 1u;
   uint place = uint(pixel % width) | uint(pixel / width) << 16 | (polarity > 0 ? 1u << 31 : 0u);
   float rest = fract(time);
-  if (whole > uint(end_time) || (whole == uint(end_time) && rest > intBitsToFloat(end_rest))) {
+  if (whole > uint(end_time) || (whole == uint(end_time) && int(rest * 8.0) > end_rest)) {
     uint seventh = uint(rest * 7.0) + 1u;  // in bits beside the coordinates
     place |= (seventh & 3u) << 14 | (seventh & 4u) << 28;
   }

@@ -30,11 +30,6 @@ uint value_of(uvec2 event) {
   return (is_time != 0 ? time : place) >> shift & 255u;
 }
 
-void count_values(uint first, uint end) {
-  for (uint i = first + gl_LocalInvocationID.x; i < end; i += 128u)
-    atomicAdd(places[value_of(events[i])], 1u);
-}
-
 // Sets the places of the group's events: after those of smaller values and of earlier groups.
 void find_places(uint groups) {
   uint lane = gl_LocalInvocationID.x;
@@ -105,7 +100,7 @@ void main() {
     barrier();
     move_events(first, end);
   } else {
-    count_values(first, end);
+    for (uint i = first + lane; i < end; i += 128u) atomicAdd(places[value_of(events[i])], 1u);
     barrier();
     counts[group * 128u + lane] = uvec2(places[2u * lane], places[2u * lane + 1u]);
   }
