@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 from gi.repository import GLib, Gst
 
-from plugins import find_plugins
+from program import find_plugins, option_parser
 
 SCENE = "videotestsrc is-live=true pattern=ball"
 # The default of v4l2src is the largest frame size, which many cameras deliver only a few times a second.
@@ -22,9 +22,8 @@ EVENTS = "application/x-event-camera"
 DECODED = 'uridecodebin uri="{uri}" caps="{caps}" expose-all-streams=false'
 
 
-def option_parser(program, description, address, port):
-    parser = argparse.ArgumentParser(
-        prog=program, description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+def server_options(name, description, address, port):
+    parser = option_parser(description, prog=name)
     source = parser.add_mutually_exclusive_group()
     source.add_argument("--device", help="camera, such as /dev/video0 (default: a test scene)")
     source.add_argument("--source", help="instead of a camera: a video or a recording of events, which is repeated; an"
@@ -36,8 +35,6 @@ def option_parser(program, description, address, port):
                         help="IP address to listen on (default: %(default)s)")
     parser.add_argument("--port", type=port_number, default=port,
                         help="0 = any free port (default: %(default)s)")
-    parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
-                        help="print the version and exit")
     return parser
 
 

@@ -16,9 +16,9 @@ import sys
 from fractions import Fraction
 
 # Imported first: it requires the versions.
-from event_files import (Failure, Gst, Interrupt, Misuse, Progress, content_of, events_pad, parse, play, post_error,
-                         reader_of, readers, set_option, utf8_path, with_extension_of, writers)
-from plugins import find_plugins
+from event_files import (Failure, Gst, Interrupt, Misuse, PlayProgress, content_of, events_pad, parse, play, post_error,
+                         reader_of, readers, run, set_option, utf8_path, with_extension_of, writers)
+from program import find_plugins, option_parser
 
 MAX_SECONDS = 1e9
 WRITER_OPTIONS = {"format": "encoding of a .raw or .mcap file, dialect of text, or layout of HDF5",
@@ -263,7 +263,7 @@ class Conversion:
         self._writer = writer_of(out) if not self._film else None
         self._readers = []
         self._fed = None
-        self._progress = Progress()
+        self._progress = PlayProgress()
         is_drawing = options.scale != 1 or options.sheet != (1, 1) or options.render or options.over_frames
         if self._writer and is_drawing:
             raise Misuse(f"--scale, --sheet, --render and --over-frames apply only to {' '.join(FILMS)} files")
@@ -671,9 +671,8 @@ def formats():
 
 
 def parse_options():
-    parser = argparse.ArgumentParser(
-        prog="event-convert", description=__doc__, usage="%(prog)s [OPTION]... IN... OUT", allow_abbrev=False,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = option_parser(
+        __doc__, prog="event-convert", usage="%(prog)s [OPTION]... IN... OUT", allow_abbrev=False,
         epilog=formats() if {"-h", "--help"} & set(sys.argv) else None)
     add = parser.add_argument
     add("files", nargs="*", metavar="IN... OUT",
@@ -708,7 +707,6 @@ def parse_options():
     add("--reverse", action="store_true", help="time backwards, polarity inverted")
     add("--output-directory", metavar="DIRECTORY", help="convert each IN to a file of the same name in this folder")
     add("--extension", metavar="NAME", help="extension of the files in the output directory (default: the extension of IN)")
-    add("--version", action="version", version="%(prog)s @VERSION@", help="print the version and exit")
     # parse_intermixed_args() of Python 3.11 refuses names after "--".
     words = sys.argv[1:]
     end = words.index("--") if "--" in words else len(words)
@@ -746,8 +744,4 @@ def main():
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except RuntimeError as failure:
-        print(failure, file=sys.stderr)
-        sys.exit(getattr(failure, "status", 1))
+    run(main)

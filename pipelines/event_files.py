@@ -14,9 +14,10 @@ gi.require_version("Gst", "1.0")
 gi.require_version("GstBase", "1.0")
 from gi.repository import GLib, Gst, GstBase  # noqa: E402
 
+from program import Progress  # noqa: E402
+
 # Typefinders see into compressed files, too.
 START_SIZE = 1 << 17
-PROGRESS_WIDTH = 40
 
 
 class Failure(RuntimeError):
@@ -171,29 +172,20 @@ class Interrupt:
         return bool(self._numbers)
 
 
-class Progress:
-    """A bar that is overwritten on a terminal, or a line every ten seconds elsewhere."""
+class PlayProgress(Progress):
+    """The share that is done, and the time left."""
 
     def __init__(self):
-        self._start = self._last = time.monotonic()
-        self._is_terminal = sys.stderr.isatty()
+        super().__init__(interval=10, pause=1)
+        self._start = time.monotonic()
 
     def show(self, share, count):
-        """Prints the share that is done, in a second at the earliest, and the time left."""
-        now = time.monotonic()
-        if share is None or now - self._last < (1 if self._is_terminal else 10):
+        if share is None:
             return
-        self._last = now
         share = min(max(share, 0), 1)
-        left = f", {(now - self._start) * (1 / share - 1):.0f} s left" if share > 0.01 else ""
-        text = f"{100 * share:3.0f} %, {count}{left}"
-        if self._is_terminal:
-            text = f"\r\033[K[{'#' * round(PROGRESS_WIDTH * share):{PROGRESS_WIDTH}}] {text}"
-        print(text, end="" if self._is_terminal else "\n", file=sys.stderr, flush=True)
-
-    def clear(self):
-        if self._is_terminal:
-            print("\r\033[K", end="", file=sys.stderr, flush=True)
+        left = f", {(time.monotonic() - self._start) * (1 / share - 1):.0f} s left" if share > 0.01 else ""
+        bar = f"[{'#' * round(40 * share):40}] " if self.on_terminal else ""
+        self.update(f"{bar}{100 * share:3.0f} %, {count}{left}")
 
 
 def play(pipeline, show, report, interrupt=False, prepare=None):
@@ -225,3 +217,12 @@ def play(pipeline, show, report, interrupt=False, prepare=None):
             prepare()
             prepare = None
             pipeline.set_state(Gst.State.PLAYING)
+
+
+def run(main):
+    """Runs a program, and exits."""
+    try:
+        sys.exit(main())
+    except RuntimeError as failure:
+        print(failure, file=sys.stderr)
+        sys.exit(getattr(failure, "status", 1))

@@ -8,20 +8,17 @@ ceiling: how similar a second recording by the same camera would be.
 All files are event files that this project reads, of the same pixels and with the same clock. --from and
 --to are in seconds after the first real event; the default is the time that all cover. Differences
 beyond the noise ceiling are marked with *."""
-import argparse
 import base64
 import functools
 import html
 import os
-import sys
 from dataclasses import dataclass
 
 # Imported first: it reports missing packages.
-from event_streams import (GLib, Gst, Sensor, Span, compare, expect_writable, png_of, read_mask, read_recording,
+from event_streams import (Gst, Sensor, Span, compare, expect_writable, png_of, read_mask, read_recording,
                            read_video, reconstruct, seconds)
 import numpy as np
-from page_style import PAGE_STYLE
-from plugins import find_plugins
+from program import find_plugins, option_parser, page, run
 
 LIMITS = (1, 5, 10)  # of matches, ms
 # Tolerance for figures beyond the ceiling, which is an estimate.
@@ -272,7 +269,7 @@ def charts_of(sensor, real, simulated, travels):
     return charts
 
 
-STYLE = PAGE_STYLE + """
+STYLE = """
 .beyond { color: light-dark(#b02020, #ff8080) } .maps, .charts { display: grid; gap: 1rem }
 .maps { grid-template-columns: repeat(auto-fill, minmax(18rem, 1fr)) }
 .charts { grid-template-columns: repeat(auto-fill, minmax(min(32rem, 100%), 1fr)) }
@@ -289,29 +286,25 @@ def page_of(sensor, real, simulated, rows, charts):
     maps = [counts_per_pixel(sensor, stream.events) for stream in streams]
     max_count = max(np.quantile(maps[0][maps[0] > 0], 0.995), 1)
     names = [html.escape(stream.name) for stream in streams]
-    header = "".join(f'<th style="border-bottom: 3px solid {COLOURS[i % len(COLOURS)]}">{name}</th>'
-                     for i, name in enumerate([f"{names[0]}, ceiling"] + names[1:]))
-    body = "".join(
-        f"<tr><th>{row.title}</th><td>{row.ceiling}</td>"
-        + "".join(f'<td class="beyond">{cell} *</td>' if beyond else f"<td>{cell}</td>"
-                  for cell, beyond in zip(row.cells, row.beyond)) + "</tr>" for row in rows)
+    header = [f'<th style="border-bottom: 3px solid {COLOURS[i % len(COLOURS)]}">{name}</th>'
+              for i, name in enumerate([f"{names[0]}, ceiling"] + names[1:])]
+    body = [(row.title, [f"<td>{row.ceiling}</td>"] + [
+        f'<td class="beyond">{cell} *</td>' if beyond else f"<td>{cell}</td>"
+        for cell, beyond in zip(row.cells, row.beyond)]) for row in rows]
     figures = "".join(f'<figure><figcaption>{name}</figcaption><img alt="events per pixel" src="{map_of(each, max_count)}">'
                       "</figure>" for name, each in zip(names, maps))
-    return ('<!DOCTYPE html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-            f"<title>Realism of {', '.join(names[1:])}</title><style>{STYLE}</style><h1>Beside {names[0]}</h1>"
-            f"<table><tr><th></th>{header}</tr>{body}</table>"
+    return page(f"Realism of {', '.join(names[1:])}", f"Beside {names[0]}", STYLE, header, body,
             "<p>* beyond the noise ceiling: two recordings of the scene by the same camera would differ less.</p>"
             f'<h2>Events per pixel</h2><p class="bar"><span>0</span><span>{max_count / 4:.3g}</span><span>{max_count:.3g}'
             "</span></p><p>White: the count that 99.5 % of the pixels with real events do not exceed. The brightness is"
-            f' the square root of the count.</p><div class="maps">{figures}</div><div class="charts">{"".join(charts)}</div>\n')
+            f' the square root of the count.</p><div class="maps">{figures}</div><div class="charts">{"".join(charts)}</div>')
 
 
 # the program
 
 
 def options():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("real")
     parser.add_argument("simulated", nargs="+")
     parser.add_argument("--from", type=seconds, metavar="SECONDS", help="start of the comparison")
@@ -323,8 +316,6 @@ def options():
                         help="the frames, for the page's response curve: a video, or a text file of lines"
                         " \"seconds picture\"")
     parser.add_argument("--html", metavar="PAGE", help="write a page with maps and curves")
-    parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
-                        help="print the version and exit")
     return parser.parse_args()
 
 
@@ -373,15 +364,9 @@ def main():
     rows = table_of(sensor, real, simulated, span)
     print_table(real, simulated, rows)
     if args.html:
-        page = page_of(sensor, real, simulated, rows, charts_of(sensor, real, simulated, travels))
         with open(args.html, "w", encoding="utf-8") as file:
-            file.write(page)
+            file.write(page_of(sensor, real, simulated, rows, charts_of(sensor, real, simulated, travels)))
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (RuntimeError, OSError, GLib.Error) as failure:
-        sys.exit(f"error: {failure}")
-    except KeyboardInterrupt:
-        sys.exit(130)
+    run(main)
