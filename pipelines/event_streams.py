@@ -14,7 +14,7 @@ try:
     import numpy as np
 
     gi.require_version("GstVideo", "1.0")
-    from gi.repository import GLib, GstVideo  # noqa: F401
+    from gi.repository import GstVideo
     from gst_eventcamera.pipeline import Gst, Pipeline, events_of, quoted
     from gst_eventcamera.recordings import buffer_of
     from gst_eventcamera.sources import SINK
@@ -157,13 +157,8 @@ def samples_of(description, feeds=()):
     """Plays a pipeline, and yields the samples of its appsink `out`. Each feed is the name of an appsrc, its caps
     and its buffers."""
     with Pipeline(description) as pipeline:
-        for name, caps, _ in feeds:
-            pipeline.element(name).set_property("caps", Gst.Caps.from_string(caps))
-        pipeline.set_state(Gst.State.PLAYING)
-        for name, _, buffers in feeds:
-            for buffer in buffers:
-                pipeline.element(name).emit("push-buffer", buffer)
-            pipeline.element(name).emit("end-of-stream")
+        for feed in feeds:
+            pipeline.feed(*feed)
         yield from pipeline.samples()
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from .events import Events
 from .frames import Frames
-from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, duration_of, events_of, property_limits, quoted
+from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, events_of, property_limits, quoted
 from .recipe import PICTURES, TENSORS, Recipe, Value, Window, is_picture
 from .sources import SINK
 from .tensors import TENSOR_CAPS, tensor_of
@@ -65,7 +65,7 @@ class DatasetVideo:
         frames = Frames()
         frames.watch(pipeline.element("decoded").get_static_pad("sink"))
         yield from pipeline.samples()
-        if fault := self.fault(frames, duration_of(pipeline)):
+        if fault := self.fault(frames, pipeline.duration()):
             raise PipelineError(f"{self.name}: {fault}")
 
     def fault(self, frames: Frames, duration: float) -> str:
@@ -96,7 +96,8 @@ class DatasetVideo:
                 made = VideoFile(self.path, rest)
             pipeline = stack.enter_context(made)
             if recipe.window:
-                _feed(pipeline, _moving_window(_scaled_picture(self.path, recipe.window), recipe.window), recipe)
+                pipeline.feed("window", f"video/x-raw,format=GRAY8,width={recipe.window.width},"
+                              f"height={recipe.window.height},{_framerate(recipe)}", _moving_window(_scaled_picture(self.path, recipe.window), recipe))
             yield pipeline
 
 
@@ -171,29 +172,12 @@ def _scaled_picture(path: str, window: Window) -> np.ndarray:
     return np.frombuffer(buffer.extract_dup(0, buffer.get_size()), np.uint8).reshape(height, -1)
 
 
-def _moving_window(picture: np.ndarray, window: Window) -> Iterator[np.ndarray]:
+def _moving_window(picture: np.ndarray, recipe: Recipe) -> Iterator[Gst.Buffer]:
     """Yields the window at each of its positions on a scaled picture."""
-    for left, top in window.corners():
-        yield picture[top:top + window.height, left:left + window.width]
-
-
-def _feed(pipeline: Pipeline, frames: Iterator[np.ndarray], recipe: Recipe) -> None:
-    """Pushes a frame whenever the pipeline needs one."""
     assert recipe.window and recipe.framerate
     width, height, duration = recipe.window.width, recipe.window.height, Gst.SECOND / recipe.framerate
-    numbered = enumerate(frames)
-
-    def push(source: Gst.Element, _: int) -> None:
-        number, frame = next(numbered, (0, None))
-        if frame is None:
-            source.emit("end-of-stream")
-            return
-        rows = np.pad(frame, ((0, 0), (0, -width % 4)))  # as GStreamer pads them
+    for number, (left, top) in enumerate(recipe.window.corners()):
+        rows = np.pad(picture[top:top + height, left:left + width], ((0, 0), (0, -width % 4)))  # as GStreamer pads them
         buffer = Gst.Buffer.new_wrapped(rows.tobytes())
         buffer.pts, buffer.duration = round(number * duration), round(duration)
-        source.emit("push-buffer", buffer)
-
-    source = pipeline.element("window")
-    source.set_property("caps", Gst.Caps.from_string(
-        f"video/x-raw,format=GRAY8,width={width},height={height},{_framerate(recipe)}"))
-    source.connect("need-data", push)
+        yield buffer

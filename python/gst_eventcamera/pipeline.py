@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import atexit
-import contextlib
 import math
 import os
 import sys
 import warnings
-from typing import Callable, Iterator, Optional
+from typing import Callable, Iterable, Iterator, Optional
 
 import gi
 import numpy as np
@@ -132,6 +131,21 @@ class Pipeline:
 
         pad.add_probe(Gst.PadProbeType.EVENT_DOWNSTREAM, replace)
 
+    def feed(self, name: str, caps: str, buffers: Iterable[Gst.Buffer]) -> None:
+        """Makes an appsrc push buffers as it needs them, and then EOS."""
+        rest = iter(buffers)
+
+        def push(source: Gst.Element, _: int) -> None:
+            buffer = next(rest, None)
+            if buffer is None:
+                source.emit("end-of-stream")
+            else:
+                source.emit("push-buffer", buffer)
+
+        source = self.element(name)
+        source.set_property("caps", Gst.Caps.from_string(caps))
+        source.connect("need-data", push)
+
     def raise_error(self, wait: int = 0) -> None:
         """Raises the first error that an element has posted, or posts within `wait` nanoseconds."""
         self._handle_messages(wait)
@@ -178,11 +192,9 @@ class Pipeline:
         self.set_state(Gst.State.PAUSED)
 
     def duration(self) -> float:
-        """Duration in seconds; the pipeline must be paused."""
+        """Duration in seconds, 0 if unknown; the pipeline must be paused."""
         known, duration = self._pipeline.query_duration(Gst.Format.TIME)
-        if not known:
-            raise PipelineError("the duration of the source is unknown")
-        return duration / 1e9
+        return duration / 1e9 if known else 0.0
 
     def caps(self) -> Gst.Caps:
         """Caps of the output; the pipeline must be paused."""
@@ -217,13 +229,6 @@ def _stop_all() -> None:
     """Stops pipelines before Python ends threads, which may hold the lock of a pad in a probe."""
     for pipeline in list(_open):
         pipeline.__exit__()
-
-
-def duration_of(pipeline: Pipeline) -> float:
-    """Duration in seconds; 0 if unknown."""
-    with contextlib.suppress(PipelineError):
-        return pipeline.duration()
-    return 0.0
 
 
 def property_limits(element: str) -> dict[str, tuple[float, float]]:
