@@ -96,8 +96,9 @@ class DatasetVideo:
                 made = VideoFile(self.path, rest)
             pipeline = stack.enter_context(made)
             if recipe.window:
-                pipeline.feed("window", f"video/x-raw,format=GRAY8,width={recipe.window.width},"
-                              f"height={recipe.window.height},{_framerate(recipe)}", _moving_window(_scaled_picture(self.path, recipe.window), recipe))
+                width, height = recipe.window.width, recipe.window.height
+                pipeline.feed("window", f"video/x-raw,format=GRAY8,width={width},height={height},{_framerate(recipe)}",
+                              _moving_window(_scaled_picture(self.path, recipe.window), recipe))
             yield pipeline
 
 
