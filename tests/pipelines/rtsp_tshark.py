@@ -1,14 +1,13 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """tshark follows a client of rtsp-events from the session description to the packets, without complaint."""
+import contextlib
 import os
 import shutil
-import socket
-import struct
+import signal
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 
 import gi
@@ -40,39 +39,19 @@ def enter_namespace():
               {**os.environ, "IN_NAMESPACE": "1"})
 
 
-class Capture:
-    """Writes the frames of the loopback device to a pcap file."""
-
-    def __init__(self, path):
-        self._path = path
-        self._frames = []
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-
-    def __enter__(self):
-        self._socket = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(0x0003))
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 24)
-        self._socket.settimeout(0.1)
-        self._socket.bind(("lo", 0))
-        self._thread.start()
-
-    def __exit__(self, *_):
-        self._ended.set()
-        self._thread.join()
-        ethernet = 1
-        with open(self._path, "wb") as file:
-            file.write(struct.pack("=IHHIIII", 0xA1B2C3D4, 2, 4, 0, 0, 1 << 16, ethernet))
-            for moment, frame in self._frames:
-                file.write(struct.pack("=IIII", int(moment), int(moment % 1 * 1e6), len(frame), len(frame)) + frame)
-
-    def _run(self):
-        while not self._ended.is_set():
-            try:
-                frame, (_, _, kind, *_) = self._socket.recvfrom(1 << 16)
-            except TimeoutError:
-                continue
-            if kind != socket.PACKET_OUTGOING:  # each arrives, too
-                self._frames.append((time.time(), frame))
+@contextlib.contextmanager
+def captured(path):
+    """Writes the packets of the loopback device to a file."""
+    capture = subprocess.Popen(["tshark", "-i", "lo", "-w", path], stdout=subprocess.DEVNULL,
+                               stderr=subprocess.PIPE, text=True)
+    for line in capture.stderr:
+        if "Capture started" in line:
+            break
+    try:
+        yield
+    finally:
+        capture.send_signal(signal.SIGINT)
+        capture.communicate()
 
 
 def play(buffers):
@@ -103,7 +82,7 @@ def rtsp_session():
         path = os.path.join(folder, "session.pcap")
         server = ServerProcess(PROGRAM, "--address", "127.0.0.1")
         try:
-            with Capture(path):
+            with captured(path):
                 play(BUFFERS)
         finally:
             server.interrupt()
