@@ -11,7 +11,7 @@ import sys
 # Imported first: it requires the versions.
 from event_files import (Failure, Gst, Interrupt, PlayProgress, content_of, events_pad, parse, play, reader_of, run,
                          utf8_path)
-from program import find_plugins, option_parser
+from program import find_plugins, option_parser, pyplot_for
 import numpy as np
 
 BIN = 10_000  # of the event rate, in microseconds
@@ -147,16 +147,10 @@ def described(info):
 
 def plot(counts, info, path):
     """Draws the event rate over time."""
-    try:
-        import matplotlib
-        matplotlib.use("Agg")
-        from matplotlib import pyplot
-    except ImportError:
-        raise Failure("--plot needs Matplotlib; on Debian, install: python3-matplotlib") from None
     used = counts.bins[:((counts.last or 0) - (counts.first or 0)) // BIN + 1]
     step = -(-max(len(used), 1) // 1000)  # bins of a point
     rates = np.add.reduceat(used, range(0, len(used), step)) / (step * BIN) if len(used) else used
-    figure, axes = pyplot.subplots(figsize=(8, 3), layout="constrained")
+    figure, axes = pyplot_for("--plot").subplots(figsize=(8, 3), layout="constrained")
     axes.fill_between(np.arange(len(rates)) * step * BIN / 1e6, rates, step="post", color="#4080d0")
     axes.set(xlabel="time (s)", ylabel="event rate (Mev/s)", title=info["path"], ylim=(0, None))
     axes.margins(x=0)

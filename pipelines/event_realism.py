@@ -11,6 +11,8 @@ beyond the noise ceiling are marked with *."""
 import base64
 import functools
 import html
+import io
+import itertools
 import os
 from dataclasses import dataclass
 
@@ -18,13 +20,13 @@ from dataclasses import dataclass
 from event_streams import (Gst, Sensor, Span, compare, expect_writable, png_of, read_mask, read_recording,
                            read_video, reconstruct, seconds)
 import numpy as np
-from program import find_plugins, option_parser, page, run
+from program import find_plugins, option_parser, page, pyplot_for, run
 
 LIMITS = (1, 5, 10)  # of matches, ms
 # Tolerance for figures beyond the ceiling, which is an estimate.
 TOLERANCE = 0.05
 SPLITS = 20
-COLOURS = ["currentColor", "#4080d0", "#d07020", "#309060", "#a050c0", "#c04060", "#60a0a0"]
+COLOURS = ["#000000", "#4080d0", "#d07020", "#309060", "#a050c0", "#c04060", "#60a0a0"]
 
 
 @dataclass
@@ -144,61 +146,26 @@ def map_of(counts, max_count):
     return "data:image/png;base64," + base64.b64encode(encoded).decode()
 
 
-def ticks_of(low, high, is_log):
-    """Round values from `low` to `high`, about five: 1, 2 and 5 times powers of ten. A logarithmic axis has
-    only the powers if these suffice."""
-    if is_log:
-        powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.log10(high) + 1)
-        shown = powers[::-(-len(powers) // 8)] if len(powers) > 4 else np.outer(powers, (1, 2, 5)).ravel()
-    else:
-        coarse = 10.0 ** np.floor(np.log10((high - low) / 5)) * np.array([1, 2, 5, 10])
-        step = coarse[coarse >= (high - low) / 6][0]
-        shown = np.arange(np.ceil(low / step), high / step + 1) * step
-    return shown[(shown >= low * 0.999) & (shown <= high * 1.001)]
-
-
-def legend_of(names):
-    return " ".join(f'<span style="color: {COLOURS[i % len(COLOURS)]}">■ {name}</span>' for i, name in enumerate(names))
-
-
 def chart(title, x_title, y_title, names, curves, logarithmic=(False, False)):
-    """An SVG of curves, given as x and y of each stream, the real one first, which is drawn over the others. A
-    logarithmic axis starts at the lowest value, a linear one at 0."""
-    points = []
-    for curve in curves:
-        curve = np.array(curve, float).reshape(2, -1)
-        points.append(curve[:, (curve > 0).all(axis=0) | (not any(logarithmic))])
-    drawn = np.concatenate(points, axis=1)
-    if drawn.shape[1] == 0:
-        return ""
-    low = np.where(logarithmic, drawn.min(axis=1), 0)
-    high = np.maximum(drawn.max(axis=1), np.where(logarithmic, low * 1.001, low + 1e-9))
-    width, height, left, bottom = 540, 260, 90, 44
-
-    def share(axis, values):
-        scale = np.log10 if logarithmic[axis] else np.asarray
-        return (scale(values) - scale(low[axis])) / (scale(high[axis]) - scale(low[axis]))
-
-    def place(curve):
-        return " ".join(f"{left + a * width:.1f},{10 + (1 - b) * height:.1f}"
-                        for a, b in zip(share(0, curve[0]), share(1, curve[1])))
-
-    lines = [f'<polyline points="{place(curve)}" stroke="{COLOURS[i % len(COLOURS)]}"/>'
-             for i, curve in reversed(list(enumerate(points)))]
-    marks = ""
-    for value in ticks_of(low[0], high[0], logarithmic[0]):
-        x = left + share(0, value) * width
-        marks += (f'<path d="M{x:.1f} 10v{height}"/><text x="{x:.1f}" y="{height + 28}" text-anchor="middle">'
-                  f"{value:g}</text>")
-    for value in ticks_of(low[1], high[1], logarithmic[1]):
-        y = 10 + (1 - share(1, value)) * height
-        marks += f'<path d="M{left} {y:.1f}h{width}"/><text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
-    return (f"<figure><figcaption><b>{title}</b> {legend_of(names)}</figcaption>"
-            f'<svg viewBox="0 0 {left + width + 30} {height + 10 + bottom}">'
-            f'<rect x="{left}" y="10" width="{width}" height="{height}"/>{marks}{"".join(lines)}'
-            f'<text x="{left + width / 2}" y="{height + 46}" text-anchor="middle">{x_title}</text>'
-            f'<text x="14" y="{10 + height / 2}" text-anchor="middle" transform="rotate(-90 14 {10 + height / 2})">'
-            f"{y_title}</text></svg></figure>")
+    """An SVG of curves, given as x and y of each stream, the real one first, which is drawn over the others."""
+    figure, axes = pyplot_for("--html").subplots(figsize=(7, 3.6), layout="constrained")
+    for i, (name, curve) in reversed(list(enumerate(zip(names, curves)))):
+        axes.plot(*np.array(curve, float).reshape(2, -1), color=COLOURS[i % len(COLOURS)], label=name.replace("$", r"\$"))
+    axes.set(title=title, xlabel=x_title, ylabel=y_title)
+    if logarithmic[0]:
+        axes.set_xscale("log")
+    else:
+        axes.set_xlim(0)
+    if logarithmic[1]:
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(0)
+    axes.grid(alpha=0.3)
+    axes.legend(*(each[::-1] for each in axes.get_legend_handles_labels()), framealpha=0)
+    file = io.StringIO()
+    figure.savefig(file, format="svg", transparent=True)
+    svg = file.getvalue().replace("#000000", "currentColor")  # light on a dark page
+    return f"<figure>{svg[svg.index('<svg'):]}</figure>"
 
 
 def intervals_of(sensor, events):
@@ -243,7 +210,7 @@ def response_curve(sensor, events, travels):
 def charts_of(sensor, real, simulated, travels):
     """The curves of the page, with the response to light if the changes of the light are known."""
     streams = [real] + simulated
-    names = [html.escape(stream.name) for stream in streams]
+    names = [stream.name for stream in streams]
     rates = []
     for i, stream in enumerate(streams):
         curve = (stream.figures or simulated[0].figures)["rate-curve"]
@@ -273,9 +240,7 @@ STYLE = """
 .beyond { color: light-dark(#b02020, #ff8080) } .maps, .charts { display: grid; gap: 1rem }
 .maps { grid-template-columns: repeat(auto-fill, minmax(18rem, 1fr)) }
 .charts { grid-template-columns: repeat(auto-fill, minmax(min(32rem, 100%), 1fr)) }
-img { width: 100%; image-rendering: pixelated } svg { width: 100% } svg text { font-size: 12px; fill: currentColor }
-svg rect, path { fill: none; stroke: #8888 } path { stroke: #8884 } polyline { fill: none; stroke-width: 2 }
-figcaption span { margin-left: .7em; white-space: nowrap }
+img { width: 100%; image-rendering: pixelated } svg { width: 100%; height: auto } svg text { fill: currentColor }
 .bar { display: flex; justify-content: space-between; max-width: 18rem; padding: .1rem .4rem; background: linear-gradient(90deg, #000, #fff) }
 .bar span:nth-child(-n+2) { color: #fff } .bar span { color: #000 }
 """
@@ -286,8 +251,8 @@ def page_of(sensor, real, simulated, rows, charts):
     maps = [counts_per_pixel(sensor, stream.events) for stream in streams]
     max_count = max(np.quantile(maps[0][maps[0] > 0], 0.995), 1)
     names = [html.escape(stream.name) for stream in streams]
-    header = [f'<th style="border-bottom: 3px solid {COLOURS[i % len(COLOURS)]}">{name}</th>'
-              for i, name in enumerate([f"{names[0]}, ceiling"] + names[1:])]
+    header = [f'<th style="border-bottom: 3px solid {colour}">{name}</th>'
+              for name, colour in zip([f"{names[0]}, ceiling"] + names[1:], itertools.cycle(["currentColor"] + COLOURS[1:]))]
     body = [(row.title, [f"<td>{row.ceiling}</td>"] + [
         f'<td class="beyond">{cell} *</td>' if beyond else f"<td>{cell}</td>"
         for cell, beyond in zip(row.cells, row.beyond)]) for row in rows]
@@ -342,6 +307,7 @@ def main():
     if args.video and not args.html:
         raise RuntimeError("--video needs a page; name one with --html")
     if args.html:
+        pyplot_for("--html")
         expect_writable(args.html, filter(None, [args.real, *args.simulated, args.mask, args.video]))
     sensor = Sensor()
     streams = []

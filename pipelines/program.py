@@ -26,6 +26,18 @@ def find_plugins(names=("eventcam", "eventsim")):
                 f" gstreamer1.0-{plugin}, or as root: meson install -C build")
 
 
+def pyplot_for(option):
+    """Matplotlib, which few options need."""
+    try:
+        import matplotlib
+        matplotlib.use("Agg")
+        from matplotlib import pyplot
+    except ImportError:
+        raise RuntimeError(f"{option} needs Matplotlib; on Debian, install: python3-matplotlib") from None
+    matplotlib.rcParams["svg.fonttype"] = "none"
+    return pyplot
+
+
 def run(main):
     """Runs a program, and exits."""
     try:
