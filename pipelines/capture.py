@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 from gi.repository import GLib, Gst
 
-from program import find_plugins, option_parser
+from program import option_parser
 
 SCENE = "videotestsrc is-live=true pattern=ball"
 # The default of v4l2src is the largest frame size, which many cameras deliver only a few times a second.
@@ -41,14 +41,6 @@ def server_options(name, description, address, port):
 def for_webcams(simulator):
     """A simulator that skips frames that a camera repeats, unless its properties say otherwise."""
     return re.sub(r"^((gl)?eventsim-\S+)", r"\1 skip-repeated=true", simulator)
-
-
-def find_elements(names, packages):
-    """Raises RuntimeError if a plugin of this project, or one of these elements from the Debian `packages`, is
-    missing."""
-    find_plugins()
-    if missing := [name for name in names if not Gst.ElementFactory.find(name)]:
-        raise RuntimeError(f"GStreamer has no {', '.join(missing)}; on Debian, install: {packages}")
 
 
 def port_number(text):

@@ -16,11 +16,10 @@ import sys
 from fractions import Fraction
 
 # Imported first: it requires the versions.
-from event_files import (Failure, Gst, Interrupt, Misuse, PlayProgress, content_of, events_pad, parse, play, post_error,
-                         reader_of, readers, run, set_option, utf8_path, with_extension_of, writers)
-from program import find_plugins, option_parser
+from event_files import (MAX_SECONDS, Failure, Gst, Interrupt, Misuse, PlayProgress, content_of, events_pad,
+                         listed_pictures, parse, play, post_error, reader_of, readers, run, set_option, utf8_path, with_extension_of, writers)
+from program import find_elements, find_plugins, option_parser
 
-MAX_SECONDS = 1e9
 WRITER_OPTIONS = {"format": "encoding of a .raw or .mcap file, dialect of text, or layout of HDF5",
                   "compression": "compression of an .aedat4, .h5 or .mcap file"}
 # The files whose readers have the property.
@@ -59,22 +58,7 @@ def pictures_of(path, options):
         if not options.framerate:
             raise Misuse(f"{path}: give the pictures a second with --framerate")
         return [(round(i * Gst.SECOND / options.framerate), name) for i, name in enumerate(names)]
-    line = re.compile(r"\s*([-+.\deE]+)\s+(\S.*\.[A-Za-z]\w*)\s*")
-    entries = []
-    with contextlib.suppress(OSError, UnicodeDecodeError), open(path, encoding="utf-8") as file:
-        for text in file:
-            if not text.strip() or text.startswith("#"):
-                continue
-            found = line.fullmatch(text)
-            if not found and not entries:
-                return None
-            try:
-                entries.append((round(float(found[1]) * 1e9), os.path.join(os.path.dirname(path), found[2])))
-            except (TypeError, ValueError):
-                raise Failure(f"{path}: \"{text.strip()}\" is not a time in seconds and a picture") from None
-    if any(a[0] >= b[0] for a, b in zip(entries, entries[1:])):
-        raise Failure(f"{path}: each picture must have a later time than the one before it")
-    return entries or None
+    return listed_pictures(path) if os.path.isfile(path) else None
 
 
 def feed(pipeline, caps, buffers, seconds):
@@ -268,9 +252,7 @@ class Conversion:
         if self._writer and is_drawing:
             raise Misuse(f"--scale, --sheet, --render and --over-frames apply only to {' '.join(FILMS)} files")
         names = re.findall(r"! (\w+)(?![/\w])", self._film[1]) if self._film else []
-        if missing := [name for name in names if not Gst.ElementFactory.find(name)]:
-            raise Failure(f"GStreamer has no {', '.join(missing)}; on Debian, install: gstreamer1.0-plugins-base"
-                          " gstreamer1.0-plugins-good gstreamer1.0-plugins-ugly")
+        find_elements(names, "gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-ugly")
         self._is_still = out.lower().endswith(".png")
         self._pipeline = self._make()
         self._set_up()

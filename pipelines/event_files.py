@@ -3,6 +3,7 @@
 pipeline to its end."""
 import functools
 import os
+import re
 import signal
 import sys
 import time
@@ -18,6 +19,8 @@ from program import Progress  # noqa: E402
 
 # Typefinders see into compressed files, too.
 START_SIZE = 1 << 17
+# Limit of times in seconds, so that nanoseconds fit a GStreamer clock time.
+MAX_SECONDS = 1e9
 
 
 class Failure(RuntimeError):
@@ -85,6 +88,32 @@ def reader_of(path, caps):
     """The reader of a file, by its content, or by its extension if the content is ambiguous; None if there is none."""
     by_content = next((reader for reader in readers() if caps and reader.factory.can_sink_any_caps(caps)), None)
     return by_content or with_extension_of(readers(), path)
+
+
+def listed_pictures(path):
+    """The times in nanoseconds and the paths of a text file of lines "seconds picture"; None if it is something else."""
+    line = re.compile(r"\s*(\S+)\s+(\S.*\.[A-Za-z]\w*)\s*")
+    entries = []
+    try:
+        with open(path, encoding="utf-8") as file:
+            for text in file:
+                if not text.strip() or text.startswith("#"):
+                    continue
+                try:
+                    time, name = line.fullmatch(text).groups()
+                    seconds = float(time)
+                except (AttributeError, ValueError):
+                    if not entries:
+                        return None
+                    raise Failure(f"{path}: \"{text.strip()}\" is not a time in seconds and a picture") from None
+                if not abs(seconds) < MAX_SECONDS:
+                    raise Failure(f"{path}: {time} is not the time of a picture; give seconds below 1e9")
+                if entries and round(seconds * 1e9) <= entries[-1][0]:
+                    raise Failure(f"{path}: the time {time} is not later than the one before it")
+                entries.append((round(seconds * 1e9), os.path.join(os.path.dirname(path), name)))
+    except UnicodeDecodeError:
+        return None
+    return entries
 
 
 def set_option(element, name, text):

@@ -23,6 +23,8 @@ except (ImportError, ValueError) as missing:
     sys.exit(f"error: {missing}\nInstall python3-gst-eventcamera, a Debian package of gst-eventsim, or in a checkout"
              " run the programs of pipelines/")
 
+from event_files import MAX_SECONDS, listed_pictures  # noqa: E402
+
 # Duration of a buffer of compared events, whose times have 32 bits, in microseconds.
 MAX_BUFFER = 1 << 31
 
@@ -34,9 +36,6 @@ WHITE_MARGIN = 5
 
 # Of red, green and blue in luma, by BT.709.
 RGB_WEIGHTS = 0.2126, 0.7152, 0.0722
-
-# Limit of times in seconds, so that nanoseconds fit a GStreamer clock time.
-MAX_SECONDS = 1e9
 
 
 @dataclass
@@ -179,19 +178,8 @@ def png_of(pixels):
 
 def read_pictures(path, start, end):
     """A text file of lines "seconds picture"; None if it is something else."""
-    entries = []
-    try:
-        with open(path, encoding="utf-8") as file:
-            for line in file:
-                if line.strip() and not line.startswith("#"):
-                    time, name = line.split(maxsplit=1)
-                    if not abs(float(time)) < MAX_SECONDS:
-                        raise RuntimeError(f"{path}: {time} is not the time of a picture; give seconds below 1e9")
-                    entries.append((round(float(time) * 1e9),
-                                    os.path.join(os.path.dirname(path), name.strip())))
-                    if len(entries) > 1 and entries[-1][0] <= entries[-2][0]:
-                        raise RuntimeError(f"{path}: the time {time} is not later than the one before it")
-    except (UnicodeDecodeError, ValueError):
+    entries = listed_pictures(path)
+    if entries is None:
         return None
     if not entries:
         raise RuntimeError(f"{path}: no pictures; give a line \"seconds picture\" for each")

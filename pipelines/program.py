@@ -26,6 +26,11 @@ def find_plugins(names=("eventcam", "eventsim")):
                 f" gstreamer1.0-{plugin}, or as root: meson install -C build")
 
 
+def find_elements(names, packages):
+    if missing := [name for name in names if not Gst.ElementFactory.find(name)]:
+        raise RuntimeError(f"GStreamer has no {', '.join(missing)}; on Debian, install: {packages}")
+
+
 def pyplot_for(option):
     """Matplotlib, which few options need."""
     try:

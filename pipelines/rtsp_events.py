@@ -28,8 +28,8 @@ except (ImportError, ValueError) as missing:
     sys.exit(f"error: {missing}\nOn Debian, install: python3-gi gir1.2-gst-plugins-base-1.0"
              " gir1.2-gst-rtsp-server-1.0")
 
-from capture import Capture, Source, described, find_elements, host_of, server_options  # noqa: E402
-from program import run  # noqa: E402
+from capture import Capture, Source, described, host_of, server_options  # noqa: E402
+from program import find_elements, find_plugins, run  # noqa: E402
 
 ELEMENTS = ["vp8enc", "rtpvp8pay",
             "x264enc", "rtph264pay"]
@@ -139,6 +139,7 @@ def main():
     if args.user == "":
         parser.error("--user is empty")
     Gst.init(None)
+    find_plugins()
     find_elements(ELEMENTS, "gstreamer1.0-plugins-good gstreamer1.0-plugins-ugly")
     server = Server(args.device, args.source, args.simulator)
     if args.user is not None or args.certificate:

@@ -27,8 +27,8 @@ except (ImportError, ValueError) as missing:
     sys.exit(f"error: {missing}\nOn Debian, install: python3-gi gir1.2-gst-plugins-base-1.0"
              " gir1.2-gst-plugins-bad-1.0 gir1.2-soup-3.0")
 
-from capture import Capture, Source, find_elements, host_of, server_options  # noqa: E402
-from program import run  # noqa: E402
+from capture import Capture, Source, host_of, server_options  # noqa: E402
+from program import find_elements, find_plugins, run  # noqa: E402
 
 PAGE = os.path.join(os.path.dirname(os.path.realpath(__file__)), "web_events.html")
 ELEMENTS = ["vp8enc", "rtpvp8pay", "webrtcbin", "nicesink", "dtlssrtpenc"]
@@ -299,6 +299,7 @@ def main():
                         " name and IP addresses; may be repeated")
     args = parser.parse_args()
     Gst.init(None)
+    find_plugins()
     find_elements(ELEMENTS, "gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-nice")
     Server(args.device, args.source, args.simulator, args.host).run(args.address, args.port)
 
