@@ -17,7 +17,8 @@ from fractions import Fraction
 
 # Imported first: it requires the versions.
 from event_files import (MAX_SECONDS, Failure, Gst, Interrupt, Misuse, PlayProgress, content_of, events_pad,
-                         listed_pictures, parse, play, post_error, reader_of, readers, run, set_option, utf8_path, with_extension_of, writers)
+                         listed_pictures, parse, play, post_error, reader_of, readers, run, set_option, utf8_path,
+                         with_extension_of, writers)
 from program import find_elements, find_plugins, option_parser
 
 WRITER_OPTIONS = {"format": "encoding of a .raw or .mcap file, dialect of text, or layout of HDF5",
