@@ -21,7 +21,7 @@ import time
 from statistics import harmonic_mean
 
 # Imported first: it reports missing packages.
-from event_streams import (Gst, Span, compare, delayed, expect_writable, png_of, read_mask, read_recording,
+from event_streams import (Gst, Span, compare, delayed, expect_writable, png_of, read_camera,
                            read_video, seconds, simulate, until)
 import numpy as np
 from program import VERSION, Progress, find_plugins, option_parser, run
@@ -435,11 +435,7 @@ def main():
     if len(video.frames) < 2:
         raise RuntimeError(f"{args.video}: fewer than two frames")
     progress.print(f"reading {args.recording}")
-    if args.mask:
-        video.mask = read_mask(args.mask, video)
-    recorded = video.of_camera(read_recording(args.recording, video))
-    if len(recorded) == 0:
-        raise RuntimeError(f"{args.recording}: no events" + (" where the mask is white" if args.mask else ""))
+    recorded = read_camera(args.recording, video, args.mask)
     progress.clear()
     lag = args.lag
     if lag == "find":

@@ -62,29 +62,13 @@ def pictures_of(path, options):
     return listed_pictures(path) if os.path.isfile(path) else None
 
 
-def feed(pipeline, caps, buffers, seconds):
-    """Makes the appsrc `source` push buffers, `seconds` long in all, when it needs data; an exception ends the pipeline
-    with an error. Returns a list that is updated: the seconds pushed so far, and all seconds."""
-    source = pipeline.get_by_name("source")
-    source.set_property("caps", caps)
-    place, first = [0, seconds], None
-
-    def push(_, __):
-        nonlocal first
-        try:
-            buffer = next(buffers, None)
-        except (OSError, RuntimeError) as failure:
-            post_error(source, str(failure), "")
-            buffer = None
-        if buffer is None:
-            source.emit("end-of-stream")
-        else:
-            first = buffer.pts if first is None else first
-            place[0] = (buffer.pts - first) / Gst.SECOND
-            source.emit("push-buffer", buffer)
-
-    source.connect("need-data", push)
-    return place
+def tracked(buffers, place):
+    """Yields buffers, and keeps the seconds since the first one in place[0]."""
+    first = None
+    for buffer in buffers:
+        first = buffer.pts if first is None else first
+        place[0] = (buffer.pts - first) / Gst.SECOND
+        yield buffer
 
 
 def buffers_of(pictures, speed):
@@ -269,7 +253,7 @@ class Conversion:
             buffers = recorded(self._inputs, options)
             width, height, length = next(buffers)
             pipeline = parse(f"appsrc name=source format=time ! queue name=events0 ! {self._rest()}")
-            self._fed = feed(pipeline, Gst.Caps.from_string(
+            self._feed(pipeline, Gst.Caps.from_string(
                 f"application/x-event-camera,format=XYTP,width={width},height={height},framerate=0/1"), buffers, length)
             return pipeline
         if options.merge:
@@ -282,8 +266,8 @@ class Conversion:
         if pictures := pictures_of(path, options):
             pipeline = self._simulated("appsrc name=source format=time ! decodebin")
             speed = options.speed if self._writer else 1
-            self._fed = feed(pipeline, content_of(pictures[0][1])[1], buffers_of(pictures, speed),
-                             (pictures[-1][0] - pictures[0][0]) / Gst.SECOND / float(speed))
+            self._feed(pipeline, content_of(pictures[0][1])[1], buffers_of(pictures, speed),
+                       (pictures[-1][0] - pictures[0][0]) / Gst.SECOND / float(speed))
             return pipeline
         reader = reader_of(path, caps)
         if reader:
@@ -294,6 +278,13 @@ class Conversion:
         if not caps or not caps.get_structure(0).get_name().startswith(("video/", "image/", "application/")):
             raise Failure(f"{path}: neither its content nor its extension matches a known format; see --help")
         return self._simulated()
+
+    def _feed(self, pipeline, caps, buffers, seconds):
+        """Feeds the appsrc `source` with buffers, `seconds` long in all."""
+        from gst_eventcamera.pipeline import feed
+
+        self._fed = [0, seconds]
+        feed(pipeline.get_by_name("source"), caps, tracked(buffers, self._fed))
 
     def _simulated(self, source=None):
         """A pipeline that simulates the events of `source`, by default of the video file."""

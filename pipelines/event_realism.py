@@ -17,7 +17,7 @@ import os
 from dataclasses import dataclass
 
 # Imported first: it reports missing packages.
-from event_streams import (Gst, Sensor, Span, compare, expect_writable, png_of, read_mask, read_recording,
+from event_streams import (Gst, Sensor, Span, compare, expect_writable, png_of, read_camera,
                            read_video, reconstruct, seconds)
 import numpy as np
 from program import find_plugins, option_parser, page, pyplot_for, run
@@ -312,12 +312,7 @@ def main():
     sensor = Sensor()
     streams = []
     for path in [args.real] + args.simulated:
-        streams.append(Stream(os.path.basename(path), read_recording(path, sensor)))
-        if len(streams) == 1 and args.mask:
-            sensor.mask = read_mask(args.mask, sensor)
-        streams[-1].events = sensor.of_camera(streams[-1].events)
-        if len(streams[-1].events) == 0:
-            raise RuntimeError(f"{path}: no events" + (" where the mask is white" if args.mask else ""))
+        streams.append(Stream(os.path.basename(path), read_camera(path, sensor, args.mask)))
     span = span_of(streams, getattr(args, "from"), args.to)
     for stream in streams:
         stream.events = span.of(stream.events)

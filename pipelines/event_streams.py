@@ -266,6 +266,17 @@ def read_recording(path, sensor):
     return events
 
 
+def read_camera(path, sensor, mask):
+    """The events of a file, of the pixels that are white in a picture, if one is given. Sets the mask of the sensor."""
+    events = read_recording(path, sensor)
+    if mask and sensor.mask is None:
+        sensor.mask = read_mask(mask, sensor)
+    events = sensor.of_camera(events)
+    if len(events) == 0:
+        raise RuntimeError(f"{path}: no events" + (" where the mask is white" if mask else ""))
+    return events
+
+
 # simulating and comparing
 
 

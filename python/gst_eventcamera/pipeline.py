@@ -132,19 +132,7 @@ class Pipeline:
         pad.add_probe(Gst.PadProbeType.EVENT_DOWNSTREAM, replace)
 
     def feed(self, name: str, caps: str, buffers: Iterable[Gst.Buffer]) -> None:
-        """Makes an appsrc push buffers as it needs them, and then EOS."""
-        rest = iter(buffers)
-
-        def push(source: Gst.Element, _: int) -> None:
-            buffer = next(rest, None)
-            if buffer is None:
-                source.emit("end-of-stream")
-            else:
-                source.emit("push-buffer", buffer)
-
-        source = self.element(name)
-        source.set_property("caps", Gst.Caps.from_string(caps))
-        source.connect("need-data", push)
+        feed(self.element(name), Gst.Caps.from_string(caps), buffers)
 
     def raise_error(self, wait: int = 0) -> None:
         """Raises the first error that an element has posted, or posts within `wait` nanoseconds."""
@@ -222,6 +210,26 @@ class Pipeline:
         """Waits until all sinks of a playing pipeline have reached the end."""
         while not self._ended:
             self.raise_error(MAX_WAIT)
+
+
+def feed(source: Gst.Element, caps: Gst.Caps, buffers: Iterable[Gst.Buffer]) -> None:
+    """Makes an appsrc push buffers as it needs them, and then EOS; an exception ends the pipeline with an error."""
+    rest = iter(buffers)
+
+    def push(_: Gst.Element, __: int) -> None:
+        buffer = None
+        try:
+            buffer = next(rest, None)
+        except (OSError, RuntimeError) as failure:
+            error = GLib.Error.new_literal(Gst.StreamError.quark(), str(failure), Gst.StreamError.FAILED)
+            source.post_message(Gst.Message.new_error(source, error, ""))
+        if buffer is None:
+            source.emit("end-of-stream")
+        else:
+            source.emit("push-buffer", buffer)
+
+    source.set_property("caps", caps)
+    source.connect("need-data", push)
 
 
 @atexit.register
