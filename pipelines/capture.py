@@ -28,14 +28,18 @@ def server_options(name, description, address, port):
     source.add_argument("--device", help="camera, such as /dev/video0 (default: a test scene)")
     source.add_argument("--source", help="instead of a camera: a video or a recording of events, which is repeated; an"
                         ' address such as rtsp://camera/stream; or a pipeline, such as "v4l2src ! videoflip method=clockwise"')
-    parser.add_argument("--simulator", default="eventsim-dvs", type=for_webcams,
-                        help='simulator and its properties, such as "eventsim-sparse positive-threshold=5"'
-                        " (default: %(default)s)")
+    add_simulator(parser)
     parser.add_argument("--address", type=ipaddress.ip_address, default=address,
                         help="IP address to listen on (default: %(default)s)")
     parser.add_argument("--port", type=port_number, default=port,
                         help="0 = any free port (default: %(default)s)")
     return parser
+
+
+def add_simulator(parser):
+    parser.add_argument("--simulator", default="eventsim-dvs", type=for_webcams,
+                        help='simulator and its properties, such as "eventsim-sparse positive-threshold=5"'
+                        " (default: %(default)s)")
 
 
 def for_webcams(simulator):

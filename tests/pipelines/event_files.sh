@@ -362,6 +362,8 @@ grep -q "Corrupt data at byte " warnings || fail "no warning about a truncated f
 refused "needs IN and OUT.*--join" ball.raw ball.dat out.raw
 refused "exclude each other" --join --reverse ball.raw ball.dat out.raw
 refused "no picture matches" 'none/*.png' out.raw
+printf '0 pictures/a 0.png\n1 nowhere.png\n' >missing.txt
+refused "No such file or directory: .*nowhere.png" missing.txt out.raw
 refused "with --framerate" 'pictures/*.png' out.raw
 refused "no frames to draw over" --over-frames ball.raw out.mp4
 refused "apply only to .mp4" --scale 2 ball.raw out.dat
