@@ -7,15 +7,14 @@ import socket
 import time
 import unittest
 
-import gi
+import scratch  # noqa: F401  first
+import gst_eventcamera as ec
 import numpy as np
+from gst_eventcamera.pipeline import Gst, events_of
+from gst_eventcamera.recordings import buffer_of
 
-gi.require_version("Gst", "1.0")
-from gi.repository import Gst  # noqa: E402
+from servers import SECONDS
 
-from servers import SECONDS  # noqa: E402
-
-XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
 # A second of events in buffers of 10 ms. The sender's times are neither 0 at its start nor whole microseconds.
 BUFFERS, EVENTS, ORIGIN = 100, 400, 123_456_789
 RTP = ("media=application,clock-rate=1000000,encoding-name=X-EVENT-CAMERA,payload=96,width=346,height=260,format=EVT3")
@@ -29,19 +28,15 @@ SRTP = (f"application/x-srtp,{RTP},srtp-key=(buffer){KEY},srtp-cipher=aes-128-ic
 
 def events_of_buffer(number):
     i = np.arange(EVENTS)
-    events = np.empty(EVENTS, XYTP)
-    events["t"] = 25 * i
+    events = np.empty(EVENTS, ec.EVENT)
+    events["t"] = ORIGIN // 1000 + 10_000 * number + 25 * i
     events["x"] = (31 * number + 17 * i) % 346
-    events["y_p"] = (7 * number + 5 * i) % 260 | (i % 3 == 0) * 0x8000
+    events["y"] = (7 * number + 5 * i) % 260
+    events["p"] = i % 3 == 0
     return events
 
 
-def with_times(events, pts):
-    """Rows of time in microseconds, x, y and polarity."""
-    return np.transpose([pts // 1000 + events["t"].astype(int), events["x"], events["y_p"]])
-
-
-SENT = np.concatenate([with_times(events_of_buffer(i), ORIGIN + i * 10 * Gst.MSECOND) for i in range(BUFFERS)])
+SENT = np.concatenate([events_of_buffer(i) for i in range(BUFFERS)])
 
 
 def wait_until(condition):
@@ -66,8 +61,8 @@ def send(pipeline, buffers, received=None):
     for i in buffers:
         if received is not None and i % 10 == 0:
             wait_until(lambda: sum(map(len, received)) >= (i - 10) * EVENTS)
-        buffer = Gst.Buffer.new_wrapped(events_of_buffer(i).tobytes())
-        buffer.pts, buffer.duration = ORIGIN + i * 10 * Gst.MSECOND, 10 * Gst.MSECOND
+        buffer = buffer_of(events_of_buffer(i), ORIGIN // 1000 + 10_000 * i, 10_000)
+        buffer.pts += ORIGIN % 1000
         pipeline.get_by_name("in").emit("push-buffer", buffer)
 
 
@@ -76,8 +71,7 @@ def receive(pipeline):
     received = []
 
     def take(sink):
-        buffer = sink.emit("pull-sample").get_buffer()
-        received.append(with_times(np.frombuffer(buffer.extract_dup(0, buffer.get_size()), XYTP), buffer.pts))
+        received.append(events_of(sink.emit("pull-sample")))
         return Gst.FlowReturn.OK
 
     pipeline.get_by_name("out").connect("new-sample", take)
@@ -172,5 +166,4 @@ class Rtp(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    Gst.init(None)
     unittest.main()

@@ -2,21 +2,18 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """tshark follows a client of rtsp-events from the session description to the packets, without complaint."""
 import contextlib
+import itertools
 import os
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-import time
 
-import gi
+import scratch  # noqa: F401  first
+from gst_eventcamera.pipeline import Pipeline
 
-from servers import SECONDS, ServerProcess
-
-gi.require_version("Gst", "1.0")
-gi.require_version("GstApp", "1.0")
-from gi.repository import Gst, GstApp  # noqa: E402, F401
+from servers import ServerProcess
 
 PROGRAM = os.path.join(os.environ["SOURCE"], "pipelines", "rtsp_events.py")
 BUFFERS = 100
@@ -55,18 +52,10 @@ def captured(path):
 
 
 def play(buffers):
-    Gst.init(None)
-    pipeline = Gst.parse_launch(
-        "rtspsrc location=rtsp://127.0.0.1:8554/both protocols=udp nat-method=none name=source"
-        "  source. ! rtpvp8depay ! fakesink"
-        "  source. ! rtpeventdepay ! appsink name=out sync=false")
-    pipeline.set_state(Gst.State.PLAYING)
-    appsink = pipeline.get_by_name("out")
-    deadline = time.monotonic() + SECONDS
-    while buffers > 0:
-        assert time.monotonic() < deadline, f"{buffers} buffers are missing"
-        buffers -= appsink.try_pull_sample(Gst.SECOND // 10) is not None
-    pipeline.set_state(Gst.State.NULL)
+    with Pipeline("rtspsrc location=rtsp://127.0.0.1:8554/both protocols=udp nat-method=none name=source"
+                  "  source. ! rtpvp8depay ! fakesink"
+                  "  source. ! rtpeventdepay ! appsink name=out sync=false") as pipeline:
+        assert sum(1 for _ in itertools.islice(pipeline.samples(), buffers)) == buffers
 
 
 def dissected(path, which, *fields):
