@@ -67,13 +67,14 @@ def cut_clips(folder):
 
 
 def write_clip(path, buffers):
-    with Pipeline(f"appsrc name=in format=time caps=\"{FRAMES},framerate=25/1\" ! avenc_ffv1 ! matroskamux"
-                  f" ! filesink location={quoted(path)}") as encoder:
-        encoder.set_state(Gst.State.PLAYING)
+    def timed():
         for number, buffer in enumerate(buffers):
             buffer.pts, buffer.dts = number * Gst.SECOND // 25, Gst.CLOCK_TIME_NONE
-            encoder.element("in").emit("push-buffer", buffer)
-        encoder.element("in").emit("end-of-stream")
+            yield buffer
+
+    with Pipeline(f"appsrc name=in format=time ! avenc_ffv1 ! matroskamux ! filesink location={quoted(path)}") as encoder:
+        encoder.feed("in", f"{FRAMES},framerate=25/1", timed())
+        encoder.set_state(Gst.State.PLAYING)
         encoder.wait()
 
 
