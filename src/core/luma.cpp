@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/core/luma.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/core/luma.cpp"
 #include <hwy/foreach_target.h>
 // Must come after HWY_TARGET_INCLUDE.
@@ -27,10 +26,10 @@ SumVector on_black(int bits, std::uint32_t black, SumVector luma, SumVector alph
   const Sums sums;
   const auto white = hn::Set(sums, (1U << bits) - 1);
   const auto opacity = hn::Min(alpha, white);
-  const auto behind = hn::Mul(hn::Set(sums, black), hn::Sub(white, opacity));
+  const auto behind = hn::Set(sums, black) * (white - opacity);
   const auto half = hn::Set(sums, 1U << (bits - 1));
-  const auto sum = hn::Add(hn::Add(hn::Mul(luma, opacity), behind), half);
-  return hn::ShiftRightSame(hn::Add(sum, hn::ShiftRightSame(sum, bits)), bits);
+  const auto sum = luma * opacity + behind + half;
+  return hn::ShiftRightSame(sum + hn::ShiftRightSame(sum, bits), bits);
 }
 
 /// Loads every `step`-th sample, and reads up to the next pixel.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/core/rgb_luma.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/core/rgb_luma.cpp"
 #include <hwy/foreach_target.h>
 // Must come after HWY_TARGET_INCLUDE.
@@ -24,11 +23,11 @@ using SumVector = hn::Vec<Sums>;
 /// Rounded weighted sums of a vector of pixels.
 SumVector luma_of(const LumaWeights& weights, SumVector red, SumVector green, SumVector blue) {
   const Sums sums;
-  const auto reds = hn::Mul(red, hn::Set(sums, weights.red));
-  const auto greens = hn::Mul(green, hn::Set(sums, weights.green));
-  const auto blues = hn::Mul(blue, hn::Set(sums, weights.blue));
+  const auto reds = red * hn::Set(sums, weights.red);
+  const auto greens = green * hn::Set(sums, weights.green);
+  const auto blues = blue * hn::Set(sums, weights.blue);
   const auto half = hn::Set(sums, LumaWeights::one / 2);
-  return hn::ShiftRight<LumaWeights::bits>(hn::Add(hn::Add(reds, greens), hn::Add(blues, half)));
+  return hn::ShiftRight<LumaWeights::bits>(reds + greens + (blues + half));
 }
 
 /// Computes the luma of `count` pixels with separate colours. Writes up to a vector past the end.

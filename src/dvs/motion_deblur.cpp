@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/motion_deblur.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -37,15 +36,15 @@ HWY_INLINE hn::Vec<Floats> mean_along(const Image<float>& image, const Path& pat
     const float whole = std::floor(moved);
     const auto near = j * along + static_cast<std::ptrdiff_t>(whole) * across;
     const auto pair = [&](std::ptrdiff_t at) HWY_ATTR {
-      return hn::Add(hn::LoadU(floats, centre + at), hn::LoadU(floats, centre - at));
+      return hn::LoadU(floats, centre + at) + hn::LoadU(floats, centre - at);
     };
     const auto first = pair(near);
-    const auto rise = hn::Sub(pair(near + across), first);
-    const auto samples = hn::Add(first, hn::Mul(hn::Set(floats, moved - whole), rise));
+    const auto rise = pair(near + across) - first;
+    const auto samples = first + hn::Set(floats, moved - whole) * rise;
     const float weight = std::min(1.0F, half + 0.5F - static_cast<float>(j));
-    sum = hn::Add(sum, hn::Mul(hn::Set(floats, weight), samples));
+    sum = sum + hn::Set(floats, weight) * samples;
   }
-  return hn::Mul(sum, hn::Set(floats, 1 / path.length));
+  return sum * hn::Set(floats, 1 / path.length);
 }
 
 /// Writes `to` = frame / mean(light) for a row.
@@ -57,7 +56,7 @@ void divide_row(const float* frame, const Image<float>& light, const Path* paths
   const int lanes = static_cast<int>(hn::Lanes(floats));
   for (int x = 0; x < light.width(); x += lanes) {
     const auto mean = mean_along(light, paths[x / MotionDeblur::block], x, y);
-    hn::StoreU(hn::Min(hn::Div(hn::LoadU(floats, frame + x), mean), limit), floats, to + x);
+    hn::StoreU(hn::Min(hn::LoadU(floats, frame + x) / mean, limit), floats, to + x);
   }
 }
 
@@ -67,7 +66,7 @@ void multiply_row(const Image<float>& ratio, const Path* paths, int y, float* li
   const int lanes = static_cast<int>(hn::Lanes(floats));
   for (int x = 0; x < ratio.width(); x += lanes) {
     const auto mean = mean_along(ratio, paths[x / MotionDeblur::block], x, y);
-    hn::StoreU(hn::Mul(hn::LoadU(floats, light + x), hn::Mul(mean, mean)), floats, light + x);
+    hn::StoreU(hn::LoadU(floats, light + x) * (mean * mean), floats, light + x);
   }
 }
 

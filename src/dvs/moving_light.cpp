@@ -9,7 +9,6 @@
 #include "src/core/sensor_size.hpp"
 #include "src/flow/flow_range.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/moving_light.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -87,7 +86,7 @@ struct BlockMotions {
     const auto scale = hn::Set(floats, 65536.0F / static_cast<float>(steps));
     const auto per_step = [&](hn::Vec<decltype(floats)> motion) {  // motion_per_step()
       const auto clamped = hn::Max(hn::Min(motion, limit), hn::Neg(limit));
-      return hn::NearestInt(hn::IfThenElseZero(hn::Eq(motion, motion), hn::Mul(clamped, scale)));
+      return hn::NearestInt(hn::IfThenElseZero(hn::Eq(motion, motion), clamped * scale));
     };
     const auto first_x = hn::Set(words, (left << 16) + 512);
     const auto first_y = hn::Set(words, (row << 16) + 512);
@@ -97,7 +96,7 @@ struct BlockMotions {
       hn::LoadInterleaved2(floats, &flows[i].x, dx, dy);
       hn::Store(per_step(dx), words, x.of + i);
       hn::Store(per_step(dy), words, y.of + i);
-      hn::Store(hn::Add(first_x, hn::ShiftLeft<16>(iota(words, i))), words, x.start + i);
+      hn::Store(first_x + hn::ShiftLeft<16>(iota(words, i)), words, x.start + i);
       hn::Store(first_y, words, y.start + i);
     }
     x.find_ranges(blocks);
@@ -171,8 +170,8 @@ class Sampler {
 
     // Bytes of the left and right neighbours.
     const auto column = hn::ShiftRight<6>(x);
-    const auto places = hn::BitCast(
-        Bytes(), hn::Add(hn::Or(column, hn::ShiftLeft<8>(column)), hn::Set(shorts, 256)));
+    const auto places =
+        hn::BitCast(Bytes(), hn::Or(column, hn::ShiftLeft<8>(column)) + hn::Set(shorts, 256));
     const auto right = hn::And(x, fraction);
     // In 1/64 of a grey level.
     const auto row_at = [&](int row) HWY_ATTR {
@@ -180,14 +179,14 @@ class Sampler {
           hn::BitCast(Shades(), hn::TableLookupBytes(pixels_at(left, top, row), places));
       const auto a = hn::BitCast(shorts, hn::And(pairs, hn::Set(Shades(), 255)));
       const auto b = hn::BitCast(shorts, hn::ShiftRight<8>(pairs));
-      return hn::Add(hn::ShiftLeft<6>(a), hn::Mul(hn::Sub(b, a), right));
+      return hn::ShiftLeft<6>(a) + (b - a) * right;
     };
     const auto row = hn::ShiftRight<6>(y);
     auto upper = row_at(0);
     auto lower = row_at(1);
     auto next = lower;
     for (int i = 0;; ++i) {
-      const auto is_below = hn::Gt(row, hn::Set(shorts, static_cast<std::int16_t>(i)));
+      const auto is_below = row > hn::Set(shorts, static_cast<std::int16_t>(i));
       if (hn::AllFalse(shorts, is_below)) break;
       const auto below = row_at(i + 2);
       upper = hn::IfThenElse(is_below, next, upper);
@@ -195,12 +194,12 @@ class Sampler {
       next = below;
     }
     const auto down = hn::And(y, fraction);
-    const auto rise = hn::Sub(lower, upper);
-    const auto low_bits = hn::Mul(rise, down);
+    const auto rise = lower - upper;
+    const auto low_bits = rise * down;
     const auto high_bits = hn::MulHigh(rise, down);
     // `wide` is upper in the upper halves of words.
     const auto sum = [](hn::Vec<Shorts> wide, hn::Vec<Shorts> product) HWY_ATTR {
-      return hn::Add(hn::ShiftRight<10>(hn::BitCast(Words(), wide)), hn::BitCast(Words(), product));
+      return hn::ShiftRight<10>(hn::BitCast(Words(), wide)) + hn::BitCast(Words(), product);
     };
     const auto zero = hn::Zero(shorts);
     return {sum(hn::InterleaveLower(shorts, zero, upper),
@@ -215,8 +214,7 @@ class Sampler {
                                                  std::int32_t* first) {
     const Words4 words;
     const auto slowest = hn::Load(words, k < 0 ? motion.max : motion.min);
-    const auto moved =
-        hn::Add(hn::Load(words, motion.block_start), hn::Mul(slowest, hn::Set(words, k)));
+    const auto moved = hn::Load(words, motion.block_start) + slowest * hn::Set(words, k);
     const auto pixels =
         hn::Min(hn::Max(hn::ShiftRight<16>(moved), hn::Zero(words)), hn::Set(words, size - 1));
     hn::Store(pixels, words, first);
@@ -231,12 +229,12 @@ class Sampler {
     const auto end = hn::Set(words, (size - 1) * 64);
     const auto firsts = hn::LoadDup128(words, first);
     const auto part = [&](std::size_t i) HWY_ATTR {
-      const auto moved = hn::Add(hn::Load(words, motion.start + i),
-                                 hn::Mul(hn::Load(words, motion.of + i), hn::Set(words, k)));
+      const auto moved =
+          hn::Load(words, motion.start + i) + hn::Load(words, motion.of + i) * hn::Set(words, k);
       const auto position = hn::Min(hn::Max(hn::ShiftRight<10>(moved), hn::Zero(words)), end);
       const auto own = hn::TableLookupBytes(
           firsts, hn::BitCast(words, hn::Load(Bytes(), word_of_block.of + 4 * i)));
-      return hn::DemoteTo(half, hn::Sub(position, hn::ShiftLeft<6>(own)));
+      return hn::DemoteTo(half, position - hn::ShiftLeft<6>(own));
     };
     return hn::Combine(Shorts(), part(hn::MaxLanes(words)), part(0));
   }
@@ -247,8 +245,7 @@ class Sampler {
     const auto last = hn::Set(words, frame_.height - 1);
     const auto stride = hn::Set(words, static_cast<std::int32_t>(frame_.stride));
     HWY_ALIGN std::int32_t places[4];
-    hn::Store(hn::Add(hn::Mul(hn::Min(hn::Add(top, hn::Set(words, row)), last), stride), left),
-              words, places);
+    hn::Store(hn::Min(top + hn::Set(words, row), last) * stride + left, words, places);
     return gather(Bytes(), places);
   }
 
@@ -282,10 +279,9 @@ class Sampler {
 template <class Words>
 HWY_INLINE hn::Vec<Words> blended(Words words, hn::Vec<Words> earlier, hn::Vec<Words> later,
                                   hn::Vec<Words> weight) {
-  const auto sum = hn::Add(hn::ShiftLeft<8>(earlier), hn::Mul(hn::Sub(later, earlier), weight));
-  const auto grey = hn::ShiftRight<8>(hn::Add(sum, hn::Set(words, 1 << 7)));
-  return hn::ShiftRight<12>(
-      hn::Add(hn::Add(hn::ShiftLeft<8>(grey), grey), hn::Set(words, 1 << 11)));
+  const auto sum = hn::ShiftLeft<8>(earlier) + (later - earlier) * weight;
+  const auto grey = hn::ShiftRight<8>(sum + hn::Set(words, 1 << 7));
+  return hn::ShiftRight<12>(hn::ShiftLeft<8>(grey) + grey + hn::Set(words, 1 << 11));
 }
 
 /// Blends blocks whose pixels are close together.

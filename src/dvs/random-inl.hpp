@@ -35,28 +35,27 @@ class RandomSeries {
 
   RandomSeries(const Random& random, Numbers pixels, Random::Purpose purpose) {
     const Bits bits;
-    const auto of_pixels = mixed(hn::Add(hn::Set(bits, random.key()), pixels));
-    hashes_ = mixed(hn::Add(of_pixels, hn::Set(bits, static_cast<std::uint64_t>(purpose))));
+    const auto of_pixels = mixed(hn::Set(bits, random.key()) + pixels);
+    hashes_ = mixed(of_pixels + hn::Set(bits, static_cast<std::uint64_t>(purpose)));
   }
 
   /// Like Random::normals().
   HWY_INLINE Normals normals(Numbers counters) const {
     const Doubles doubles;
     const Bits bits;
-    const auto first = mixed(hn::Add(hashes_, counters));
+    const auto first = mixed(hashes_ + counters);
     const auto logarithm = hn::Min(hn::Zero(doubles), logarithms(to_uniform(first)));
-    const auto radius = hn::Sqrt(hn::Mul(hn::Set(doubles, -2), logarithm));
-    const auto second = mixed(hn::Add(first, hn::Set(bits, 1)));
+    const auto radius = hn::Sqrt(hn::Set(doubles, -2) * logarithm);
+    const auto second = mixed(first + hn::Set(bits, 1));
     const auto angle =
-        hn::Mul(hn::Set(doubles, std::numbers::pi / 4), to_uniform(hn::ShiftLeft<3>(second)));
+        hn::Set(doubles, std::numbers::pi / 4) * to_uniform(hn::ShiftLeft<3>(second));
     Values cosine;
     Values sine;
     cosines_and_sines(angle, cosine, sine);
     const auto swap = hn::Set(bits, std::uint64_t{1} << 61);
-    const auto is_swapped = hn::RebindMask(doubles, hn::Eq(hn::And(second, swap), swap));
-    return {mirrored(hn::Mul(radius, hn::IfThenElse(is_swapped, sine, cosine)), second),
-            mirrored(hn::Mul(radius, hn::IfThenElse(is_swapped, cosine, sine)),
-                     hn::ShiftLeft<1>(second))};
+    const auto is_swapped = hn::RebindMask(doubles, hn::And(second, swap) == swap);
+    return {mirrored(radius * hn::IfThenElse(is_swapped, sine, cosine), second),
+            mirrored(radius * hn::IfThenElse(is_swapped, cosine, sine), hn::ShiftLeft<1>(second))};
   }
 
  private:
@@ -64,7 +63,7 @@ class RandomSeries {
     const Bits bits;
     const auto from_1_to_2 =
         hn::Or(hn::ShiftRight<12>(numbers), hn::Set(bits, std::uint64_t{1023} << 52));
-    return hn::Sub(hn::BitCast(Doubles(), from_1_to_2), hn::Set(Doubles(), 1 - 0x1p-53));
+    return hn::BitCast(Doubles(), from_1_to_2) - hn::Set(Doubles(), 1 - 0x1p-53);
   }
 
   static HWY_INLINE Values mirrored(Values values, Numbers numbers) {
@@ -74,8 +73,8 @@ class RandomSeries {
 
   static HWY_INLINE Numbers mixed(Numbers z) {
     const Bits bits;
-    z = hn::Mul(hn::Xor(z, hn::ShiftRight<30>(z)), hn::Set(bits, 0xbf58476d1ce4e5b9));
-    z = hn::Mul(hn::Xor(z, hn::ShiftRight<27>(z)), hn::Set(bits, 0x94d049bb133111eb));
+    z = hn::Xor(z, hn::ShiftRight<30>(z)) * hn::Set(bits, 0xbf58476d1ce4e5b9);
+    z = hn::Xor(z, hn::ShiftRight<27>(z)) * hn::Set(bits, 0x94d049bb133111eb);
     return hn::Xor(z, hn::ShiftRight<31>(z));
   }
 

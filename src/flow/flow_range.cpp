@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/flow/flow_range.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/flow_range.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.

@@ -24,7 +24,7 @@ class ProductSum {
   // Not defaulted: GCC 12 compiles a defaulted constructor without the target's instructions.
   ProductSum() : low_(hn::Zero(Lanes())), high_(hn::Zero(Lanes())) {}
   void add(Factor a, Factor b) { low_ = hn::ReorderWidenMulAccumulate(Lanes(), a, b, low_, high_); }
-  hn::Vec<Lanes> lanes() const { return hn::Add(low_, high_); }
+  hn::Vec<Lanes> lanes() const { return low_ + high_; }
 
  private:
   hn::Vec<Lanes> low_;
@@ -37,13 +37,12 @@ template <class Lanes, class Value = hn::Vec<Lanes>>
 HWY_INLINE Value add_lanes(Lanes lanes, Value sum0, Value sum1, Value sum2, Value sum3) {
   const hn::Repartition<std::int64_t, Lanes> pairs;
   const auto add_pairs = [&](Value a, Value b) {
-    return hn::BitCast(pairs,
-                       hn::Add(hn::InterleaveLower(lanes, a, b), hn::InterleaveUpper(lanes, a, b)));
+    return hn::BitCast(pairs, hn::InterleaveLower(lanes, a, b) + hn::InterleaveUpper(lanes, a, b));
   };
   const auto low = add_pairs(sum0, sum1);
   const auto high = add_pairs(sum2, sum3);
-  return hn::Add(hn::BitCast(lanes, hn::InterleaveLower(pairs, low, high)),
-                 hn::BitCast(lanes, hn::InterleaveUpper(pairs, low, high)));
+  return hn::BitCast(lanes, hn::InterleaveLower(pairs, low, high)) +
+         hn::BitCast(lanes, hn::InterleaveUpper(pairs, low, high));
 }
 #endif
 

@@ -6,7 +6,6 @@
 
 #include "src/flow/scratch.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/resampling.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -21,7 +20,7 @@ using Words = hn::Rebind<std::int32_t, Floats>;
 using Vector = hn::Vec<Floats>;
 
 Vector between(Vector a, Vector b, Vector weight) {
-  return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
+  return a + weight * (b - a);
 }
 
 void resample_floats(const float* row, const Resampling& resampling, float* out) {
@@ -48,15 +47,13 @@ void resample_flows(const Flow* row, const Resampling& resampling, int begin, in
     const auto index = hn::ShiftLeft<1>(hn::LoadU(Words(), first));
     const auto weight = hn::LoadU(floats, resampling.weight() + x);
     const auto blend = [&](const auto& at) {
-      hn::StoreInterleaved2(hn::Mul(between(at(0), at(2), weight), times),
-                            hn::Mul(between(at(1), at(3), weight), times), floats, &out[x].x);
+      hn::StoreInterleaved2(between(at(0), at(2), weight) * times,
+                            between(at(1), at(3), weight) * times, floats, &out[x].x);
     };
     if (right - left <= 2 * lanes) {  // the usual case: the row becomes twice as long
       const auto low = hn::LoadU(floats, values + left);
       const auto high = hn::LoadU(floats, values + left + lanes);
-      blend([&](int i) {
-        return Lookup<Floats>(hn::Sub(index, hn::Set(Words(), left - i)))(low, high);
-      });
+      blend([&](int i) { return Lookup<Floats>(index - hn::Set(Words(), left - i))(low, high); });
     } else {
       blend([&](int i) { return hn::GatherIndex(floats, values + i, index); });
     }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/render/accumulator.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/render/accumulator.cpp"
 #include <hwy/foreach_target.h>
 // Must come after foreach_target.h.
@@ -61,7 +60,7 @@ class RowPainter {
   void draw_vector(Vector which, std::uint8_t* fired, std::uint8_t* out) const {
     const Bytes pixels;
     const auto zero = hn::Zero(pixels);
-    if (hn::AllTrue(pixels, hn::Eq(which, zero))) {
+    if (hn::AllTrue(pixels, which == zero)) {
       const auto lanes = hn::Lanes(pixels);
       for (std::size_t i = 0; i < bytes; ++i)
         hn::StoreU(hn::Load(pixels, silent_ + i * lanes), pixels, out + i * lanes);

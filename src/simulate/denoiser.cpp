@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/simulate/denoiser.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/denoiser.cpp"
 #include <hwy/foreach_target.h>
 // Must come after HWY_TARGET_INCLUDE.
@@ -33,14 +32,14 @@ void denoise_row(const Pixel* above, const Pixel* here, const Pixel* below, int 
     };
     const auto centre = load(here, x);
     const auto difference = [&](const Pixel* row, int at) {
-      return hn::Min(hn::Max(hn::Sub(load(row, at), centre), min), max);
+      return hn::Min(hn::Max(load(row, at) - centre, min), max);
     };
-    const auto corners = hn::Add(hn::Add(difference(above, x - 1), difference(above, x + 1)),
-                                 hn::Add(difference(below, x - 1), difference(below, x + 1)));
-    const auto sides = hn::Add(hn::Add(difference(above, x), difference(below, x)),
-                               hn::Add(difference(here, x - 1), difference(here, x + 1)));
-    const auto sum = hn::Add(hn::Add(corners, hn::Add(sides, sides)), hn::Set(wide, 8));
-    hn::StoreU(hn::DemoteTo(pixels, hn::Add(centre, hn::ShiftRight<4>(sum))), pixels, out + x);
+    const auto corners = difference(above, x - 1) + difference(above, x + 1) +
+                         (difference(below, x - 1) + difference(below, x + 1));
+    const auto sides = difference(above, x) + difference(below, x) +
+                       (difference(here, x - 1) + difference(here, x + 1));
+    const auto sum = corners + (sides + sides) + hn::Set(wide, 8);
+    hn::StoreU(hn::DemoteTo(pixels, centre + hn::ShiftRight<4>(sum)), pixels, out + x);
   };
   const auto one = [&](int x) {
     const int left = std::max(x - 1, 0);

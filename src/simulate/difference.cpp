@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/difference.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -37,9 +36,9 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, const Thr
     // Excess over the threshold.
     const auto rise = hn::SaturatedSub(hn::SaturatedSub(b, a), positive);
     const auto fall = hn::SaturatedSub(hn::SaturatedSub(a, b), negative);
-    const auto fired = hn::Ne(hn::Or(rise, fall), zero);
+    const auto fired = hn::Or(rise, fall) != zero;
     if (hn::AllFalse(pixels, fired)) return;
-    out.add(x, y, bits_of(pixels, fired), bits_of(pixels, hn::Ne(rise, zero)));
+    out.add(x, y, bits_of(pixels, fired), bits_of(pixels, rise != zero));
   };
   // Most of a frame does not change: several vectors are skipped at once.
   constexpr int at_once = 4;
@@ -51,7 +50,7 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, const Thr
       const auto b = hn::LoadU(pixels, now + x + std::ptrdiff_t{i} * lanes);
       largest = hn::Max(largest, hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a)));
     }
-    return hn::AllTrue(pixels, hn::Eq(hn::SaturatedSub(largest, smaller), zero));
+    return hn::AllTrue(pixels, hn::SaturatedSub(largest, smaller) == zero);
   };
   int x = 0;
   while (x + lanes <= width) {
@@ -90,8 +89,8 @@ void fire_words(Strength* strengths, std::uint8_t* touched, int words, int y, Fi
     std::uint64_t on = 0;
     for (int i = 0; i < 64; i += lanes) {
       const auto strength = hn::LoadU(pixels, first + i);
-      fired |= bits_of(pixels, hn::Ne(strength, zero)) << i;
-      on |= bits_of(pixels, hn::Ne(hn::And(strength, one), zero)) << i;
+      fired |= bits_of(pixels, strength != zero) << i;
+      on |= bits_of(pixels, hn::And(strength, one) != zero) << i;
       hn::StoreU(zero, pixels, first + i);
     }
     out.add(64 * word, y, fired, on);
@@ -117,7 +116,7 @@ ChangedColumns changed(const Pixel* before, const Pixel* now, int width, int thr
     const auto a = hn::LoadU(pixels, before + x);
     const auto b = hn::LoadU(pixels, now + x);
     const auto difference = hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a));
-    return hn::AllTrue(pixels, hn::Eq(hn::SaturatedSub(difference, limit), hn::Zero(pixels)));
+    return hn::AllTrue(pixels, hn::SaturatedSub(difference, limit) == hn::Zero(pixels));
   };
   const auto one = [&](int x) { return std::abs(now[x] - before[x]) > threshold; };
   int first = 0;

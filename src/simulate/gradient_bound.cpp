@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/gradient_bound.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.

@@ -23,7 +23,6 @@ void begin_steps(const InterpolatedInterval<Pixel>& interval, int band, StepBuck
 }  // namespace eventcamera
 #endif
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/interpolation.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -54,8 +53,8 @@ struct SamplePlaces {
     const auto zero = hn::Zero(Words());
     const auto half = hn::Set(Words(), 512);
     const auto low_bits = hn::Set(Words(), 63);
-    const auto qx = hn::Min(hn::Max(hn::ShiftRight<10>(hn::Add(x, half)), zero), right_end);
-    const auto qy = hn::Min(hn::Max(hn::ShiftRight<10>(hn::Add(y, half)), zero), lower_end);
+    const auto qx = hn::Min(hn::Max(hn::ShiftRight<10>(x + half), zero), right_end);
+    const auto qy = hn::Min(hn::Max(hn::ShiftRight<10>(y + half), zero), lower_end);
     x0 = hn::ShiftRight<6>(qx);
     y0 = hn::ShiftRight<6>(qy);
     right = hn::And(qx, low_bits);
@@ -76,10 +75,10 @@ class Sampler {
   /// Positions in 1/65536 of a pixel; samples in 1/4096 of a grey level.
   Vector at(Vector x, Vector y) const {
     const SamplePlaces at(x, y, right_end_, lower_end_);
-    const auto y1 = hn::Min(hn::Add(at.y0, hn::Set(Words(), 1)), last_row_);
-    const auto upper = between(hn::Add(hn::Mul(at.y0, stride_), at.x0), at.right);
-    const auto lower = between(hn::Add(hn::Mul(y1, stride_), at.x0), at.right);
-    return hn::Add(hn::ShiftLeft<6>(upper), hn::Mul(hn::Sub(lower, upper), at.down));
+    const auto y1 = hn::Min(at.y0 + hn::Set(Words(), 1), last_row_);
+    const auto upper = between(at.y0 * stride_ + at.x0, at.right);
+    const auto lower = between(y1 * stride_ + at.x0, at.right);
+    return hn::ShiftLeft<6>(upper) + (lower - upper) * at.down;
   }
 
  private:
@@ -90,7 +89,7 @@ class Sampler {
     const auto pixels = hn::GatherOffset(Words(), pixels_, offset);
     const auto a = hn::And(pixels, byte);
     const auto b = hn::And(hn::ShiftRight<8>(pixels), byte);
-    return hn::Add(hn::ShiftLeft<6>(a), hn::Mul(hn::Sub(b, a), right));
+    return hn::ShiftLeft<6>(a) + (b - a) * right;
   }
 
   const std::int32_t* pixels_;
@@ -113,17 +112,16 @@ class PairSampler {
 
   Vector at(Vector x, Vector y) const {
     const SamplePlaces at(x, y, right_end_, lower_end_);
-    const auto offset = hn::Add(hn::Mul(at.y0, stride_), hn::Add(at.x0, at.x0));
+    const auto offset = at.y0 * stride_ + (at.x0 + at.x0);
     const auto pairs = hn::GatherOffset(Words(), pairs_, offset);
     // Left and right column in 16 bits each, which no sum exceeds.
     const auto bytes = hn::Set(Words(), 0x00FF00FF);
     const auto upper = hn::And(pairs, bytes);
     const auto lower = hn::And(hn::ShiftRight<8>(pairs), bytes);
-    const auto columns =
-        hn::Add(hn::Mul(upper, hn::Sub(hn::Set(Words(), 64), at.down)), hn::Mul(lower, at.down));
+    const auto columns = upper * (hn::Set(Words(), 64) - at.down) + lower * at.down;
     const auto left = hn::And(columns, hn::Set(Words(), 0xFFFF));
     const auto right = hn::ShiftRight<16>(columns);
-    return hn::Add(hn::ShiftLeft<6>(left), hn::Mul(hn::Sub(right, left), at.right));
+    return hn::ShiftLeft<6>(left) + (right - left) * at.right;
   }
 
  private:
@@ -159,7 +157,7 @@ struct MovingPixels {
   /// Samples of `next` at the positions reached in `left` steps.
   Vector ahead(const Sampler& next, int left) const {
     const auto steps = hn::Set(Words(), left);
-    return next.at(hn::Add(x, hn::Mul(steps, dx)), hn::Add(y, hn::Mul(steps, dy)));
+    return next.at(x + steps * dx, y + steps * dy);
   }
 
  private:
@@ -167,16 +165,14 @@ struct MovingPixels {
     const auto limit = hn::Set(Floats(), static_cast<float>(max_side));
     const auto number = hn::IfThenElseZero(hn::Eq(flow, flow), flow);
     const auto clamped = hn::Min(hn::Max(number, hn::Neg(limit)), limit);
-    return hn::NearestInt(
-        hn::Mul(clamped, hn::Set(Floats(), 65536.0F / static_cast<float>(steps))));
+    return hn::NearestInt(clamped * hn::Set(Floats(), 65536.0F / static_cast<float>(steps)));
   }
 };
 
 /// Blends two samples at step j, in 1/2^20 of a grey level.
 Vector blend(Vector earlier, Vector later, int j, int steps) {
   const int weight = blend_weight(j, steps);
-  return hn::Add(hn::Mul(earlier, hn::Set(Words(), 256 - weight)),
-                 hn::Mul(later, hn::Set(Words(), weight)));
+  return earlier * hn::Set(Words(), 256 - weight) + later * hn::Set(Words(), weight);
 }
 
 /// Steps sampled in one go before their differences are thresholded.
@@ -221,9 +217,9 @@ void fire_row(const InterpolatedInterval<std::uint8_t>& interval, const LastSamp
   for (int x = 0; x < width; x += lanes) {
     const auto within = hn::FirstN(words, static_cast<std::size_t>(std::min(lanes, width - x)));
     const auto fire = [&](Vector before, Vector after, int j) {
-      const auto difference = hn::Sub(after, before);
-      const auto on = hn::Gt(difference, positive);
-      const auto fired = hn::And(hn::Or(on, hn::Gt(hn::Neg(difference), negative)), within);
+      const auto difference = after - before;
+      const auto on = difference > positive;
+      const auto fired = hn::And(hn::Or(on, hn::Neg(difference) > negative), within);
       if (hn::AllFalse(words, fired)) return;
       events.pixels(j, band).add(x, y, bits_of(words, fired), bits_of(words, on));
     };
@@ -236,17 +232,17 @@ void fire_row(const InterpolatedInterval<std::uint8_t>& interval, const LastSamp
       continue;
     }
     const MovingPixels pixels(interval.flow, x, y, steps);
-    auto from_x = hn::Sub(pixels.x, hn::Mul(pixels.dx, hn::Set(words, first - 1)));
-    auto from_y = hn::Sub(pixels.y, hn::Mul(pixels.dy, hn::Set(words, first - 1)));
+    auto from_x = pixels.x - pixels.dx * hn::Set(words, first - 1);
+    auto from_y = pixels.y - pixels.dy * hn::Set(words, first - 1);
     const auto value_at = [&](int j) {
-      from_x = hn::Sub(from_x, pixels.dx);
-      from_y = hn::Sub(from_y, pixels.dy);
+      from_x = from_x - pixels.dx;
+      from_y = from_y - pixels.dy;
       const auto earlier = last.at(from_x, from_y);
       if constexpr (interpolation == Interpolation::forward) {
-        return hn::ShiftRight<12>(hn::Add(earlier, hn::Set(words, 2048)));
+        return hn::ShiftRight<12>(earlier + hn::Set(words, 2048));
       } else {
         const auto sum = blend(earlier, pixels.ahead(now, steps - j), j, steps);
-        return hn::ShiftRight<20>(hn::Add(sum, hn::Set(words, 1 << 19)));
+        return hn::ShiftRight<20>(sum + hn::Set(words, 1 << 19));
       }
     };
     if (first > 1) {

@@ -8,7 +8,6 @@
 
 #include "src/flow/scratch.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/dis/densification.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -54,9 +53,7 @@ HWY_INLINE void add_patch(const Image<std::uint8_t>& from, const Image<std::uint
   const auto load = [&](const std::uint8_t* pixels) {
     return hn::ConvertTo(floats, hn::PromoteTo(ints, hn::LoadU(bytes, pixels)));
   };
-  const auto between = [](auto a, auto b, auto weight) {
-    return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
-  };
+  const auto between = [](auto a, auto b, auto weight) { return a + weight * (b - a); };
   for (int k = 0; k < width; k += lanes) {
     const auto along = [&](int row) {
       const std::uint8_t* pixels = to.row(row - y + top) + left + k;
@@ -67,14 +64,14 @@ HWY_INLINE void add_patch(const Image<std::uint8_t>& from, const Image<std::uint
       const auto below = along(row + 1);
       const auto there = between(above, below, down);
       above = below;
-      const auto difference = hn::Abs(hn::Sub(there, load(from.row(row) + x + k)));
-      const auto weight = hn::Div(one, hn::Max(one, difference));
+      const auto difference = hn::Abs(there - load(from.row(row) + x + k));
+      const auto weight = one / hn::Max(one, difference);
       const SumRow sums = sums_of(row);
       const auto add = [&](float* sum, auto value) {
-        hn::StoreU(hn::Add(hn::LoadU(floats, sum + x + k), value), floats, sum + x + k);
+        hn::StoreU(hn::LoadU(floats, sum + x + k) + value, floats, sum + x + k);
       };
-      add(sums.x, hn::Mul(weight, flow_x));
-      add(sums.y, hn::Mul(weight, flow_y));
+      add(sums.x, weight * flow_x);
+      add(sums.y, weight * flow_y);
       add(sums.weight, weight);
     }
   }
@@ -95,8 +92,8 @@ void divide_row(const SumRow& sums, int y, SplitPlane& flow_x, SplitPlane& flow_
     load(sums.y, y_);
     load(sums.weight, weight);
     for (int parity = 0; parity < 2; ++parity) {
-      hn::StoreU(hn::Div(x[parity], weight[parity]), floats, flow_x.row(parity, y) + k);
-      hn::StoreU(hn::Div(y_[parity], weight[parity]), floats, flow_y.row(parity, y) + k);
+      hn::StoreU(x[parity] / weight[parity], floats, flow_x.row(parity, y) + k);
+      hn::StoreU(y_[parity] / weight[parity], floats, flow_y.row(parity, y) + k);
     }
   }
   flow_x.replicate_ends(y);

@@ -9,7 +9,6 @@
 
 #include "src/flow/scratch.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/dis/inverse_search.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -40,7 +39,7 @@ template <class Sum>
 HWY_INLINE hn::Vec<Quarters> quarters(Sum sum) {
 #if HWY_TARGET != HWY_SCALAR
   if constexpr (hn::MaxLanes(hn::DFromV<Sum>()) > hn::MaxLanes(Quarters()))
-    return hn::Add(hn::LowerHalf(Quarters(), sum), hn::UpperHalf(Quarters(), sum));
+    return hn::LowerHalf(Quarters(), sum) + hn::UpperHalf(Quarters(), sum);
   else
 #endif
     return sum;
@@ -122,8 +121,7 @@ class Search {
     move_to(flow_x_, flow_y_);
     read_moved<Sums::error>();
     for (int i = 0; i < count_; i += lanes)
-      hn::Store(hn::Sub(hn::Mul(hn::Set(floats, better_share), Cell(*this, i).error()),
-                        hn::Set(floats, better_by)),
+      hn::Store(hn::Set(floats, better_share) * Cell(*this, i).error() - hn::Set(floats, better_by),
                 floats, previous_ + i);
     const int first = left_ / stride_;
     for (int y = std::max(row - 1, 0); y <= std::min(row + 1, found.height() - 1); ++y) {
@@ -140,7 +138,7 @@ class Search {
         read_moved<Sums::error>();
         for (int i = 0; i < count_; i += lanes) {
           const auto error = Cell(*this, i).error();
-          const auto is_better = hn::Lt(error, hn::Load(floats, previous_ + i));
+          const auto is_better = error < hn::Load(floats, previous_ + i);
           hn::BlendedStore(error, is_better, floats, previous_ + i);
           hn::BlendedStore(hn::Load(floats, flow_x + i), is_better, floats, flow_x_ + i);
           hn::BlendedStore(hn::Load(floats, flow_y + i), is_better, floats, flow_y_ + i);
@@ -166,7 +164,7 @@ class Search {
       read_moved<Sums::error_and_step>();
       bool any = false;
       for (int i = 0; i < count_; i += lanes) {
-        const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
+        const auto active = hn::Load(floats, active_ + i) != hn::Zero(floats);
         if (hn::AllFalse(floats, active)) continue;
         any = true;
         descend(i, active);
@@ -266,10 +264,10 @@ class Search {
     WordSum d23;
     for (int first = 0; first < side * side; first += vector_size) {
       const auto here = load_words(from_, x, top_, first);
-      const auto d0 = hn::Sub(load_words(to_, to_x, to_y, first), here);
-      const auto d1 = hn::Sub(load_words(to_, to_x + 1, to_y, first), here);
-      const auto d2 = hn::Sub(load_words(to_, to_x, to_y + 1, first), here);
-      const auto d3 = hn::Sub(load_words(to_, to_x + 1, to_y + 1, first), here);
+      const auto d0 = load_words(to_, to_x, to_y, first) - here;
+      const auto d1 = load_words(to_, to_x + 1, to_y, first) - here;
+      const auto d2 = load_words(to_, to_x, to_y + 1, first) - here;
+      const auto d3 = load_words(to_, to_x + 1, to_y + 1, first) - here;
       c0.add(d0);
       c1.add(d1);
       c2.add(d2);
@@ -310,17 +308,16 @@ class Search {
       return hn::Min(hn::Max(place, hn::Set(floats, float{1 - side})),
                      hn::Set(floats, static_cast<float>(size - 1)));
     };
-    const auto x = clamped(hn::Add(hn::Load(floats, left_of_ + i), flow_x), to_.width());
-    const auto y =
-        clamped(hn::Add(hn::Set(floats, static_cast<float>(top_)), flow_y), to_.height());
+    const auto x = clamped(hn::Load(floats, left_of_ + i) + flow_x, to_.width());
+    const auto y = clamped(hn::Set(floats, static_cast<float>(top_)) + flow_y, to_.height());
     const auto cell_x = hn::Floor(x);
     const auto cell_y = hn::Floor(y);
-    const auto moved = hn::And(active, hn::Or(hn::Ne(cell_x, hn::Load(floats, cell_x_ + i)),
-                                              hn::Ne(cell_y, hn::Load(floats, cell_y_ + i))));
+    const auto moved = hn::And(active, hn::Or(cell_x != hn::Load(floats, cell_x_ + i),
+                                              cell_y != hn::Load(floats, cell_y_ + i)));
     hn::Store(cell_x, floats, cell_x_ + i);
     hn::Store(cell_y, floats, cell_y_ + i);
-    hn::Store(hn::Sub(x, cell_x), floats, right_ + i);
-    hn::Store(hn::Sub(y, cell_y), floats, down_ + i);
+    hn::Store(x - cell_x, floats, right_ + i);
+    hn::Store(y - cell_y, floats, down_ + i);
     hn::Store(hn::IfThenElseZero(active, hn::Set(floats, 1.0F)), floats, active_ + i);
     std::uint8_t bytes[8] = {};
     hn::StoreMaskBits(floats, moved, bytes);
@@ -333,8 +330,8 @@ class Search {
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
     for (int i = 0; i < count_; i += lanes)
-      locate(i, hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats)),
-             hn::Load(floats, flow_x + i), hn::Load(floats, flow_y + i));
+      locate(i, hn::Load(floats, active_ + i) != hn::Zero(floats), hn::Load(floats, flow_x + i),
+             hn::Load(floats, flow_y + i));
   }
 
   /// Reads the cells that patches entered.
@@ -351,42 +348,38 @@ class Search {
       const auto one = hn::Set(Floats(), 1.0F);
       const auto right = load(search.right_);
       const auto down = load(search.down_);
-      const auto left = hn::Sub(one, right);
-      const auto up = hn::Sub(one, down);
-      w0_ = hn::Mul(up, left);
-      w1_ = hn::Mul(up, right);
-      w2_ = hn::Mul(down, left);
-      w3_ = hn::Mul(down, right);
+      const auto left = one - right;
+      const auto up = one - down;
+      w0_ = up * left;
+      w1_ = up * right;
+      w2_ = down * left;
+      w3_ = down * right;
       all_ = weighted(sum);
     }
 
     /// The sum of the differences times a gradient, less its mean.
     HWY_INLINE Vector along(int k, const float* mean) const {
-      return hn::Sub(weighted(k), hn::Mul(all_, load(mean)));
+      return weighted(k) - all_ * load(mean);
     }
 
     /// The sum of the squared deviations of the differences from their mean.
     HWY_INLINE Vector error() const {
-      const auto cross0 =
-          hn::Add(hn::Add(hn::Mul(w1_, total(4)), hn::Mul(w2_, total(5))), hn::Mul(w3_, total(6)));
-      const auto cross1 = hn::Add(hn::Mul(w2_, total(7)), hn::Mul(w3_, total(8)));
-      const auto cross2 = hn::Mul(w3_, total(9));
+      const auto cross0 = w1_ * total(4) + w2_ * total(5) + w3_ * total(6);
+      const auto cross1 = w2_ * total(7) + w3_ * total(8);
+      const auto cross2 = w3_ * total(9);
       const auto part = [&](Vector weight, int square, Vector cross) {
-        return hn::Mul(weight, hn::Add(hn::Mul(weight, total(square)),
-                                       hn::Mul(hn::Set(Floats(), 2.0F), cross)));
+        return weight * (weight * total(square) + hn::Set(Floats(), 2.0F) * cross);
       };
-      const auto squares =
-          hn::Add(hn::Add(part(w0_, 0, cross0), part(w1_, 1, cross1)),
-                  hn::Add(part(w2_, 2, cross2), hn::Mul(w3_, hn::Mul(w3_, total(3)))));
-      return hn::Sub(squares, hn::Mul(all_, hn::Mul(all_, hn::Set(Floats(), 1 / pixels))));
+      const auto squares = part(w0_, 0, cross0) + part(w1_, 1, cross1) +
+                           (part(w2_, 2, cross2) + w3_ * (w3_ * total(3)));
+      return squares - all_ * (all_ * hn::Set(Floats(), 1 / pixels));
     }
 
    private:
     HWY_INLINE Vector load(const float* values) const { return hn::Load(Floats(), values + i_); }
     HWY_INLINE Vector total(int k) const { return load(search_.sums_[k]); }
     HWY_INLINE Vector weighted(int k) const {
-      return hn::Add(hn::Add(hn::Mul(w0_, total(k)), hn::Mul(w1_, total(k + 1))),
-                     hn::Add(hn::Mul(w2_, total(k + 2)), hn::Mul(w3_, total(k + 3))));
+      return w0_ * total(k) + w1_ * total(k + 1) + (w2_ * total(k + 2) + w3_ * total(k + 3));
     }
 
     const Search& search_;
@@ -410,15 +403,15 @@ class Search {
     const auto xx = load(inverse_xx_);
     const auto xy = load(inverse_xy_);
     const auto yy = load(inverse_yy_);
-    const auto step_x = hn::Add(hn::Mul(xx, along_x), hn::Mul(xy, along_y));
-    const auto step_y = hn::Add(hn::Mul(xy, along_x), hn::Mul(yy, along_y));
+    const auto step_x = xx * along_x + xy * along_y;
+    const auto step_y = xy * along_x + yy * along_y;
     const auto old_x = load(flow_x_);
     const auto old_y = load(flow_y_);
-    const auto flow_x = hn::IfThenElse(active, hn::Sub(old_x, step_x), old_x);
-    const auto flow_y = hn::IfThenElse(active, hn::Sub(old_y, step_y), old_y);
+    const auto flow_x = hn::IfThenElse(active, old_x - step_x, old_x);
+    const auto flow_y = hn::IfThenElse(active, old_y - step_y, old_y);
     hn::Store(flow_x, floats, flow_x_ + i);
     hn::Store(flow_y, floats, flow_y_ + i);
-    const auto goes_on = hn::And(active, hn::Lt(error, load(previous_)));
+    const auto goes_on = hn::And(active, error < load(previous_));
     hn::Store(error, floats, previous_ + i);
     locate(i, goes_on, flow_x, flow_y);
   }

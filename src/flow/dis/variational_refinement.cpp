@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <utility>
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/dis/variational_refinement.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -46,7 +45,7 @@ HWY_INLINE Vector set(float value) {
   return hn::Set(Floats(), value);
 }
 HWY_INLINE Vector square(Vector value) {
-  return hn::Mul(value, value);
+  return value * value;
 }
 
 /// 1 / sqrt(value) with a relative error below 1e-6: an estimate from the bits of the exponent, and
@@ -55,11 +54,10 @@ HWY_INLINE Vector square(Vector value) {
 HWY_INLINE Vector inverse_sqrt(Vector value) {
   const Ints ints;
   const auto bits = hn::ShiftRight<1>(hn::BitCast(ints, value));
-  auto root = hn::BitCast(Floats(), hn::Sub(hn::Set(ints, 0x5F1FFFF9), bits));
-  root = hn::Mul(hn::Mul(root, set(0.703952253F)),
-                 hn::Sub(set(2.38924456F), hn::Mul(hn::Mul(value, root), root)));
-  const auto half = hn::Mul(value, set(0.5F));
-  return hn::Mul(root, hn::Sub(set(1.5F), hn::Mul(hn::Mul(half, root), root)));
+  auto root = hn::BitCast(Floats(), hn::Set(ints, 0x5F1FFFF9) - bits);
+  root = root * set(0.703952253F) * (set(2.38924456F) - value * root * root);
+  const auto half = value * set(0.5F);
+  return root * (set(1.5F) - half * root * root);
 }
 
 /// The columns to the left of a parity's columns; the columns to the right come next.
@@ -79,8 +77,8 @@ struct Neighbours {
   HWY_INLINE Vector left(int k) const { return load(side + k); }
   HWY_INLINE Vector right(int k) const { return load(side + k + 1); }
   /// Differences between the neighbours of a pixel.
-  HWY_INLINE Vector across(int k) const { return hn::Sub(right(k), left(k)); }
-  HWY_INLINE Vector along(int k) const { return hn::Sub(load(below + k), load(above + k)); }
+  HWY_INLINE Vector across(int k) const { return right(k) - left(k); }
+  HWY_INLINE Vector along(int k) const { return load(below + k) - load(above + k); }
 
   const float* here;
   const float* side;
@@ -111,11 +109,11 @@ class Linearisation {
  private:
   /// Rounds and clamps positions in the later image.
   static HWY_INLINE Vector place(Vector exact, int size) {
-    const auto rounded = hn::Mul(hn::Round(hn::Mul(exact, set(fractions))), set(1 / fractions));
+    const auto rounded = hn::Round(exact * set(fractions)) * set(1 / fractions);
     return hn::Min(hn::Max(rounded, set(0.0F)), set(static_cast<float>(size - 1)));
   }
   static HWY_INLINE Vector between(Vector a, Vector b, Vector weight) {
-    return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
+    return a + weight * (b - a);
   }
   /// The mean of the pixels at offsets and their right neighbours: the two lowest bytes of words.
   static HWY_INLINE Vector along(const std::uint8_t* pixels, hn::Vec<Ints> offsets, Vector weight) {
@@ -138,7 +136,7 @@ class Linearisation {
     const Ints ints;
     const hn::Rebind<std::uint8_t, Floats> bytes;
     const int lanes = static_cast<int>(hn::Lanes(floats));
-    const auto every_second = hn::Mul(iota(floats, 0), set(2.0F));
+    const auto every_second = iota(floats, 0) * set(2.0F);
     const std::uint8_t* here = from_.row(y);
     const auto stride = static_cast<std::int32_t>(to_.stride());
     const std::uint8_t* data = to_.row(0);
@@ -147,21 +145,21 @@ class Linearisation {
     float* mean = scratch_.mean.row(parity, ring(y));
     float* change = scratch_.change.row(parity, ring(y));
     for (int k = 0; k < flow_.x.count(parity); k += lanes) {
-      const auto start = hn::Add(every_second, set(static_cast<float>(2 * k + parity)));
-      const auto to_x = place(hn::Add(start, load(flow_x + k)), to_.width());
-      const auto to_y = place(hn::Add(set(static_cast<float>(y)), load(flow_y + k)), to_.height());
+      const auto start = every_second + set(static_cast<float>(2 * k + parity));
+      const auto to_x = place(start + load(flow_x + k), to_.width());
+      const auto to_y = place(set(static_cast<float>(y)) + load(flow_y + k), to_.height());
       const auto cell_x = hn::Floor(to_x);
       const auto cell_y = hn::Floor(to_y);
-      const auto offsets = hn::Add(hn::Mul(hn::ConvertTo(ints, cell_y), hn::Set(ints, stride)),
-                                   hn::ConvertTo(ints, cell_x));
-      const auto right = hn::Sub(to_x, cell_x);
-      const auto there = between(along(data, offsets, right), along(data + stride, offsets, right),
-                                 hn::Sub(to_y, cell_y));
+      const auto offsets =
+          hn::ConvertTo(ints, cell_y) * hn::Set(ints, stride) + hn::ConvertTo(ints, cell_x);
+      const auto right = to_x - cell_x;
+      const auto there =
+          between(along(data, offsets, right), along(data + stride, offsets, right), to_y - cell_y);
       hn::Vec<decltype(bytes)> columns[2];
       hn::LoadInterleaved2(bytes, here + std::ptrdiff_t{2} * k, columns[0], columns[1]);
       const auto grey = hn::ConvertTo(floats, hn::PromoteTo(ints, columns[parity]));
-      store(hn::Mul(hn::Add(grey, there), set(0.5F)), mean + k);
-      store(hn::Sub(there, grey), change + k);
+      store((grey + there) * set(0.5F), mean + k);
+      store(there - grey, change + k);
     }
   }
 
@@ -199,7 +197,7 @@ void linearise_rows(const Image<std::uint8_t>& from, const Image<std::uint8_t>& 
 
 /// factor / sqrt(squares)
 HWY_INLINE Vector weight(float factor, Vector squares) {
-  return hn::Mul(set(factor), inverse_sqrt(squares));
+  return set(factor) * inverse_sqrt(squares);
 }
 
 /// Computes the equations of every other pixel of a row.
@@ -235,13 +233,9 @@ class Assembly {
  private:
   /// a x + b y + c = 0 for a step (x, y) from the start.
   struct Constraint {
-    HWY_INLINE Vector residual(Vector x, Vector y) const {
-      return hn::Add(hn::Add(c, hn::Mul(a, x)), hn::Mul(b, y));
-    }
+    HWY_INLINE Vector residual(Vector x, Vector y) const { return c + a * x + b * y; }
     /// Square of the gradient.
-    HWY_INLINE Vector norm() const {
-      return hn::Add(hn::Add(square(a), square(b)), set(min_gradient));
-    }
+    HWY_INLINE Vector norm() const { return square(a) + square(b) + set(min_gradient); }
     Vector a;
     Vector b;
     Vector c;
@@ -252,13 +246,13 @@ class Assembly {
     // Not in the declarations: GCC 12 compiles these without the target's instructions.
     HWY_INLINE Equations() : xx(set(min_gradient)), xy(set(0.0F)), yy(xx), x(xy), y(xy) {}
     HWY_INLINE void add(const Constraint& constraint, Vector weight) {
-      const auto a = hn::Mul(weight, constraint.a);
-      const auto b = hn::Mul(weight, constraint.b);
-      xx = hn::Add(xx, hn::Mul(a, constraint.a));
-      xy = hn::Add(xy, hn::Mul(a, constraint.b));
-      yy = hn::Add(yy, hn::Mul(b, constraint.b));
-      x = hn::Sub(x, hn::Mul(a, constraint.c));
-      y = hn::Sub(y, hn::Mul(b, constraint.c));
+      const auto a = weight * constraint.a;
+      const auto b = weight * constraint.b;
+      xx = xx + a * constraint.a;
+      xy = xy + a * constraint.b;
+      yy = yy + b * constraint.b;
+      x = x - a * constraint.c;
+      y = y - b * constraint.c;
     }
     Vector xx;
     Vector xy;
@@ -285,8 +279,8 @@ class Assembly {
   }
 
   HWY_INLINE Terms terms_at(int k) const {
-    const auto x = hn::Sub(load(x_ + k), load(start_x_ + k));
-    const auto y = hn::Sub(load(y_ + k), load(start_y_ + k));
+    const auto x = load(x_ + k) - load(start_x_ + k);
+    const auto y = load(y_ + k) - load(start_y_ + k);
     const auto xy = dx_.along(k);
     const Constraint bright = {load(dx_.here + k), load(dy_.here + k), load(dt_.here + k)};
     const Constraint gradient_x = {dx_.across(k), xy, dt_.across(k)};
@@ -294,28 +288,26 @@ class Assembly {
     const auto norm = bright.norm();
     const auto norm_x = gradient_x.norm();
     const auto norm_y = gradient_y.norm();
-    const auto norms = hn::Mul(norm_x, norm_y);
-    const auto bright_squares =
-        hn::Add(square(bright.residual(x, y)), hn::Mul(norm, set(min_residual)));
-    const auto gradient_squares =
-        hn::Add(hn::Add(hn::Mul(square(gradient_x.residual(x, y)), norm_y),
-                        hn::Mul(square(gradient_y.residual(x, y)), norm_x)),
-                hn::Mul(norms, set(min_residual)));
+    const auto norms = norm_x * norm_y;
+    const auto bright_squares = square(bright.residual(x, y)) + norm * set(min_residual);
+    const auto gradient_squares = square(gradient_x.residual(x, y)) * norm_y +
+                                  square(gradient_y.residual(x, y)) * norm_x +
+                                  norms * set(min_residual);
     return {bright,
             gradient_x,
             gradient_y,
             norm_x,
             norm_y,
-            hn::Mul(norm, bright_squares),
-            hn::Mul(norms, gradient_squares)};
+            norm * bright_squares,
+            norms * gradient_squares};
   }
 
   static HWY_INLINE Equations weighted(const Terms& terms) {
     Equations equations;
     equations.add(terms.bright, weight(brightness, terms.bright_squares));
     const auto both = weight(gradient, terms.gradient_squares);
-    equations.add(terms.gradient_x, hn::Mul(both, terms.norm_y));
-    equations.add(terms.gradient_y, hn::Mul(both, terms.norm_x));
+    equations.add(terms.gradient_x, both * terms.norm_y);
+    equations.add(terms.gradient_y, both * terms.norm_x);
     return equations;
   }
 
@@ -323,19 +315,16 @@ class Assembly {
   HWY_INLINE void solve(const Equations& equations, int k) const {
     const auto start_x = load(start_x_ + k);
     const auto start_y = load(start_y_ + k);
-    const auto all = hn::Add(hn::Add(load(left_ + k), load(right_ + k)),
-                             hn::Add(load(above_ + k), load(below_ + k)));
-    const auto xx = hn::Add(equations.xx, all);
-    const auto yy = hn::Add(equations.yy, all);
-    const auto inverse = hn::Div(set(over_relaxation), hn::Mul(xx, yy));
-    const auto constant_x = hn::Add(
-        equations.x, hn::Add(hn::Mul(equations.xx, start_x), hn::Mul(equations.xy, start_y)));
-    const auto constant_y = hn::Add(
-        equations.y, hn::Add(hn::Mul(equations.xy, start_x), hn::Mul(equations.yy, start_y)));
+    const auto all = load(left_ + k) + load(right_ + k) + (load(above_ + k) + load(below_ + k));
+    const auto xx = equations.xx + all;
+    const auto yy = equations.yy + all;
+    const auto inverse = set(over_relaxation) / (xx * yy);
+    const auto constant_x = equations.x + (equations.xx * start_x + equations.xy * start_y);
+    const auto constant_y = equations.y + (equations.xy * start_x + equations.yy * start_y);
     float* to = out_ + EquationRows::offset_of(k);
     store(equations.xy, to + VariationalRefinement::cross * EquationRows::block);
-    store(hn::Mul(yy, inverse), to + VariationalRefinement::inverse_x * EquationRows::block);
-    store(hn::Mul(xx, inverse), to + VariationalRefinement::inverse_y * EquationRows::block);
+    store(yy * inverse, to + VariationalRefinement::inverse_x * EquationRows::block);
+    store(xx * inverse, to + VariationalRefinement::inverse_y * EquationRows::block);
     store(constant_x, to + VariationalRefinement::constant_x * EquationRows::block);
     store(constant_y, to + VariationalRefinement::constant_y * EquationRows::block);
   }
@@ -409,8 +398,8 @@ class Relaxation {
       float* weights = scratch_.weight.row(parity, to);
       float* right = scratch_.right.row(parity, y & 1);
       for (int k = 0; k < flow_.x.count(parity); k += lanes) {
-        const auto squared = hn::Add(squares(x, k), squares(y_, k));
-        const auto by = weight(smoothness, hn::Add(squared, set(min_residual)));
+        const auto squared = squares(x, k) + squares(y_, k);
+        const auto by = weight(smoothness, squared + set(min_residual));
         store(load(x.here + k), x_row + k);
         store(load(y_.here + k), y_row + k);
         store(by, weights + k);
@@ -430,8 +419,7 @@ class Relaxation {
   /// Squares of the differences from the neighbours to the right and below.
   static HWY_INLINE Vector squares(const Neighbours& flow, int k) {
     const auto value = load(flow.here + k);
-    return hn::Add(square(hn::Sub(flow.right(k), value)),
-                   square(hn::Sub(load(flow.below + k), value)));
+    return square(flow.right(k) - value) + square(load(flow.below + k) - value);
   }
 
   /// Every other pixel of the rows, from the first column on; all these planes share the offset of
@@ -472,21 +460,20 @@ class Relaxation {
       // Adds the row below last, because it has just been computed.
       const auto pull = [&](const float* beside, Vector above_flow, Vector constant,
                             Vector below_flow) HWY_ATTR {
-        const auto along = hn::Add(hn::Mul(left, load(beside)), hn::Mul(weight_, load(beside + 1)));
-        const auto sum = hn::Add(hn::Add(along, constant), hn::Mul(up, above_flow));
-        return hn::Add(sum, hn::Mul(weight_, below_flow));
+        const auto along = left * load(beside) + weight_ * load(beside + 1);
+        const auto sum = along + constant + up * above_flow;
+        return sum + weight_ * below_flow;
       };
       const auto cross = coefficient(VariationalRefinement::cross);
       const auto keep = set(1 - over_relaxation);
-      const auto pull_x = pull(
-          pixels.x + left_row, above_x,
-          hn::Sub(coefficient(VariationalRefinement::constant_x), hn::Mul(cross, y_)), below_x_);
+      const auto pull_x =
+          pull(pixels.x + left_row, above_x,
+               coefficient(VariationalRefinement::constant_x) - cross * y_, below_x_);
       const auto pull_y = pull(pixels.y + left_row, above_y,
                                coefficient(VariationalRefinement::constant_y), below_y_);
-      below_x_ = hn::Add(hn::Mul(keep, x_),
-                         hn::Mul(pull_x, coefficient(VariationalRefinement::inverse_x)));
-      below_y_ = hn::Add(hn::Mul(keep, y_), hn::Mul(hn::Sub(pull_y, hn::Mul(cross, below_x_)),
-                                                    coefficient(VariationalRefinement::inverse_y)));
+      below_x_ = keep * x_ + pull_x * coefficient(VariationalRefinement::inverse_x);
+      below_y_ =
+          keep * y_ + (pull_y - cross * below_x_) * coefficient(VariationalRefinement::inverse_y);
       store(below_x_, pixels.x + row);
       store(below_y_, pixels.y + row);
       x_ = above_x;

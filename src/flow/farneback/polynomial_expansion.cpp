@@ -6,7 +6,6 @@
 
 #include "src/flow/scratch.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/farneback/polynomial_expansion.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -27,16 +26,16 @@ void fit_columns(const PolynomialExpansion::Window& window, int width, const Fit
   const int lanes = static_cast<int>(hn::Lanes(floats));
   for (int x = 0; x < width; x += lanes) {
     const auto middle = hn::LoadU(floats, window[reach] + x);
-    auto sum0 = hn::Mul(hn::Set(floats, kernels.smooth[0]), middle);
+    auto sum0 = hn::Set(floats, kernels.smooth[0]) * middle;
     auto sum1 = hn::Zero(floats);
-    auto sum2 = hn::Mul(hn::Set(floats, kernels.bend[0]), middle);
+    auto sum2 = hn::Set(floats, kernels.bend[0]) * middle;
     for (int k = 1; k <= reach; ++k) {
       const auto above = hn::LoadU(floats, window[reach - k] + x);
       const auto below = hn::LoadU(floats, window[reach + k] + x);
-      const auto both = hn::Add(above, below);
-      sum0 = hn::Add(sum0, hn::Mul(hn::Set(floats, kernels.smooth[k]), both));
-      sum1 = hn::Add(sum1, hn::Mul(hn::Set(floats, kernels.slope[k]), hn::Sub(below, above)));
-      sum2 = hn::Add(sum2, hn::Mul(hn::Set(floats, kernels.bend[k]), both));
+      const auto both = above + below;
+      sum0 = sum0 + hn::Set(floats, kernels.smooth[k]) * both;
+      sum1 = sum1 + hn::Set(floats, kernels.slope[k]) * (below - above);
+      sum2 = sum2 + hn::Set(floats, kernels.bend[k]) * both;
     }
     hn::StoreU(sum0, floats, smooth + x);
     hn::StoreU(sum1, floats, slope + x);
@@ -51,10 +50,10 @@ void fit_row(const float* smooth, const float* slope, const float* bend, int wid
   for (int x = 0; x < width; x += lanes) {
     const auto set = [&](float value) { return hn::Set(floats, value); };
     const auto at = [&](const float* row, int k) { return hn::LoadU(floats, row + x + k); };
-    auto b_y = hn::Mul(set(kernels.smooth[0]), at(slope, 0));
+    auto b_y = set(kernels.smooth[0]) * at(slope, 0);
     auto b_x = hn::Zero(floats);
-    auto a_yy = hn::Mul(set(kernels.smooth[0]), at(bend, 0));
-    auto a_xx = hn::Mul(set(kernels.bend[0]), at(smooth, 0));
+    auto a_yy = set(kernels.smooth[0]) * at(bend, 0);
+    auto a_xx = set(kernels.bend[0]) * at(smooth, 0);
     auto a_xy = hn::Zero(floats);
     for (int k = 1; k <= reach; ++k) {
       const auto left = at(smooth, -k);
@@ -62,11 +61,11 @@ void fit_row(const float* smooth, const float* slope, const float* bend, int wid
       const auto left_slope = at(slope, -k);
       const auto right_slope = at(slope, k);
       const auto weight = set(kernels.smooth[k]);
-      b_y = hn::Add(b_y, hn::Mul(weight, hn::Add(left_slope, right_slope)));
-      b_x = hn::Add(b_x, hn::Mul(set(kernels.slope[k]), hn::Sub(right, left)));
-      a_yy = hn::Add(a_yy, hn::Mul(weight, hn::Add(at(bend, -k), at(bend, k))));
-      a_xx = hn::Add(a_xx, hn::Mul(set(kernels.bend[k]), hn::Add(left, right)));
-      a_xy = hn::Add(a_xy, hn::Mul(set(kernels.slope[k]), hn::Sub(right_slope, left_slope)));
+      b_y = b_y + weight * (left_slope + right_slope);
+      b_x = b_x + set(kernels.slope[k]) * (right - left);
+      a_yy = a_yy + weight * (at(bend, -k) + at(bend, k));
+      a_xx = a_xx + set(kernels.bend[k]) * (left + right);
+      a_xy = a_xy + set(kernels.slope[k]) * (right_slope - left_slope);
     }
     float* at_x = out + (x / group * group * coefficients + x % group);
     for (const auto& coefficient : {b_y, b_x, a_yy, a_xx, a_xy}) {

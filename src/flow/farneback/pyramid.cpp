@@ -8,7 +8,6 @@
 
 #include "src/flow/scratch.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/farneback/pyramid.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -31,7 +30,7 @@ void add_rows(const std::uint8_t* const* rows, const float* weights, int count, 
     auto sum = hn::Zero(floats);
     for (int t = 0; t < count; ++t) {
       const auto pixels = hn::PromoteTo(Words(), load(rows[t] + x));
-      sum = hn::Add(sum, hn::Mul(hn::Set(floats, weights[t]), hn::ConvertTo(floats, pixels)));
+      sum = sum + hn::Set(floats, weights[t]) * hn::ConvertTo(floats, pixels);
     }
     hn::StoreU(sum, floats, out + x);
   };
@@ -49,10 +48,10 @@ void blur_row(const float* row, const float* kernel, int reach, int width, float
   row += reach;
   kernel += reach;
   for (int x = 0; x < width; x += lanes) {
-    auto sum = hn::Mul(hn::Set(floats, kernel[0]), hn::LoadU(floats, row + x));
+    auto sum = hn::Set(floats, kernel[0]) * hn::LoadU(floats, row + x);
     for (int k = 1; k <= reach; ++k) {
-      const auto both = hn::Add(hn::LoadU(floats, row + x - k), hn::LoadU(floats, row + x + k));
-      sum = hn::Add(sum, hn::Mul(hn::Set(floats, kernel[k]), both));
+      const auto both = hn::LoadU(floats, row + x - k) + hn::LoadU(floats, row + x + k);
+      sum = sum + hn::Set(floats, kernel[k]) * both;
     }
     hn::StoreU(sum, floats, out + x);
   }

@@ -7,7 +7,6 @@
 #include <limits>
 #include <optional>
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/search.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -49,11 +48,9 @@ constexpr int corners = 4;
 /// Smaller eigenvalue of the mean gradient matrix over a window, from its sums.
 template <class Floats, class Value = hn::Vec<Floats>>
 HWY_INLINE Value min_eigenvalue(Floats floats, Value xx, Value xy, Value yy) {
-  const auto difference = hn::Sub(xx, yy);
-  const auto root = hn::Sqrt(
-      hn::Add(hn::Mul(difference, difference), hn::Mul(hn::Set(floats, 4.0F), hn::Mul(xy, xy))));
-  return hn::Div(hn::Sub(hn::Add(xx, yy), root),
-                 hn::Set(floats, static_cast<float>(2 * Tile::window * Tile::window)));
+  const auto difference = xx - yy;
+  const auto root = hn::Sqrt(difference * difference + hn::Set(floats, 4.0F) * (xy * xy));
+  return (xx + yy - root) / hn::Set(floats, static_cast<float>(2 * Tile::window * Tile::window));
 }
 
 /// Sums over a window of the products of both gradients and the pixels of the other image.
@@ -172,12 +169,12 @@ class SharedSums {
   /// Indices of displacements.
   HWY_INLINE hn::Vec<Ints> index(hn::Vec<Floats> x, hn::Vec<Floats> y) const {
     const Floats floats;
-    const auto column = hn::Sub(x, hn::Set(floats, first_x_));
-    const auto row = hn::Sub(y, hn::Set(floats, first_y_));
+    const auto column = x - hn::Set(floats, first_x_);
+    const auto row = y - hn::Set(floats, first_y_);
     const auto last = hn::Set(floats, side - 1);
-    const auto near = hn::And(hn::And(hn::Ge(column, hn::Zero(floats)), hn::Lt(column, last)),
-                              hn::And(hn::Ge(row, hn::Zero(floats)), hn::Lt(row, last)));
-    const auto at = hn::Add(hn::Mul(row, hn::Set(floats, side)), column);
+    const auto near = hn::And(hn::And(column >= hn::Zero(floats), column < last),
+                              hn::And(row >= hn::Zero(floats), row < last));
+    const auto at = row * hn::Set(floats, side) + column;
     return hn::ConvertTo(Ints(), hn::IfThenElse(near, at, hn::Set(floats, far)));
   }
 
@@ -255,7 +252,7 @@ class SharedSums {
                                      pair_products(slope_y + at, there)};
         },
         [&](int row, int column, const auto& left, const auto& right) {
-          hn::StoreInterleaved2(hn::Add(left[0], right[0]), hn::Add(left[1], right[1]), Pairs(),
+          hn::StoreInterleaved2(left[0] + right[0], left[1] + right[1], Pairs(),
                                 &out[row * Tile::side + column].x);
         });
   }
@@ -294,19 +291,19 @@ class Blocks {
     const int lanes = static_cast<int>(hn::Lanes(floats));
     for (int i = 0; i < count_; i += lanes) {
       const auto scale = hn::Set(floats, slope_product);
-      const auto xx = hn::Mul(hn::Load(floats, xx_ + i), scale);
-      const auto xy = hn::Mul(hn::Load(floats, xy_ + i), scale);
-      const auto yy = hn::Mul(hn::Load(floats, yy_ + i), scale);
-      const auto determinant = hn::Sub(hn::Mul(xx, yy), hn::Mul(xy, xy));
+      const auto xx = hn::Load(floats, xx_ + i) * scale;
+      const auto xy = hn::Load(floats, xy_ + i) * scale;
+      const auto yy = hn::Load(floats, yy_ + i) * scale;
+      const auto determinant = xx * yy - xy * xy;
       const auto followed =
-          hn::And(hn::Ge(min_eigenvalue(floats, xx, xy, yy), hn::Set(floats, min_texture)),
-                  hn::Ge(determinant, hn::Set(floats, std::numeric_limits<float>::epsilon())));
+          hn::And(min_eigenvalue(floats, xx, xy, yy) >= hn::Set(floats, min_texture),
+                  determinant >= hn::Set(floats, std::numeric_limits<float>::epsilon()));
       const auto present =
           hn::FirstN(floats, static_cast<std::size_t>(std::min(lanes, count_ - i)));
       hn::Store(xx, floats, xx_ + i);
       hn::Store(xy, floats, xy_ + i);
       hn::Store(yy, floats, yy_ + i);
-      hn::Store(hn::Div(hn::Set(floats, 1.0F), determinant), floats, inverse_ + i);
+      hn::Store(hn::Set(floats, 1.0F) / determinant, floats, inverse_ + i);
       const auto ones = hn::IfThenElseZero(hn::And(followed, present), hn::Set(floats, 1.0F));
       hn::Store(ones, floats, followed_ + i);
       hn::Store(ones, floats, active_ + i);
@@ -317,14 +314,14 @@ class Blocks {
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
     for (int i = 0; i < count_; i += lanes) {
-      const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
+      const auto active = hn::Load(floats, active_ + i) != hn::Zero(floats);
       locate(i, active, hn::Load(floats, flow_x_ + i), hn::Load(floats, flow_y_ + i));
     }
     for (int round = 0; round < max_moves; ++round) {
       update_sums();
       bool any = false;
       for (int i = 0; i < count_; i += lanes) {
-        const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
+        const auto active = hn::Load(floats, active_ + i) != hn::Zero(floats);
         if (hn::AllFalse(floats, active)) continue;
         any = true;
         move(i, active, round);
@@ -367,8 +364,7 @@ class Blocks {
         [&](int row, int column, const auto& left, const auto& right) {
           const Pairs pairs;
           const int at = row * Tile::side + column;
-          for (std::size_t k = 0; k < xy; ++k)
-            hn::Store(hn::Add(left[k], right[k]), pairs, sums[k] + at);
+          for (std::size_t k = 0; k < xy; ++k) hn::Store(left[k] + right[k], pairs, sums[k] + at);
           hn::Store(left[xy], pairs, sums[xy] + at);
           hn::Store(right[xy], pairs, sums[xy_right] + at);
         });
@@ -468,21 +464,21 @@ class Blocks {
     const Floats floats;
     const auto cell_x = hn::Floor(flow_x);
     const auto cell_y = hn::Floor(flow_y);
-    const auto x = hn::Add(cell_x, hn::Load(floats, left_ + i));
-    const auto y = hn::Add(cell_y, hn::Load(floats, top_ + i));
+    const auto x = cell_x + hn::Load(floats, left_ + i);
+    const auto y = cell_y + hn::Load(floats, top_ + i);
     const auto min = hn::Set(floats, -static_cast<float>(Tile::window));
-    const auto inside = hn::And(
-        hn::And(hn::Ge(x, min), hn::Lt(x, hn::Set(floats, static_cast<float>(to_.width())))),
-        hn::And(hn::Ge(y, min), hn::Lt(y, hn::Set(floats, static_cast<float>(to_.height())))));
+    const auto inside =
+        hn::And(hn::And(x >= min, x < hn::Set(floats, static_cast<float>(to_.width()))),
+                hn::And(y >= min, y < hn::Set(floats, static_cast<float>(to_.height()))));
     active = hn::And(active, inside);
     const Ints ints;
     const auto stride = hn::Set(ints, static_cast<std::int32_t>(to_.stride()));
     const auto row = hn::ConvertTo(ints, hn::IfThenElseZero(inside, y));
     const auto column = hn::ConvertTo(ints, hn::IfThenElseZero(inside, x));
-    hn::Store(hn::Add(hn::Mul(row, stride), column), ints, at_ + i);
+    hn::Store(row * stride + column, ints, at_ + i);
     if (shared_) hn::Store(shared_->index(cell_x, cell_y), ints, displacement_ + i);
-    const auto moved = hn::And(active, hn::Or(hn::Ne(cell_x, hn::Load(floats, cell_x_ + i)),
-                                              hn::Ne(cell_y, hn::Load(floats, cell_y_ + i))));
+    const auto moved = hn::And(active, hn::Or(cell_x != hn::Load(floats, cell_x_ + i),
+                                              cell_y != hn::Load(floats, cell_y_ + i)));
     hn::Store(cell_x, floats, cell_x_ + i);
     hn::Store(cell_y, floats, cell_y_ + i);
     hn::Store(hn::IfThenElseZero(active, hn::Set(floats, 1.0F)), floats, active_ + i);
@@ -499,8 +495,8 @@ class Blocks {
     const Ints ints;
     const auto flow_x = hn::Load(floats, flow_x_ + i);
     const auto flow_y = hn::Load(floats, flow_y_ + i);
-    const auto beyond_x = hn::Sub(flow_x, hn::Load(floats, cell_x_ + i));
-    const auto beyond_y = hn::Sub(flow_y, hn::Load(floats, cell_y_ + i));
+    const auto beyond_x = flow_x - hn::Load(floats, cell_x_ + i);
+    const auto beyond_y = flow_y - hn::Load(floats, cell_y_ + i);
     // Sums of gradient * (there - here).
     hn::Vec<Floats> mismatch_x[corners];
     hn::Vec<Floats> mismatch_y[corners];
@@ -509,18 +505,15 @@ class Blocks {
       hn::Vec<Ints> there_y;
       hn::LoadInterleaved2(ints, &there_[c][i].x, there_x, there_y);
       const auto subtract = [&](auto there, const std::int32_t* here) {
-        return hn::ConvertTo(floats, hn::Sub(there, hn::Load(ints, here + i)));
+        return hn::ConvertTo(floats, there - hn::Load(ints, here + i));
       };
       mismatch_x[c] = subtract(there_x, here_x_);
       mismatch_y[c] = subtract(there_y, here_y_);
     }
     const auto bilinear = [&](const auto& at) {
-      const auto between = [](auto a, auto b, auto part) {
-        return hn::Add(a, hn::Mul(hn::Sub(b, a), part));
-      };
-      return hn::Mul(
-          between(between(at[0], at[1], beyond_x), between(at[2], at[3], beyond_x), beyond_y),
-          hn::Set(floats, mismatch_product));
+      const auto between = [](auto a, auto b, auto part) { return a + (b - a) * part; };
+      return between(between(at[0], at[1], beyond_x), between(at[2], at[3], beyond_x), beyond_y) *
+             hn::Set(floats, mismatch_product);
     };
     const auto x = bilinear(mismatch_x);
     const auto y = bilinear(mismatch_y);
@@ -528,22 +521,22 @@ class Blocks {
     const auto xy = hn::Load(floats, xy_ + i);
     const auto yy = hn::Load(floats, yy_ + i);
     const auto inverse = hn::Load(floats, inverse_ + i);
-    const auto move_x = hn::Mul(hn::Sub(hn::Mul(xy, y), hn::Mul(yy, x)), inverse);
-    const auto move_y = hn::Mul(hn::Sub(hn::Mul(xy, x), hn::Mul(xx, y)), inverse);
-    auto to_x = hn::Add(flow_x, move_x);
-    auto to_y = hn::Add(flow_y, move_y);
-    const auto square = hn::Add(hn::Mul(move_x, move_x), hn::Mul(move_y, move_y));
-    auto stops = hn::Le(square, hn::Set(floats, min_move * min_move));
+    const auto move_x = (xy * y - yy * x) * inverse;
+    const auto move_y = (xy * x - xx * y) * inverse;
+    auto to_x = flow_x + move_x;
+    auto to_y = flow_y + move_y;
+    const auto square = move_x * move_x + move_y * move_y;
+    auto stops = square <= hn::Set(floats, min_move * min_move);
     if (round >= early_moves)
-      stops = hn::Or(stops, hn::Gt(square, hn::Set(floats, max_late_move * max_late_move)));
+      stops = hn::Or(stops, square > hn::Set(floats, max_late_move * max_late_move));
     if (round > 0) {
       const auto limit = hn::Set(floats, turning_back);
-      const auto turns = hn::AndNot(
-          stops, hn::And(hn::Lt(hn::Abs(hn::Add(move_x, hn::Load(floats, before_x_ + i))), limit),
-                         hn::Lt(hn::Abs(hn::Add(move_y, hn::Load(floats, before_y_ + i))), limit)));
+      const auto turns =
+          hn::AndNot(stops, hn::And(hn::Abs(move_x + hn::Load(floats, before_x_ + i)) < limit,
+                                    hn::Abs(move_y + hn::Load(floats, before_y_ + i)) < limit));
       const auto half = hn::Set(floats, 0.5F);
-      to_x = hn::IfThenElse(turns, hn::Sub(to_x, hn::Mul(move_x, half)), to_x);
-      to_y = hn::IfThenElse(turns, hn::Sub(to_y, hn::Mul(move_y, half)), to_y);
+      to_x = hn::IfThenElse(turns, to_x - move_x * half, to_x);
+      to_y = hn::IfThenElse(turns, to_y - move_y * half, to_y);
       stops = hn::Or(stops, turns);
     }
     to_x = hn::IfThenElse(active, to_x, flow_x);

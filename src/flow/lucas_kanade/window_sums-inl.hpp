@@ -103,7 +103,7 @@ HWY_INLINE Pair pairs_from(const PairRow& row, std::size_t first) {
 template <int n>
 HWY_INLINE PairRow add_pairs(const PairRow& row) {
   PairRow sums;
-  for (std::size_t i = 0; i < PairRow::size; ++i) sums[i] = hn::Add(row[i], pairs_from<n>(row, i));
+  for (std::size_t i = 0; i < PairRow::size; ++i) sums[i] = row[i] + pairs_from<n>(row, i);
   return sums;
 }
 
@@ -125,9 +125,9 @@ HWY_INLINE void sum_windows(int rows, const Products& products, const Store& sto
       const auto upper = products(2 * row, 2 * pair);
       const auto lower = products(2 * row + 1, 2 * pair);
       for (std::size_t k = 0; k < count; ++k) {
-        const auto both = hn::Add(upper[k], lower[k]);
+        const auto both = upper[k] + lower[k];
         hn::Store(both, pairs, of_rows[row][k] + pair);
-        if (row < window_pairs - 1) sums[k][i] = hn::Add(sums[k][i], both);
+        if (row < window_pairs - 1) sums[k][i] = sums[k][i] + both;
       }
     }
   }
@@ -135,11 +135,11 @@ HWY_INLINE void sum_windows(int rows, const Products& products, const Store& sto
     PairRow halves[count];
     for (std::size_t k = 0; k < count; ++k) {
       for (std::size_t i = 0; i < PairRow::size; ++i)
-        sums[k][i] = hn::Add(
-            sums[k][i], hn::Load(pairs, of_rows[row + window_pairs - 1][k] + i * pairs_at_once));
+        sums[k][i] =
+            sums[k][i] + hn::Load(pairs, of_rows[row + window_pairs - 1][k] + i * pairs_at_once);
       halves[k] = add_pairs<2>(add_pairs<1>(sums[k]));
       for (std::size_t i = 0; i < PairRow::size; ++i)
-        sums[k][i] = hn::Sub(sums[k][i], hn::Load(pairs, of_rows[row][k] + i * pairs_at_once));
+        sums[k][i] = sums[k][i] - hn::Load(pairs, of_rows[row][k] + i * pairs_at_once);
     }
     for (std::size_t i = 0; i < PairRow::size / 2; ++i) {
       Pair left[count];
