@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/simulate/sparse_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 
 #include <algorithm>
 #include <cstdint>
