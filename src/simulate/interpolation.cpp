@@ -7,22 +7,6 @@
 
 #include "src/flow/flow_range.hpp"
 
-#ifndef EVENTCAMERA_BEGIN_STEPS
-#define EVENTCAMERA_BEGIN_STEPS
-namespace eventcamera {
-namespace {
-
-/// Empties the pixels of each step, in a band of rows.
-template <class Pixel>
-void begin_steps(const InterpolatedInterval<Pixel>& interval, int band, StepBuckets& events) {
-  for (int j = 1; j <= interval.steps.count(); ++j)
-    events.pixels(j, band).begin(interval.steps.microseconds(j));
-}
-
-}  // namespace
-}  // namespace eventcamera
-#endif
-
 #define HWY_TARGET_INCLUDE "src/simulate/interpolation.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -201,6 +185,51 @@ void pair_rows(const ImageView<std::uint8_t>& frame, int first, int last,
   }
 }
 
+/// Columns measured at once; vectors are capped at this width.
+constexpr int columns_at_once = 16;
+
+/// Largest |a - b| over the added rows, per column.
+class LargestDifference {
+ public:
+  void add(const std::uint8_t* a, const std::uint8_t* b) {
+    const hn::CappedTag<std::uint8_t, columns_at_once> bytes;
+    for (int x = 0; x < columns_at_once; x += static_cast<int>(hn::Lanes(bytes))) {
+      const auto p = hn::LoadU(bytes, a + x);
+      const auto q = hn::LoadU(bytes, b + x);
+      const auto difference = hn::Or(hn::SaturatedSub(p, q), hn::SaturatedSub(q, p));
+      hn::Store(hn::Max(hn::Load(bytes, columns_ + x), difference), bytes, columns_ + x);
+    }
+  }
+  std::uint8_t of_cell(int cell) const {
+    const auto* c = columns_ + std::ptrdiff_t{4} * cell;
+    return std::max(std::max(c[0], c[1]), std::max(c[2], c[3]));
+  }
+
+ private:
+  HWY_ALIGN std::uint8_t columns_[columns_at_once] = {};
+};
+
+/// Measures the row of 4x4 cells that starts at image row `top`. Reads past the right border, which
+/// can only increase the bound.
+void measure_row(const ImageView<std::uint8_t>& image, int top, std::uint8_t* x_out,
+                 std::uint8_t* y_out) {
+  const int bottom = std::min(top + 4, image.height);
+  for (int left = 0; left < image.width; left += columns_at_once) {
+    LargestDifference x;
+    LargestDifference y;
+    for (int row = top; row < bottom; ++row) {
+      const std::uint8_t* here = image.row(row) + left;
+      const std::uint8_t* below = image.row(std::min(row + 1, image.height - 1)) + left;
+      x.add(here, here + 1);
+      y.add(here, below);
+    }
+    for (int cell = 0; cell < 4; ++cell) {
+      x_out[left / 4 + cell] = x.of_cell(cell);
+      y_out[left / 4 + cell] = y.of_cell(cell);
+    }
+  }
+}
+
 template <Interpolation interpolation, class LastSampler>
 void fire_row(const InterpolatedInterval<std::uint8_t>& interval, const LastSampler& last, int y,
               int band, const FirstSteps& first_steps, StepBuckets& events) {
@@ -298,7 +327,6 @@ void fire_band_forward(const InterpolatedInterval<std::uint8_t>& interval,
                        const ImageView<std::uint16_t>& last_pairs,
                        const GradientBound& gradient_bound, int band, StepBuckets& events) {
   const PairSampler last(last_pairs);
-  begin_steps(interval, band, events);
   const BandRows rows(band, interval.flow.height);
   const int width = interval.flow.width;
   FirstSteps first_steps;
@@ -316,7 +344,6 @@ void fire_band_blend(const InterpolatedInterval<std::uint8_t>& interval, int ban
                      StepBuckets& events) {
   const Sampler last(interval.warp.last);
   const BandRows rows(band, interval.flow.height);
-  begin_steps(interval, band, events);
   FirstSteps first_steps;
   first_steps.fill(1);
   for (int y = rows.first; y < rows.last; ++y)
@@ -330,11 +357,29 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace eventcamera {
 
+HWY_EXPORT(measure_row);
 HWY_EXPORT(pair_rows);
 HWY_EXPORT(fire_band_forward);
 HWY_EXPORT(fire_band_blend);
 
 namespace {
+
+/// Each large cell is the maximum of its 4x4 small cells.
+void gather_row(const Image<std::uint8_t>& small, int row, Image<std::uint8_t>& large) {
+  for (int column = 0; column < large.width(); ++column) {
+    std::uint8_t largest = 0;
+    for (int y = 4 * row; y < 4 * row + 4; ++y)
+      for (int x = 4 * column; x < 4 * column + 4; ++x) largest = std::max(largest, small.at(x, y));
+    large.at(column, row) = largest;
+  }
+}
+
+/// Empties the pixels of each step, in a band of rows.
+template <class Pixel>
+void begin_steps(const InterpolatedInterval<Pixel>& interval, int band, StepBuckets& events) {
+  for (int j = 1; j <= interval.steps.count(); ++j)
+    events.pixels(j, band).begin(interval.steps.microseconds(j));
+}
 
 template <Interpolation interpolation>
 void fire_row_16(const InterpolatedInterval<std::uint16_t>& interval, int y, int band,
@@ -356,22 +401,57 @@ void fire_row_16(const InterpolatedInterval<std::uint16_t>& interval, int y, int
   }
 }
 
-template <Interpolation interpolation>
-void fire_band_16(const InterpolatedInterval<std::uint16_t>& interval, int band,
-                  StepBuckets& events) {
-  begin_steps(interval, band, events);
-  const BandRows rows(band, interval.flow.height);
-  for (int y = rows.first; y < rows.last; ++y)
-    fire_row_16<interpolation>(interval, y, band, events);
+}  // namespace
+
+void GradientBound::Cells::shape(int cell_side, int columns, int rows) {
+  side = cell_side;
+  if (x.width() == columns && x.height() == rows) return;
+  x = Image<std::uint8_t>(columns, rows);
+  y = Image<std::uint8_t>(columns, rows);
 }
 
-}  // namespace
+void GradientBound::measure(const ImageView<std::uint8_t>& image, ThreadPool& threads) {
+  const int columns = (image.width + 15) / 16;
+  const int rows = (image.height + 15) / 16;
+  far_.shape(16, columns, rows);
+  near_.shape(4, 4 * columns, 4 * rows);
+  threads.for_each(rows, [&](int row, int) {
+    for (int y = 4 * row; y < 4 * row + 4 && 4 * y < image.height; ++y)
+      HWY_DYNAMIC_DISPATCH(measure_row)(image, 4 * y, near_.x.row(y), near_.y.row(y));
+    gather_row(near_.x, row, far_.x);
+    gather_row(near_.y, row, far_.y);
+  });
+}
+
+GradientBound::Bound GradientBound::within(const Box& box) const {
+  constexpr int near = 40;
+  return box.width() <= near && box.height() <= near ? near_.within(box) : far_.within(box);
+}
+
+GradientBound::Bound GradientBound::Cells::within(const Box& box) const {
+  const int left = std::clamp(box.left / side, 0, x.width() - 1);
+  const int right = std::clamp((box.right - 1) / side, 0, x.width() - 1);
+  const int top = std::clamp(box.top / side, 0, x.height() - 1);
+  const int bottom = std::clamp((box.bottom - 1) / side, 0, x.height() - 1);
+  std::uint8_t max_x = 0;
+  std::uint8_t max_y = 0;
+  for (int row = top; row <= bottom; ++row) {
+    const auto* x_row = x.row(row);
+    const auto* y_row = y.row(row);
+    for (int column = left; column <= right; ++column) {
+      max_x = std::max(max_x, x_row[column]);
+      max_y = std::max(max_y, y_row[column]);
+    }
+  }
+  return {max_x, max_y};
+}
 
 void InterpolationKernel::fire(const InterpolatedInterval<std::uint8_t>& interval,
                                ThreadPool& threads, StepBuckets& events) {
   const int bands = band_count(interval.flow.height);
+  const bool is_forward = interval.interpolation == Interpolation::forward;
   events.reset(interval.steps.count(), bands);
-  if (interval.interpolation == Interpolation::forward) {
+  if (is_forward) {
     gradient_bound_.measure(interval.warp.last, threads);
     if (last_pairs_.width() != interval.flow.width || last_pairs_.height() != interval.flow.height)
       last_pairs_ = Image<std::uint16_t>(interval.flow.width, interval.flow.height);
@@ -379,15 +459,16 @@ void InterpolationKernel::fire(const InterpolatedInterval<std::uint8_t>& interva
       const BandRows rows(band, interval.flow.height);
       HWY_DYNAMIC_DISPATCH(pair_rows)(interval.warp.last, rows.first, rows.last, last_pairs_);
     });
-    threads.for_each(bands, [&](int band, int) {
+  }
+  threads.for_each(bands, [&](int band, int) {
+    begin_steps(interval, band, events);
+    if (is_forward) {
       HWY_DYNAMIC_DISPATCH(fire_band_forward)
       (interval, last_pairs_.view(), gradient_bound_, band, events);
-    });
-  } else {
-    threads.for_each(bands, [&](int band, int) {
+    } else {
       HWY_DYNAMIC_DISPATCH(fire_band_blend)(interval, band, events);
-    });
-  }
+    }
+  });
 }
 
 void InterpolationKernel::fire(const InterpolatedInterval<std::uint16_t>& interval,
@@ -395,10 +476,13 @@ void InterpolationKernel::fire(const InterpolatedInterval<std::uint16_t>& interv
   const int bands = band_count(interval.flow.height);
   events.reset(interval.steps.count(), bands);
   threads.for_each(bands, [&](int band, int) {
-    if (interval.interpolation == Interpolation::forward)
-      fire_band_16<Interpolation::forward>(interval, band, events);
-    else
-      fire_band_16<Interpolation::blend>(interval, band, events);
+    begin_steps(interval, band, events);
+    const BandRows rows(band, interval.flow.height);
+    for (int y = rows.first; y < rows.last; ++y)
+      if (interval.interpolation == Interpolation::forward)
+        fire_row_16<Interpolation::forward>(interval, y, band, events);
+      else
+        fire_row_16<Interpolation::blend>(interval, y, band, events);
   });
 }
 

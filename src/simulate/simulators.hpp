@@ -31,12 +31,12 @@ class DenseSimulator : public Simulator {
 
 std::unique_ptr<DenseSimulator> make_dense_simulator(const LumaFormat& format);
 
-/// Sparse frame interpolation (paper, section III-B): Lucas-Kanade tracks the pixels that changed by
-/// more than the smaller threshold from I(i-1) to I(i); tracks that are lost or leave the frame are
-/// dropped. The interpolated frame I(a) is I(i-1), except that each tracked pixel p with flow f is
-/// drawn at p + a f, rounded (the last in raster order wins), and the pixel it left shows the
-/// uncovered background, I(i). I(1) = I(i). Differences of successive frames are thresholded; events
-/// take the time of the later frame.
+/// Sparse frame interpolation (paper, section III-B): Lucas-Kanade tracks the pixels that changed
+/// by more than the smaller threshold from I(i-1) to I(i); tracks that are lost or leave the frame
+/// are dropped. The interpolated frame I(a) is I(i-1), except that each tracked pixel p with flow f
+/// is drawn at p + a f, rounded (the last in raster order wins), and the pixel it left shows the
+/// uncovered background, I(i). I(1) = I(i). Differences of successive frames are thresholded;
+/// events take the time of the later frame.
 std::unique_ptr<Simulator> make_sparse_simulator(const LumaFormat& format);
 
 /// Difference frame interpolation (paper, section III-C). The difference frame D(i) = I(i) - I(i-1)

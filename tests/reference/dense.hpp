@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "src/simulate/motion.hpp"
 #include "src/simulate/simulators.hpp"
 #include "tests/reference/differences.hpp"
 
