@@ -82,15 +82,8 @@ void composite_any(const LumaView& luma, const AlphaView& alpha, ThreadPool& thr
     composite<4>(luma, alpha, threads, out);
 }
 
-void composite_bytes(const LumaView& luma, const AlphaView& alpha, ThreadPool& threads,
-                     Image<std::uint8_t>& out) {
-  composite_any(luma, alpha, threads, out);
-}
-
-void composite_16_bits(const LumaView& luma, const AlphaView& alpha, ThreadPool& threads,
-                       Image<std::uint16_t>& out) {
-  composite_any(luma, alpha, threads, out);
-}
+constexpr auto& composite_bytes = composite_any<std::uint8_t>;
+constexpr auto& composite_16_bits = composite_any<std::uint16_t>;
 
 }  // namespace
 }  // namespace eventcamera::HWY_NAMESPACE

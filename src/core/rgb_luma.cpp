@@ -101,15 +101,8 @@ void luma_of_samples(const RgbView& frame, const LumaWeights& weights, ThreadPoo
   });
 }
 
-void luma_of_bytes(const RgbView& frame, const LumaWeights& weights, ThreadPool& threads,
-                   Image<std::uint8_t>& out) {
-  luma_of_samples(frame, weights, threads, out);
-}
-
-void luma_of_16_bits(const RgbView& frame, const LumaWeights& weights, ThreadPool& threads,
-                     Image<std::uint16_t>& out) {
-  luma_of_samples(frame, weights, threads, out);
-}
+constexpr auto& luma_of_bytes = luma_of_samples<std::uint8_t>;
+constexpr auto& luma_of_16_bits = luma_of_samples<std::uint16_t>;
 
 void luma_of_words(const RgbWordsView& frame, const LumaWeights& weights, ThreadPool& threads,
                    Image<std::uint8_t>& out) {

@@ -70,15 +70,8 @@ void denoise_rows(const ImageView<Pixel>& frame, int limit, ThreadPool& threads,
   });
 }
 
-void denoise_8(const ImageView<std::uint8_t>& frame, int limit, ThreadPool& threads,
-               Image<std::uint8_t>& out) {
-  denoise_rows(frame, limit, threads, out);
-}
-
-void denoise_16(const ImageView<std::uint16_t>& frame, int limit, ThreadPool& threads,
-                Image<std::uint16_t>& out) {
-  denoise_rows(frame, limit, threads, out);
-}
+constexpr auto& denoise_8 = denoise_rows<std::uint8_t>;
+constexpr auto& denoise_16 = denoise_rows<std::uint16_t>;
 
 }  // namespace
 }  // namespace eventcamera::HWY_NAMESPACE

@@ -66,15 +66,8 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, const Thr
     fire(x, load_first(pixels, before + x, width - x), load_first(pixels, now + x, width - x));
 }
 
-void fire_row_8(const std::uint8_t* before, const std::uint8_t* now, int width, int y,
-                const Thresholds& thresholds, FiredPixels& out) {
-  fire_row(before, now, width, y, thresholds, out);
-}
-
-void fire_row_16(const std::uint16_t* before, const std::uint16_t* now, int width, int y,
-                 const Thresholds& thresholds, FiredPixels& out) {
-  fire_row(before, now, width, y, thresholds, out);
-}
+constexpr auto& fire_row_8 = fire_row<std::uint8_t>;
+constexpr auto& fire_row_16 = fire_row<std::uint16_t>;
 
 template <class Strength>
 void fire_words(Strength* strengths, std::uint8_t* touched, int words, int y, FiredPixels& out) {
@@ -97,15 +90,8 @@ void fire_words(Strength* strengths, std::uint8_t* touched, int words, int y, Fi
   }
 }
 
-void fire_words_16(std::uint16_t* strengths, std::uint8_t* touched, int words, int y,
-                   FiredPixels& out) {
-  fire_words(strengths, touched, words, y, out);
-}
-
-void fire_words_32(std::uint32_t* strengths, std::uint8_t* touched, int words, int y,
-                   FiredPixels& out) {
-  fire_words(strengths, touched, words, y, out);
-}
+constexpr auto& fire_words_16 = fire_words<std::uint16_t>;
+constexpr auto& fire_words_32 = fire_words<std::uint32_t>;
 
 template <class Pixel>
 ChangedColumns changed(const Pixel* before, const Pixel* now, int width, int threshold) {
@@ -128,15 +114,8 @@ ChangedColumns changed(const Pixel* before, const Pixel* now, int width, int thr
   return {first, last};
 }
 
-ChangedColumns changed_8(const std::uint8_t* before, const std::uint8_t* now, int width,
-                         int threshold) {
-  return changed(before, now, width, threshold);
-}
-
-ChangedColumns changed_16(const std::uint16_t* before, const std::uint16_t* now, int width,
-                          int threshold) {
-  return changed(before, now, width, threshold);
-}
+constexpr auto& changed_8 = changed<std::uint8_t>;
+constexpr auto& changed_16 = changed<std::uint16_t>;
 
 }  // namespace
 }  // namespace eventcamera::HWY_NAMESPACE
