@@ -50,6 +50,11 @@ HWY_INLINE hn::Vec<Tag> iota(Tag tag, hn::TFromD<Tag> first) {
   return hn::Load(tag, numbers.data()) + hn::Set(tag, first);
 }
 
+template <class Vector>
+HWY_INLINE Vector lerp(Vector a, Vector b, Vector weight) {
+  return a + weight * (b - a);
+}
+
 /// Moves the lanes of a mask to the front; the remaining lanes are undefined. Lanes have 4 or 8
 /// bytes. Used instead of hn::Compress(), whose table GCC 12 copies to the stack on each call,
 /// except on targets without a table.

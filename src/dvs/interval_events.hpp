@@ -18,8 +18,8 @@
 
 namespace eventcamera {
 
-/// Events of an interval, which bands of rows add in any order. Events past its end are deferred to
-/// the next interval. With a rolling shutter of the frames, all events of a row are delayed; with a
+/// Collects the events of an interval from bands of rows, in any order. Events past its end are
+/// deferred to the next interval. A rolling shutter of the frames delays all events of a row; at a
 /// limited rate, a Readout delays them further.
 class IntervalEvents {
   struct DeferredEvent {
@@ -43,14 +43,14 @@ class IntervalEvents {
     fired_.reset(static_cast<std::uint32_t>(duration), band_count(height_));
   }
 
-  /// True if the interval has exactly the events within it, at their own times.
+  /// True if no event is delayed, and none was deferred to this interval.
   bool is_plain() const {
     return rolling_shutter_ == 0 && !readout_ &&
            std::ranges::all_of(deferred_, [](const Deferred& band) { return band.empty(); });
   }
 
-  /// Ends the interval, after the last event. Returns its events, with_cause(): its own slices, or
-  /// in `read` those that were read out.
+  /// Ends the interval, after the last event. Returns its events, with_cause(), in `read` if there
+  /// is a readout.
   const EventBuckets& end(StepBuckets& read, ThreadPool& threads) {
     if (!readout_) return fired_;
     sorted_.resize(fired_.size());
@@ -60,8 +60,8 @@ class IntervalEvents {
     return read;
   }
 
-  /// Time from the end of the interval to the last deferred event of a rolling shutter, rounded up;
-  /// none if there is none.
+  /// Time from the end of the interval to the last event deferred by a rolling shutter, rounded up,
+  /// if any.
   std::optional<Nanoseconds> latest() const {
     std::optional<double> latest;
     if (rolling_shutter_ == 0) return std::nullopt;
@@ -84,8 +84,7 @@ class IntervalEvents {
     if (readout_) readout_->reset();
   }
 
-  /// Adds the events of one band of rows at a time. Several may add to the same interval, from
-  /// different threads.
+  /// Adds the events of one band of rows at a time. Threads may use several for the same interval.
   class Band {
    public:
     /// Begins with the deferred events of the last interval.
@@ -131,7 +130,6 @@ class IntervalEvents {
     }
 
    private:
-    /// Delays the events of this interval.
     void delay_rows() {
       const auto delay_of = [this](const Event& event) {
         return delays_[event.y_p & coordinate_bits];
@@ -169,7 +167,7 @@ class IntervalEvents {
   };
 
  private:
-  /// Event rate limit that no array reaches, events per second.
+  /// Rate limit that no array reaches, events per second.
   static constexpr double unlimited = 1e18;
 
   int width_;

@@ -39,7 +39,7 @@ class LightResponse {
 
   void set_range(bool is_narrow);
 
-  /// The next frame has the exposure 1.
+  /// Sets the exposure of the next frame to 1.
   void restart();
 
   /// Updates the exposure if `exposure_compensation` is set. Returns its gain since the last frame.

@@ -38,7 +38,6 @@ class Pixels {
     count_ = std::min(row.candidates.count - first, hn::Lanes(Doubles()));
   }
 
-  /// Index of the first one.
   std::size_t first() const { return first_; }
   Mask exist() const { return hn::FirstN(Doubles(), count_); }
 
@@ -102,8 +101,8 @@ class Pixels {
   std::size_t count_;
 };
 
-/// Vectors of candidates that are solved in turns: the processor overlaps their operations, while
-/// successive crossings of one pixel depend on each other.
+/// Vectors of candidates that are solved in turns, because the processor can overlap their
+/// operations: successive crossings of one pixel depend on each other.
 constexpr std::size_t max_vectors = 16;
 
 /// Adds events of vectors of pixels.
@@ -136,7 +135,7 @@ class Events {
     count_ += hn::CountTrue(doubles, fire);
   }
 
-  /// Must be called after each turn.
+  /// Call after each turn.
   void flush() {
     row_.events.add({events_, count_});
     count_ = 0;
@@ -173,8 +172,8 @@ class Events {
   Event events_[(max_vectors + 1) * max_lanes / 2];
 };
 
-/// Growth of the thresholds of a vector of pixels, as a fraction of them. It falls to 0, or until
-/// the sub-interval ends.
+/// Growth of the thresholds of a vector of pixels, as a fraction of the thresholds. It falls to 0,
+/// or until the sub-interval ends.
 struct Growth {
   Values first;
   Values last;  ///< after the fall
@@ -193,7 +192,7 @@ HWY_INLINE Values wait(Values value, Values slope, Values threshold, Values left
   return hn::IfThenElse(hn::Or(is_beyond, meets), found, hn::Inf(Doubles()));
 }
 
-/// Time until signals reach grown thresholds, which fall.
+/// Time until signals reach thresholds whose growth falls.
 HWY_INLINE Values wait(Values value, Values slope, Values threshold, const Growth& growth) {
   const auto one = all(1);
   const auto margin = all(rounding);
@@ -212,8 +211,8 @@ HWY_INLINE Values wait(Values value, Values slope, Values threshold, const Growt
   return hn::IfThenElse(hn::Or(is_beyond, hn::Or(meets, reaches)), found, hn::Inf(Doubles()));
 }
 
-/// Straight-line signals of a vector of pixels. Thresholds may vary by adaptation, or by jitter if
-/// there is no mismatch.
+/// Straight-line signals of a vector of pixels. Thresholds may vary by adaptation, or by jitter
+/// without mismatch.
 template <bool thresholds_vary>
 class Lines {
  public:
@@ -332,7 +331,7 @@ class Lines {
   Mask drawn_;          ///< pixels whose thresholds were drawn
 };
 
-/// Finds a crossing of each vector in turn, and then the next ones.
+/// Finds the first crossing in each vector, then the second ones, and so on.
 template <class Signals>
 void solve_in_turns(RowToSolve& row) {
   Events events(row);

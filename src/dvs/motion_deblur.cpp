@@ -30,7 +30,7 @@ HWY_INLINE hn::Vec<Floats> mean_along(const Image<float>& image, const Path& pat
   const std::ptrdiff_t along = is_wide ? (path.dx > 0 ? 1 : -1) : (path.dy > 0 ? row : -row);
   const std::ptrdiff_t across = is_wide ? row : 1;
   const float slope = is_wide ? path.dy : path.dx;
-  // Both samples at a distance of j lie between `near` and its neighbour across.
+  // Both samples at distance j lie between `near` and its neighbour across.
   for (int j = 1; static_cast<float>(j) < half + 0.5F; ++j) {
     const float moved = static_cast<float>(j) * slope;
     const float whole = std::floor(moved);
@@ -82,10 +82,10 @@ HWY_EXPORT(multiply_row);
 
 namespace {
 
-/// Samples are up to max_length / 2 pixels from a block, which may itself end past the row.
+/// Samples are up to max_length / 2 pixels from a block, and a block may end past the row.
 constexpr int margin = MotionDeblur::max_length / 2 + 2 + MotionDeblur::block;
 
-/// Half of a grey level, which rounding may have removed, so that no light is 0.
+/// Added to grey levels so that no light is 0: rounding may have removed up to half a level.
 constexpr float offset = 0.5F;
 
 void replicate_sides(Image<float>& image, int y) {
@@ -94,7 +94,7 @@ void replicate_sides(Image<float>& image, int y) {
   std::fill_n(row + image.width(), margin, row[image.width() - 1]);
 }
 
-/// After replicate_sides() of all rows.
+/// Call after replicate_sides() of all rows.
 void replicate_ends(Image<float>& image) {
   const auto copy = [&](int from, int to) {
     std::copy_n(image.row(from) - margin, image.width() + 2 * margin, image.row(to) - margin);

@@ -18,10 +18,10 @@ HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-/// Pixels whose samples are near each other.
+/// Number of pixels that are sampled together if their samples are close to each other.
 constexpr int block = 8;
 
-/// Blocks that a vector holds, and are sampled together.
+/// Number of blocks in a vector.
 #if HWY_TARGET == HWY_SCALAR || HWY_HAVE_SCALABLE
 constexpr int max_blocks = 1;
 #else
@@ -33,7 +33,7 @@ using Words4 = hn::CappedTag<std::int32_t, 4>;
 
 /// Positions of pixels along one axis and their displacements per step, in 1/65536 of a pixel.
 struct AxisMotion {
-  HWY_ALIGN std::int32_t start[max_pixels];  ///< and half of 1/64 pixel, for rounding
+  HWY_ALIGN std::int32_t start[max_pixels];  ///< plus half of 1/64 pixel, for rounding
   HWY_ALIGN Motion of[max_pixels];
   HWY_ALIGN std::int32_t block_start[4] = {};
   HWY_ALIGN Motion min[4] = {};  ///< by block
@@ -55,7 +55,7 @@ struct AxisMotion {
     }
   }
 
-  /// Whether the pixels of each block stay less than a block apart for `steps` steps.
+  /// True if the pixels of each block stay less than a block apart for `steps` steps.
   bool stay_close(int blocks, int steps) const {
     std::int64_t max_difference = 0;
     for (int i = 0; i < blocks; ++i)
@@ -63,7 +63,7 @@ struct AxisMotion {
     return max_difference * steps <= (block - 1) << 16;
   }
 
-  /// Whether the pixels of the first block are less than a block apart after k steps.
+  /// True if the pixels of the first block are less than a block apart after k steps.
   bool are_close(int k) const {
     const auto pixel = [&](Motion motion) { return (k * motion + 512) >> 16; };
     return std::abs(pixel(max[0]) - pixel(min[0])) < block;
@@ -118,8 +118,8 @@ std::uint16_t blended_luma(std::int32_t earlier, std::int32_t later, int weight)
 }
 
 /// Blends a block of pixels one by one.
-void blend_apart(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
-                 std::uint16_t* out) {
+void blend_singly(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
+                  std::uint16_t* out) {
   const auto sample_of = [&](const ImageView<std::uint8_t>& frame, int i, int k) {
     return sample(frame, motions.x.start[i] - 512 + k * motions.x.of[i],
                   motions.y.start[i] - 512 + k * motions.y.of[i]);
@@ -134,13 +134,13 @@ void blend_apart(const Warp<std::uint8_t>& warp, const BlockMotions& motions, in
 template <int blocks>
 void blend_blocks(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
                   std::uint16_t* out) {
-  blend_apart(warp, motions, j, out);
+  blend_singly(warp, motions, j, out);
 }
 
 #else
 
-/// Bilinear samples, equal to sample() in warp.hpp, of blocks whose pixels are close together: all
-/// samples of a block are in the same 16 bytes of a few rows.
+/// Vector version of sample() in warp.hpp, for blocks whose pixels are close together: all samples
+/// of a block are in the same 16 bytes of a few rows.
 template <int blocks>
 class Sampler {
  public:
@@ -261,7 +261,7 @@ class Sampler {
     }
   }
 
-  /// Bytes of the word of each pixel's block.
+  /// Indices of the bytes of the word of each pixel's block.
   static constexpr auto word_of_block = [] {
     struct alignas(64) Table {
       std::uint8_t of[max_pixels * 4];
@@ -307,7 +307,7 @@ void blend_blocks(const Warp<std::uint8_t>& warp, const BlockMotions& motions, i
 
 #endif
 
-/// Moves the pixels of some blocks, of which `count` are in the run.
+/// Moves the pixels of some blocks; `count` of them are in the run.
 template <int blocks>
 void move_blocks(const Warp<std::uint8_t>& warp, const Flow* flow, int left, int y, int count,
                  std::uint16_t* out, std::ptrdiff_t stride) {
@@ -324,7 +324,7 @@ void move_blocks(const Warp<std::uint8_t>& warp, const Flow* flow, int left, int
       if (motions.are_close(-j) && motions.are_close(warp.steps - j))
         blend_blocks<1>(warp, motions, j, out);
       else
-        blend_apart(warp, motions, j, out);
+        blend_singly(warp, motions, j, out);
     }
   }
 }
@@ -356,8 +356,8 @@ HWY_EXPORT(move_light_8);
 namespace {
 
 /// Number of steps of a tile whose pixels move by up to `max_motion` pixels. Luma is linear between
-/// steps; where it bends, the error of event times is proportional to the motion and to the inverse
-/// square of the steps. So from `fine` pixels on, steps grow with the square root of the motion,
+/// steps. Where it bends, the error of event times is proportional to the motion and inversely to
+/// the square of the steps: from `fine` pixels on, steps grow with the square root of the motion,
 /// which keeps the error constant.
 int steps_for(float max_motion, int max_steps) {
   constexpr float fine = 4;

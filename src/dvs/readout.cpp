@@ -21,12 +21,11 @@ void Readout::reset() {
 
 void Readout::read(std::span<const Event> in, double duration, double events_per_second,
                    StepBuckets& out) {
-  constexpr double min_rate = 1e-9;  // an event in 30 years; a lower one makes no difference
+  constexpr double min_rate = 1e-9;  // an event in 30 years: a lower rate makes no difference
   const double time_per_event = 1e6 / std::max(events_per_second, min_rate);
   double idle_from = unfinished_ * time_per_event;  // microseconds after the start of the interval
   out.reset(1, 1);
   auto& left = out.bucket(1, 0);
-  // Reads rows until `time`.
   const auto serve_until = [&](double time) {
     while (queue_count_ > 0 && idle_from < time) {
       const int row = row_queue_[queue_first_];

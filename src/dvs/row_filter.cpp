@@ -75,7 +75,7 @@ void filter(const PixelModel& model, const LightResponse& response, const SubInt
 
     auto last_signal = last_target;
     auto signal = target;
-    auto margin = hn::Set(floats, rounding);  // excess beyond the values at both ends
+    auto margin = hn::Set(floats, rounding);  // by which the signal may exceed its end values
     if constexpr (has_bandwidth) {
       last_signal = hn::LoadU(floats, pixels.signal + x);
       const auto decay_factor = hn::GatherIndex(floats, tables.decay_factor.data(), shade);
@@ -84,7 +84,7 @@ void filter(const PixelModel& model, const LightResponse& response, const SubInt
       const auto exponent = hn::GatherIndex(floats, tables.exponent.data(), shade);
       const auto lag = last_signal - last_target;
       signal = target - (target - last_target) * mean_decay_factor + lag * decay_factor;
-      // The signal may reverse in between, but not cross the tangents at both ends.
+      // The signal may reverse in between, but does not cross the tangents at its ends.
       const auto first_slope = leaked - lag * exponent;
       const auto last_slope = leaked + (target - signal) * exponent;
       const auto turns = first_slope * last_slope < zero;

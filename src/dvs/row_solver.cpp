@@ -11,7 +11,6 @@
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
-#include "src/dvs/elementary-inl.hpp"
 #include "src/dvs/random-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -217,7 +216,7 @@ class RowSolver {
     const auto ready = load(Column::ready);
     const auto noise = load(Column::next_noise);
     const auto sign = load(Column::sign);
-    // A reset holds the reference at the signal until the pixel is ready, maybe after the end.
+    // A reset holds the reference at the signal until the pixel is ready, possibly past the end.
     const auto held_until = holds_ ? ready : all(0);
     const auto stays_held = held_until > end.t;
     const auto is_released = hn::And(held_until > now.t, hn::Not(stays_held));
@@ -324,7 +323,7 @@ class RowSolver {
     return hn::CountTrue(doubles, happens);
   }
 
-  /// Times at which events are emitted that are due at `t`: later by the latency.
+  /// Times at which the events of crossings at `t` are emitted: later by the latency.
   Values emissions(std::size_t i, Values t, std::uint64_t noise_bits) {
     const PixelModel& model = *row_.model;
     if (model.latency == 0 && !has_latency_jitter()) return t;
@@ -335,7 +334,7 @@ class RowSolver {
     HWY_ALIGN std::uint64_t counters[max_lanes / 2] = {};
     for (std::size_t lane = 0; lane < std::min(lanes(), count_ - i); ++lane) {
       numbers[lane] = row_.pixels.number_of(x_of(i + lane));
-      // Noise has drawn its next event and its polarity before.
+      // Noise draws its next event and its polarity first.
       counters[lane] = unsolved_.draws[index_of(i + lane)] + 2 * (noise_bits >> lane & 1);
     }
     const RandomSeries<Doubles> random(row_.model->random, hn::Load(bits, numbers),
@@ -356,7 +355,7 @@ class RowSolver {
   }
   int x_of(std::size_t i) { return row_.candidates.x[index_of(i)]; }
 
-  /// Adds the event of a crossing by a pixel whose columns are not updated yet.
+  /// Adds the event of a crossing; the columns of the pixel are not updated yet.
   void cross(std::size_t i, double t, double emitted, bool is_on) {
     const int x = x_of(i);
     const auto polarity = is_on ? Polarity::on : Polarity::off;
@@ -368,7 +367,7 @@ class RowSolver {
     row_.add_event(x, emitted, polarity, cause);
   }
 
-  /// Slope of a signal relative to its reference, at a time after its columns.
+  /// Slope of a signal relative to its reference, at a time after Column::t.
   double slope_at(std::size_t i, double t) {
     const auto at = [&](Column column) { return unsolved_.column(column)[i]; };
     const double lag = at(Column::value) - at(Column::offset) - at(Column::slope) * at(Column::t);

@@ -14,7 +14,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 
-/// Lane-wise sum of the products of two columns of vectors, exact in 32 bits.
+/// Lane-wise sums of the products of 16-bit vectors, exact in 32 bits.
 template <class Factors>
 class ProductSum {
  public:
@@ -32,7 +32,7 @@ class ProductSum {
 };
 
 #if HWY_TARGET != HWY_SCALAR
-/// In each 128-bit block, lane c is the sum of the lanes of that block of sum c.
+/// In each 128-bit block, lane c of the result is the sum of the lanes of sum c.
 template <class Lanes, class Value = hn::Vec<Lanes>>
 HWY_INLINE Value add_lanes(Lanes lanes, Value sum0, Value sum1, Value sum2, Value sum3) {
   const hn::Repartition<std::int64_t, Lanes> pairs;

@@ -6,7 +6,7 @@
 namespace eventcamera {
 namespace {
 
-/// Extent of a region along one axis: at least [from, to) and its surroundings.
+/// Region along one axis: [from, to) and its surroundings, rounded up, within the frame.
 struct Range {
   int first;
   int last;
@@ -34,19 +34,19 @@ ImageView<Flow> RegionOfInterestFlow::find(const ImageView<std::uint8_t>& from,
                                            const ImageView<std::uint8_t>& to, const Box& changed,
                                            ThreadPool& threads) {
   if (changed.empty()) {
-    whole_knows_last_ = false;
+    whole_has_last_ = false;
     clear();
     return flow_.view();
   }
   const Range columns(changed.left, changed.right, width_);
   const Range rows(changed.top, changed.bottom, height_);
   const Box part{columns.first, rows.first, columns.last, rows.last};
-  // A region of more than half the frame is extended to the whole frame, because then the work on
-  // `to` is reused by the next call.
+  // A region of more than half the frame is extended to the whole frame, so that the next call
+  // reuses the work on `to`.
   if (2 * static_cast<std::int64_t>(part.width()) * part.height() >
       static_cast<std::int64_t>(width_) * height_)
     return find_in_whole(from, to, threads);
-  whole_knows_last_ = false;
+  whole_has_last_ = false;
   find_in_part(from, to, part, threads);
   return flow_.view();
 }
@@ -55,9 +55,9 @@ ImageView<Flow> RegionOfInterestFlow::find_in_whole(const ImageView<std::uint8_t
                                                     const ImageView<std::uint8_t>& to,
                                                     ThreadPool& threads) {
   if (!whole_) whole_ = make_dense_flow(method_);
-  if (!whole_knows_last_) whole_->push(from, threads);
+  if (!whole_has_last_) whole_->push(from, threads);
   whole_->push(to, threads);
-  whole_knows_last_ = true;
+  whole_has_last_ = true;
   return whole_->flow(threads);
 }
 

@@ -8,11 +8,11 @@
 
 namespace eventcamera {
 
-/// Dense flow between successive frames, computed only around changed pixels; 0 elsewhere. Saves
+/// Dense flow between successive frames, computed only around changed pixels and 0 elsewhere. Saves
 /// most of the work if the camera does not move.
 class RegionOfInterestFlow {
  public:
-  /// Distance up to which a change affects the flow, in pixels: the reach of a window on a coarse
+  /// Distance up to which a change affects the flow, in pixels: about half a window on a coarse
   /// scale.
   static constexpr int surroundings = 48;
 
@@ -20,7 +20,6 @@ class RegionOfInterestFlow {
   /// memory of a DenseFlow.
   static constexpr int side_step = 64;
 
-  /// For frames of this size.
   RegionOfInterestFlow(FlowMethod method, int width, int height);
 
   FlowMethod method() const { return method_; }
@@ -42,7 +41,7 @@ class RegionOfInterestFlow {
   int width_;
   int height_;
   std::unique_ptr<DenseFlow> whole_;
-  bool whole_knows_last_ = false;
+  bool whole_has_last_ = false;
   std::unique_ptr<DenseFlow> part_;
   Image<Flow> flow_;  ///< 0 outside filled_
   Box filled_;

@@ -20,6 +20,7 @@ namespace {
 /// One lane per pixel.
 using Floats = hn::CappedTag<float, row_padding>;
 using Vector = hn::Vec<Floats>;
+using Field = VariationalRefinement::Field;
 
 /// Weighted sums over the patches that cover the pixels of a row.
 struct SumRow {
@@ -28,8 +29,8 @@ struct SumRow {
   float* weight;
 };
 
-/// Adds rows [first, last) of a patch with this flow, whose top left pixel is (x, y); sums_of(row)
-/// returns the sums of a row.
+/// Adds rows [first, last) of a patch at (x, y) with this flow. sums_of(row) returns the sums of a
+/// row.
 template <int side, class SumsOf>
 HWY_INLINE void add_patch(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, int x,
                           int y, int width, int first, int last, const Flow& flow,
@@ -53,16 +54,15 @@ HWY_INLINE void add_patch(const Image<std::uint8_t>& from, const Image<std::uint
   const auto load = [&](const std::uint8_t* pixels) {
     return hn::ConvertTo(floats, hn::PromoteTo(ints, hn::LoadU(bytes, pixels)));
   };
-  const auto between = [](auto a, auto b, auto weight) { return a + weight * (b - a); };
   for (int k = 0; k < width; k += lanes) {
     const auto along = [&](int row) {
       const std::uint8_t* pixels = to.row(row - y + top) + left + k;
-      return between(load(pixels), load(pixels + 1), right);
+      return lerp(load(pixels), load(pixels + 1), right);
     };
     auto above = along(first);
     for (int row = first; row < last; ++row) {
       const auto below = along(row + 1);
-      const auto there = between(above, below, down);
+      const auto there = lerp(above, below, down);
       above = below;
       const auto difference = hn::Abs(there - load(from.row(row) + x + k));
       const auto weight = one / hn::Max(one, difference);
@@ -78,10 +78,10 @@ HWY_INLINE void add_patch(const Image<std::uint8_t>& from, const Image<std::uint
 }
 
 /// Divides sums by weights.
-void divide_row(const SumRow& sums, int y, SplitPlane& flow_x, SplitPlane& flow_y) {
+void divide_row(const SumRow& sums, int y, Field& out) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
-  for (int k = 0; k < flow_x.count(0); k += lanes) {
+  for (int k = 0; k < out.x.count(0); k += lanes) {
     const auto load = [&](const float* row, Vector* values) {
       hn::LoadInterleaved2(floats, row + std::ptrdiff_t{2} * k, values[0], values[1]);
     };
@@ -92,18 +92,21 @@ void divide_row(const SumRow& sums, int y, SplitPlane& flow_x, SplitPlane& flow_
     load(sums.y, y_);
     load(sums.weight, weight);
     for (int parity = 0; parity < 2; ++parity) {
-      hn::StoreU(x[parity] / weight[parity], floats, flow_x.row(parity, y) + k);
-      hn::StoreU(y_[parity] / weight[parity], floats, flow_y.row(parity, y) + k);
+      hn::StoreU(x[parity] / weight[parity], floats, out.x.row(parity, y) + k);
+      hn::StoreU(y_[parity] / weight[parity], floats, out.y.row(parity, y) + k);
     }
   }
-  flow_x.replicate_ends(y);
-  flow_y.replicate_ends(y);
+  out.x.replicate_ends(y);
+  out.y.replicate_ends(y);
 }
 
 template <int side>
 void spread(const PatchGrid& grid, const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
-            const Image<Flow>& flows, int first, int last, float* sums, int padded_width,
-            SplitPlane& x, SplitPlane& y) {
+            const Image<Flow>& flows, int first, int last, std::vector<float>& scratch,
+            Field& out) {
+  const int padded_width = from.width() + 3 * row_padding;
+  float* sums = scratch_of(scratch, std::size_t{3} * static_cast<std::size_t>(padded_width) *
+                                        static_cast<std::size_t>(last - first));
   const auto sums_of = [&](int row) -> SumRow {
     float* values = sums + std::ptrdiff_t{row - first} * 3 * padded_width;
     return {values, values + padded_width, values + std::ptrdiff_t{2} * padded_width};
@@ -125,16 +128,16 @@ void spread(const PatchGrid& grid, const Image<std::uint8_t>& from, const Image<
                       sums_of);
     }
   }
-  for (int row = first; row < last; ++row) divide_row(sums_of(row), row, x, y);
+  for (int row = first; row < last; ++row) divide_row(sums_of(row), row, out);
 }
 
 void spread_rows(const PatchGrid& grid, const Image<std::uint8_t>& from,
                  const Image<std::uint8_t>& to, const Image<Flow>& flows, int first, int last,
-                 float* sums, int padded_width, SplitPlane& x, SplitPlane& y) {
+                 std::vector<float>& sums, Field& out) {
   if (grid.side == 4)
-    spread<4>(grid, from, to, flows, first, last, sums, padded_width, x, y);
+    spread<4>(grid, from, to, flows, first, last, sums, out);
   else
-    spread<8>(grid, from, to, flows, first, last, sums, padded_width, x, y);
+    spread<8>(grid, from, to, flows, first, last, sums, out);
 }
 
 }  // namespace
@@ -148,12 +151,8 @@ HWY_EXPORT(spread_rows);
 
 void spread_patches(const PatchGrid& grid, const Image<std::uint8_t>& from,
                     const Image<std::uint8_t>& to, const Image<Flow>& flows, int first, int last,
-                    std::vector<float>& sums, SplitPlane& x, SplitPlane& y) {
-  const int padded_width = from.width() + 3 * row_padding;
-  float* rows = scratch_of(sums, std::size_t{3} * static_cast<std::size_t>(padded_width) *
-                                     static_cast<std::size_t>(last - first));
-  HWY_DYNAMIC_DISPATCH(spread_rows)
-  (grid, from, to, flows, first, last, rows, padded_width, x, y);
+                    std::vector<float>& sums, VariationalRefinement::Field& out) {
+  HWY_DYNAMIC_DISPATCH(spread_rows)(grid, from, to, flows, first, last, sums, out);
 }
 
 }  // namespace eventcamera

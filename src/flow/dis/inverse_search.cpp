@@ -22,7 +22,7 @@ namespace {
 using Words = hn::CappedTag<std::int16_t, 16>;
 using Word = hn::Vec<Words>;
 
-/// Lanes of a sum once its halves are added.
+/// Lanes of a sum after its halves are added.
 using Quarters = hn::CappedTag<std::int32_t, 4>;
 
 /// One lane per patch.
@@ -45,7 +45,8 @@ HWY_INLINE hn::Vec<Quarters> quarters(Sum sum) {
     return sum;
 }
 
-/// Sums at one of the four pixels of a patch's cell, of the differences there.
+/// Sums over the differences of a patch from the other image, with the patch at one corner of its
+/// cell of four pixels.
 struct Corner {
   // Not defaulted: see ProductSum.
   Corner() {}  // NOLINT(modernize-use-equals-default)
@@ -64,10 +65,10 @@ struct Corner {
   WordSum along_y;
 };
 
-/// What the sums of a cell are for.
+/// Quantities to compute from the sums of a cell.
 enum class Sums { error, error_and_step };
 
-/// Stores the totals of four sums.
+/// Adds up the lanes of four sums.
 HWY_INLINE void store_totals(const WordSum& sum0, const WordSum& sum1, const WordSum& sum2,
                              const WordSum& sum3, std::int32_t* out) {
 #if HWY_TARGET == HWY_SCALAR
@@ -82,9 +83,9 @@ HWY_INLINE void store_totals(const WordSum& sum0, const WordSum& sum1, const Wor
 
 /// Searches for up to `capacity` patches of a row, one lane per patch.
 ///
-/// Between four pixels of the other image, the differences of a patch are the bilinear mean of its
-/// differences at these four, and their sums are polynomials of the four weights. So pixels are
-/// read only when a patch enters another cell of four pixels.
+/// In a cell of four pixels of the other image, the differences of a patch are the bilinear mean of
+/// its differences at the four corners, and their sums are polynomials of the four weights. So
+/// pixels are read only when a patch enters another cell.
 template <int side>
 class Search {
  public:
@@ -113,8 +114,8 @@ class Search {
     }
   }
 
-  /// Starts patches from the best of their neighbours' flows, and stops those whose own is hardly
-  /// worse.
+  /// Starts patches from the best flow of their neighbours; deactivates patches whose own flow is
+  /// about as good.
   void start_from(const Image<Flow>& found, int row) {
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
@@ -240,13 +241,13 @@ class Search {
     mean_y_[i] = static_cast<float>(totals[5]) / pixels;
   }
 
-  /// Marks the sums of a patch to be read at its next position.
+  /// Makes locate() queue a patch at its next position.
   void leave_cell(int i) {
     cell_x_[i] = cell_y_[i] = std::numeric_limits<float>::max();
   }
 
-  /// Computes the sums at the four pixels of a patch's cell, of the differences d0 ... d3 and their
-  /// products.
+  /// Computes the sums of the differences d0 ... d3 at the four corners of a patch's cell, and of
+  /// their products.
   template <Sums sums>
   void read_cell(int i) {
     const int x = left_ + i * stride_;
@@ -341,7 +342,7 @@ class Search {
     moved_count_ = 0;
   }
 
-  /// Where in their cells a vector of patches are.
+  /// Bilinear weights of a vector of patches in their cells.
   class Cell {
    public:
     HWY_INLINE Cell(const Search& search, int i) : search_(search), i_(i) {
@@ -416,8 +417,8 @@ class Search {
     locate(i, goes_on, flow_x, flow_y);
   }
 
-  // Indices of sums: the squares of d0 ... d3; d0 with d1, d2, d3, d1 with d2, d3, d2 with d3; and
-  // d0 ... d3, alone and times each gradient.
+  // Indices of sums: 0 to 3 are the squares of d0 ... d3; 4 to 9 the products d0 d1, d0 d2, d0 d3,
+  // d1 d2, d1 d3 and d2 d3; then follow d0 ... d3, alone and times each gradient.
   static constexpr int sum = 12;
   static constexpr int sum_x = 16;
   static constexpr int sum_y = 20;
@@ -451,7 +452,6 @@ class Search {
   HWY_ALIGN float sums_[max_sums][capacity];
 };
 
-/// Searches from `found`, of all patches, if there are any, else from `flows`.
 template <int side>
 void search(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradients& gradients,
             const Image<std::uint8_t>& to, int row, int iterations, const Image<Flow>* found,
@@ -485,14 +485,9 @@ namespace eventcamera {
 HWY_EXPORT(search_one_row);
 
 void search_row(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradients& gradients,
-                const Image<std::uint8_t>& to, int row, int iterations, Flow* flows) {
-  HWY_DYNAMIC_DISPATCH(search_one_row)(grid, from, gradients, to, row, iterations, nullptr, flows);
-}
-
-void propagate_row(const PatchGrid& grid, const Image<std::uint8_t>& from,
-                   const Gradients& gradients, const Image<std::uint8_t>& to, int row,
-                   int iterations, const Image<Flow>& found, Flow* flows) {
-  HWY_DYNAMIC_DISPATCH(search_one_row)(grid, from, gradients, to, row, iterations, &found, flows);
+                const Image<std::uint8_t>& to, int row, int iterations, const Image<Flow>* found,
+                Flow* flows) {
+  HWY_DYNAMIC_DISPATCH(search_one_row)(grid, from, gradients, to, row, iterations, found, flows);
 }
 
 }  // namespace eventcamera

@@ -32,7 +32,7 @@ constexpr float min_residual = 0.001F * 0.001F;
 constexpr float over_relaxation = 1.6F;
 constexpr int half_sweeps = 2 * 5;      ///< per evaluation of the penalties
 constexpr int reach = half_sweeps - 1;  ///< distance to the farthest row that affects a row
-/// Positions in the later image are rounded to a fraction of a pixel.
+/// Positions in the later image are rounded to 1/fractions of a pixel.
 constexpr float fractions = 32;
 
 HWY_INLINE Vector load(const float* values) {
@@ -60,9 +60,9 @@ HWY_INLINE Vector inverse_sqrt(Vector value) {
   return root * (set(1.5F) - half * root * root);
 }
 
-/// The columns to the left of a parity's columns; the columns to the right come next.
+/// Left neighbours of the columns of a parity; their right neighbours are one element further.
 template <class Plane>
-HWY_INLINE auto* beside(Plane& plane, int parity, int y) {
+HWY_INLINE auto* left_of(Plane& plane, int parity, int y) {
   return parity == 0 ? plane.row(1, y) - 1 : plane.row(0, y);
 }
 
@@ -70,7 +70,7 @@ HWY_INLINE auto* beside(Plane& plane, int parity, int y) {
 struct Neighbours {
   Neighbours(const SplitPlane& plane, int parity, int y, int y_above, int y_below)
       : here(plane.row(parity, y)),
-        side(beside(plane, parity, y)),
+        side(left_of(plane, parity, y)),
         above(plane.row(parity, y_above)),
         below(plane.row(parity, y_below)) {}
 
@@ -90,7 +90,7 @@ int ring(int y) {
   return y & (Scratch::rows - 1);
 }
 
-/// Computes the derivatives of the images at the positions to which a flow leads.
+/// Computes the derivatives of the earlier image and the later one, warped back along a flow.
 class Linearisation {
  public:
   Linearisation(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, const Field& flow,
@@ -112,10 +112,8 @@ class Linearisation {
     const auto rounded = hn::Round(exact * set(fractions)) * set(1 / fractions);
     return hn::Min(hn::Max(rounded, set(0.0F)), set(static_cast<float>(size - 1)));
   }
-  static HWY_INLINE Vector between(Vector a, Vector b, Vector weight) {
-    return a + weight * (b - a);
-  }
-  /// The mean of the pixels at offsets and their right neighbours: the two lowest bytes of words.
+  /// Interpolates between the pixels at offsets and their right neighbours, the two lowest bytes of
+  /// words.
   static HWY_INLINE Vector along(const std::uint8_t* pixels, hn::Vec<Ints> offsets, Vector weight) {
     const Ints ints;
     const auto words =
@@ -123,10 +121,10 @@ class Linearisation {
     const auto pixel = [&](auto lowest) HWY_ATTR {
       return hn::ConvertTo(Floats(), hn::And(lowest, hn::Set(ints, 0xFF)));
     };
-    return between(pixel(words), pixel(hn::ShiftRight<8>(words)), weight);
+    return lerp(pixel(words), pixel(hn::ShiftRight<8>(words)), weight);
   }
 
-  /// Computes the mean and the difference of the earlier image and the later one, moved back.
+  /// Computes the mean and the difference of the earlier image and the warped later one.
   void warp(int y) {
     for (int parity = 0; parity < 2; ++parity) warp(y, parity);
     scratch_.mean.replicate_ends(ring(y));
@@ -154,7 +152,7 @@ class Linearisation {
           hn::ConvertTo(ints, cell_y) * hn::Set(ints, stride) + hn::ConvertTo(ints, cell_x);
       const auto right = to_x - cell_x;
       const auto there =
-          between(along(data, offsets, right), along(data + stride, offsets, right), to_y - cell_y);
+          lerp(along(data, offsets, right), along(data + stride, offsets, right), to_y - cell_y);
       hn::Vec<decltype(bytes)> columns[2];
       hn::LoadInterleaved2(bytes, here + std::ptrdiff_t{2} * k, columns[0], columns[1]);
       const auto grey = hn::ConvertTo(floats, hn::PromoteTo(ints, columns[parity]));
@@ -211,13 +209,13 @@ class Assembly {
         start_y_(start.y.row(parity, y)),
         x_(scratch.flow.x.row(parity, ring(y))),
         y_(scratch.flow.y.row(parity, ring(y))),
-        left_(beside(scratch.weight, parity, ring(y))),
+        left_(left_of(scratch.weight, parity, ring(y))),
         right_(scratch.right.row(parity, y & 1)),
         above_(scratch.weight.row(parity, ring(y - 1))),
         below_(scratch.weight.row(parity, ring(y + 1 < start.x.height() ? y : y + 1))),
         out_(scratch.equations.row(parity, ring(y))) {}
 
-  /// Processes two vectors at a time, because the operations on one depend on each other.
+  /// Processes two vectors at a time, because the operations on each depend on one another.
   void run(int count) const {
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     for (int k = 0; k < count; k += 2 * lanes) {
@@ -344,7 +342,7 @@ class Assembly {
   float* out_;
 };
 
-/// Evaluates the penalties at a flow, and improves the flow.
+/// Evaluates the penalties at a flow, and relaxes the equations that they give.
 class Relaxation {
  public:
   Relaxation(const Derivatives& derivatives, const Field& start, const Field& flow, int first,
@@ -422,14 +420,14 @@ class Relaxation {
     return square(flow.right(k) - value) + square(load(flow.below + k) - value);
   }
 
-  /// Every other pixel of the rows, from the first column on; all these planes share the offset of
-  /// a row.
+  /// Every other pixel of the rows, from the first column on. All these planes have the same offset
+  /// from row to row.
   struct Pixels {
     Pixels(Scratch& scratch, int parity)
         : x(scratch.flow.x.row(parity, 0)),
           y(scratch.flow.y.row(parity, 0)),
           weight(scratch.weight.row(parity, 0)),
-          to_left(beside(scratch.weight, parity, 0) - weight) {}
+          to_left(left_of(scratch.weight, parity, 0) - weight) {}
 
     float* x;
     float* y;
@@ -437,18 +435,18 @@ class Relaxation {
     std::ptrdiff_t to_left;  ///< from a pixel to the one on its left
   };
 
-  /// Relaxes a vector of pixels, row by row, upwards.
-  class Climb {
+  /// Relaxes a vector of pixels, row by row from the bottom up.
+  class UpwardSweep {
    public:
-    HWY_INLINE Climb(const Pixels& pixels, std::ptrdiff_t below, std::ptrdiff_t row)
+    HWY_INLINE UpwardSweep(const Pixels& pixels, std::ptrdiff_t below, std::ptrdiff_t row)
         : below_x_(load(pixels.x + below)),
           below_y_(load(pixels.y + below)),
           x_(load(pixels.x + row)),
           y_(load(pixels.y + row)),
           weight_(load(pixels.weight + row)) {}
 
-    HWY_INLINE void improve(const Pixels& pixels, std::ptrdiff_t row, std::ptrdiff_t above,
-                            const float* equation) {
+    HWY_INLINE void relax(const Pixels& pixels, std::ptrdiff_t row, std::ptrdiff_t above,
+                          const float* equation) {
       const auto coefficient = [&](int which) HWY_ATTR {
         return load(equation + which * EquationRows::block);
       };
@@ -458,22 +456,22 @@ class Relaxation {
       const auto left_row = row + pixels.to_left;
       const auto left = load(pixels.weight + left_row);
       // Adds the row below last, because it has just been computed.
-      const auto pull = [&](const float* beside, Vector above_flow, Vector constant,
-                            Vector below_flow) HWY_ATTR {
+      const auto smoothed = [&](const float* beside, Vector above_flow, Vector constant,
+                                Vector below_flow) HWY_ATTR {
         const auto along = left * load(beside) + weight_ * load(beside + 1);
         const auto sum = along + constant + up * above_flow;
         return sum + weight_ * below_flow;
       };
       const auto cross = coefficient(VariationalRefinement::cross);
       const auto keep = set(1 - over_relaxation);
-      const auto pull_x =
-          pull(pixels.x + left_row, above_x,
-               coefficient(VariationalRefinement::constant_x) - cross * y_, below_x_);
-      const auto pull_y = pull(pixels.y + left_row, above_y,
-                               coefficient(VariationalRefinement::constant_y), below_y_);
-      below_x_ = keep * x_ + pull_x * coefficient(VariationalRefinement::inverse_x);
+      const auto sum_x =
+          smoothed(pixels.x + left_row, above_x,
+                   coefficient(VariationalRefinement::constant_x) - cross * y_, below_x_);
+      const auto sum_y = smoothed(pixels.y + left_row, above_y,
+                                  coefficient(VariationalRefinement::constant_y), below_y_);
+      below_x_ = keep * x_ + sum_x * coefficient(VariationalRefinement::inverse_x);
       below_y_ =
-          keep * y_ + (pull_y - cross * below_x_) * coefficient(VariationalRefinement::inverse_y);
+          keep * y_ + (sum_y - cross * below_x_) * coefficient(VariationalRefinement::inverse_y);
       store(below_x_, pixels.x + row);
       store(below_y_, pixels.y + row);
       x_ = above_x;
@@ -489,9 +487,9 @@ class Relaxation {
     Vector weight_;
   };
 
-  /// Does half sweep i of row y - i, for every i. A few columns are relaxed in all these rows at a
-  /// time, so that most of what a row needs has just been loaded for the row below it. Two vectors
-  /// at a time, because each row depends on the row below it.
+  /// Runs half sweep i of row y - i, for each i. A few columns pass through all these rows at a
+  /// time, because a row needs mostly what has just been loaded for the row below it. Two vectors
+  /// at a time, because their dependent operations then overlap.
   void relax(int y) {
     const int begin = std::max(0, y - height_ + 1);
     const int end = std::min({half_sweeps, y + 1, (y - first_ + reach) / 2 + 1});
@@ -509,11 +507,11 @@ class Relaxation {
     for (int k = 0; k < count; k += 2 * lanes) {
       const auto at = EquationRows::offset_of(k);
       const auto next = EquationRows::offset_of(k + lanes);
-      Climb left(pixels, below + k, rows[begin] + k);
-      Climb right(pixels, below + k + lanes, rows[begin] + k + lanes);
+      UpwardSweep left(pixels, below + k, rows[begin] + k);
+      UpwardSweep right(pixels, below + k + lanes, rows[begin] + k + lanes);
       for (int i = begin; i < end; ++i) {
-        left.improve(pixels, rows[i] + k, rows[i + 1] + k, equations[i] + at);
-        right.improve(pixels, rows[i] + k + lanes, rows[i + 1] + k + lanes, equations[i] + next);
+        left.relax(pixels, rows[i] + k, rows[i + 1] + k, equations[i] + at);
+        right.relax(pixels, rows[i] + k + lanes, rows[i + 1] + k + lanes, equations[i] + next);
       }
     }
     for (int i = begin; i < end; ++i) clear_past_end(ring(y - i), parity);

@@ -28,7 +28,7 @@ constexpr int strip = FlowUpdate::strip;
 /// Coefficients of the normal equations: symmetric 2x2 matrix and right-hand side.
 constexpr int equations = FlowUpdate::equations;
 
-/// Polynomials of a row, interpolated between columns.
+/// Interpolates the polynomials of a row between columns.
 struct Columns {
   Lookup<Floats> first;
   Lookup<Floats> second;
@@ -58,8 +58,8 @@ HWY_INLINE void add_weighted(const PolynomialExpansion& to, int column, int row,
 
 /// Positions in the later image to which the flow moves a vector of pixels.
 struct Targets {
-  hn::Mask<Words> inside;  ///< the image
-  WordVector column;       ///< of the pixel left of and above the target
+  hn::Mask<Words> inside;  ///< true within the image
+  WordVector column;       ///< of the pixel to the upper left of the target
   WordVector row;
   Vector right;  ///< sub-pixel offset from that pixel
   Vector down;
@@ -85,9 +85,9 @@ struct Targets {
 
 /// Interpolates the later polynomials bilinearly; outside the image they are 0.
 ///
-/// Neighbours mostly have similar flow: they end between columns of the same two vectors, in the
-/// same row or an adjacent one. All such lanes read the same three rows; the row that a lane does
-/// not need has weight 0. The remaining lanes are processed next, grouped in the same way.
+/// Neighbours mostly have similar flow: their targets lie between columns of the same two vectors,
+/// in the same row or an adjacent one. All such lanes read the same three rows; the row that a lane
+/// does not need has weight 0. The remaining lanes are then grouped in the same way.
 HWY_INLINE void interpolate(const PolynomialExpansion& to, const Targets& targets, Vector* sums) {
   const Words words;
   const Floats floats;
@@ -134,7 +134,7 @@ HWY_INLINE void interpolate(const PolynomialExpansion& to, const Targets& target
 
 using RowSums = FlowUpdate::RowSums;
 
-/// Replaces the equations of each row of a block by the sum over this row and all later ones.
+/// Replaces the equations of each row of a block by their sum over this row and all later ones.
 void complete_block(RowSums& sums) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
@@ -154,14 +154,14 @@ void complete_block(RowSums& sums) {
 template <int width>
 using EquationRows = float[equations][width + 2 * row_padding];
 
-/// Sums over the rows of a window: a strip's, preceded by the last sums of the strip to the left.
+/// Sums over the rows of a window for a strip, after the last sums of the strip to the left.
 struct Window {
   static constexpr int before = row_padding;
   HWY_ALIGN EquationRows<before + strip> sums = {};
 };
 
-/// Adds the equations of columns [left, right) of image row y, as row `row` of the current block,
-/// and computes the sums over the last rows, as many as a window has.
+/// Adds the equations of columns [left, right) of image row y, which is row `row` of the current
+/// block, and computes the sums over the rows of the window that ends there.
 void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, const Flow* flow,
              int y, int left, int right, float row_weight, const float* column_weights, int row,
              RowSums& sums, Window& window) {
@@ -181,7 +181,7 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
     for (int k = 0; k < coefficients; ++k) hwy::Prefetch(next + k * group);
     const auto here = [&](int k) { return hn::Load(floats, polynomials + k * group); };
     const auto weight = hn::Set(floats, row_weight) * hn::LoadU(floats, column_weights + x);
-    // Outside the image, the earlier polynomial alone gives a.
+    // Outside the image, a comes from the earlier polynomial alone.
     const auto a_weight = hn::IfThenElse(hn::RebindMask(floats, targets.inside), half, one);
     auto a_yy = (here(2) + there[2]) * a_weight;
     auto a_xx = (here(3) + there[3]) * a_weight;

@@ -24,13 +24,11 @@ class PolynomialExpansion {
 
   int width() const { return width_; }
   int height() const { return height_; }
-  /// First coefficient of the polynomial at (x, y); the others follow `group` floats apart. The
-  /// coefficients of `group` more pixels to the right, and of the row below the last one, may be
-  /// read, and are finite.
+  /// First coefficient of the polynomial at (x, y); the others follow `group` floats apart. `group`
+  /// more pixels to the right, and the row below the last one, may be read: they are finite.
   const float* at(int x, int y) const { return groups_.row(y) + place(x); }
 
   using Scratch = std::array<std::vector<float>, 3>;  ///< sums along the columns
-  /// Fits row y.
   void fit(int y, const Window& window, Scratch& scratch);
 
  private:
@@ -44,9 +42,9 @@ class PolynomialExpansion {
   Image<float> groups_;  ///< in a group, each coefficient of all pixels in turn
 };
 
-/// Kernels of the least-squares fit, which is separable: each coefficient is one kernel along the
-/// columns, then one along the rows. Only the half from the centre on is stored; `slope` is odd,
-/// the others are even.
+/// Kernels of the least-squares fit, which is separable: each coefficient applies one kernel along
+/// the columns, then one along the rows. Only the half from the centre on is stored; `slope` is
+/// odd, the others are even.
 struct FitKernels {
   static constexpr int count = PolynomialExpansion::reach + 1;
   FitKernels();

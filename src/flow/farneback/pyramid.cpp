@@ -88,7 +88,7 @@ int shrunk(int length, int level) {
   return static_cast<int>(std::lrint(std::ldexp(length, -level)));
 }
 
-/// Mirrors an index past the border at the outermost pixel.
+/// Mirrors an index at the outermost pixels.
 int mirrored(int i, int length) {
   if (length == 1) return 0;
   while (i < 0 || i >= length) i = i < 0 ? -i : 2 * (length - 1) - i;
@@ -110,7 +110,7 @@ void PyramidLevel::row(const ImageView<std::uint8_t>& image, int y, Scratch& scr
   const int width = image.width;
   const auto padded_width = static_cast<std::size_t>(width) + row_padding;
 
-  // Blur and interpolation between two rows in one kernel, one row longer.
+  // Blur and interpolation between two rows in one kernel, longer by one row.
   std::array<const std::uint8_t*, max_kernel + 1> rows;
   std::array<float, max_kernel + 1> weights{};
   const float lower = rows_.weight()[y];

@@ -9,9 +9,8 @@
 
 namespace eventcamera {
 
-/// Blurs an image with a Gaussian and shrinks it to 1 / 2^level of its size, row by row. A blur of
-/// about half a pixel of the shrunk image prevents aliasing; level 0 is blurred slightly, to reduce
-/// noise.
+/// Blurs an image with a Gaussian and shrinks it to 1 / 2^level of its size, row by row. The blur,
+/// about half a pixel of the shrunk image, prevents aliasing; on level 0 it reduces noise.
 class PyramidLevel {
  public:
   struct Scratch {
@@ -19,7 +18,6 @@ class PyramidLevel {
     std::vector<float> blurred;
   };
 
-  /// For images of this size.
   PyramidLevel(int width, int height, int level);
 
   int width() const { return columns_.size(); }

@@ -10,7 +10,7 @@
 namespace eventcamera {
 namespace {
 
-/// Bit i is bit 2i or bit 2i + 1 of a word.
+/// ORs pairs of bits: bit i of the result is bit 2i | bit 2i + 1.
 std::uint64_t join_pairs(std::uint64_t bits) {
   bits = (bits | bits >> 1) & 0x5555555555555555U;
   bits = (bits | bits >> 1) & 0x3333333333333333U;
@@ -30,13 +30,13 @@ void PointTracker::Blocks::clear() {
   }
 }
 
-Track PointTracker::Blocks::between(int x, int y) const {
+Track PointTracker::Blocks::interpolated(int x, int y) const {
   const int column = x / 2;
   const int row = y / 2;
   const auto& own = track(column, row);
   Flow flow = own.flow;
-  const auto approach = [&](int beside, int below) {
-    // Without branches: a block past the border is the own one.
+  const auto add_share_of = [&](int beside, int below) {
+    // Without branches: past the border, this is the block itself.
     const auto& other =
         track(std::clamp(beside, 0, region_side - 1), std::clamp(below, 0, region_side - 1));
     const auto part = [&](float from, float to) {
@@ -45,8 +45,8 @@ Track PointTracker::Blocks::between(int x, int y) const {
     };
     flow = {flow.x + part(own.flow.x, other.flow.x), flow.y + part(own.flow.y, other.flow.y)};
   };
-  approach(x % 2 == 0 ? column - 1 : column + 1, row);
-  approach(column, y % 2 == 0 ? row - 1 : row + 1);
+  add_share_of(x % 2 == 0 ? column - 1 : column + 1, row);
+  add_share_of(column, y % 2 == 0 ? row - 1 : row + 1);
   return {flow, own.found};
 }
 
@@ -85,8 +85,8 @@ std::span<const Track> PointTracker::track(std::span<const Point> points, Thread
   const int across = (image.width() + side - 1) / side;
   const int down = (image.height() + side - 1) / side;
   threads.for_each(across * down, [&](int i, int thread) {
-    follow(points, i % across * side, i / across * side,
-           regions_[static_cast<std::size_t>(thread)]);
+    track_region(points, i % across * side, i / across * side,
+                 regions_[static_cast<std::size_t>(thread)]);
   });
   return tracks_;
 }
@@ -98,7 +98,7 @@ void PointTracker::find_rows(std::span<const Point> points, int height) {
   rows_.resize(static_cast<std::size_t>(height) + 1, points.size());
 }
 
-void PointTracker::follow(std::span<const Point> points, int left, int top, Region& region) {
+void PointTracker::track_region(std::span<const Point> points, int left, int top, Region& region) {
   auto& finest = region.levels[0];
   finest.clear();
   const int side = block_side_ * region_side;
@@ -129,7 +129,7 @@ void PointTracker::follow(std::span<const Point> points, int left, int top, Regi
     for (const auto& point : rows[static_cast<std::size_t>(y - top)])
       tracks_[static_cast<std::size_t>(&point - points.data())] =
           block_side_ == 1 ? finest.track(point.x - left, y - top)
-                           : finest.between(point.x - left, y - top);
+                           : finest.interpolated(point.x - left, y - top);
   }
 }
 

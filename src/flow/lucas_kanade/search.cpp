@@ -4,18 +4,155 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <optional>
 
 #define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/search.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
-#include "src/flow/lucas_kanade/window_sums-inl.hpp"
 #include "src/flow/product_sum-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
+
+/// Pairs of columns, or of rows, of a window.
+constexpr int window_pairs = Tile::window / 2;
+/// Pairs of columns of a tile's windows, rounded up to whole vectors.
+constexpr int column_pairs = 2 * Tile::side;
+
+/// Pairs of columns, one per lane.
+using Pairs = hn::CappedTag<std::int32_t, Tile::side>;
+using Pair = hn::Vec<Pairs>;
+constexpr int pairs_at_once = hn::MaxLanes(Pairs());
+
+#if HWY_TARGET == HWY_SCALAR
+template <class A, class B>
+HWY_INLINE Pair pair_products(const A* a, const B* b) {
+  return hn::Set(Pairs(), a[0] * b[0] + a[1] * b[1]);
+}
+#else
+using PairValues = hn::Repartition<std::int16_t, Pairs>;
+
+HWY_INLINE hn::Vec<PairValues> load_pairs(const std::int16_t* at) {
+  return hn::LoadU(PairValues(), at);
+}
+HWY_INLINE hn::Vec<PairValues> load_pairs(const std::uint8_t* at) {
+  return hn::PromoteTo(PairValues(), hn::LoadU(hn::Rebind<std::uint8_t, PairValues>(), at));
+}
+
+/// Products of two rows, from these columns on, added up in pairs.
+template <class A, class B>
+HWY_INLINE Pair pair_products(const A* a, const B* b) {
+  auto odd = hn::Zero(Pairs());
+  const auto even =
+      hn::ReorderWidenMulAccumulate(Pairs(), load_pairs(a), load_pairs(b), hn::Zero(Pairs()), odd);
+  return hn::RearrangeToOddPlusEven(even, odd);
+}
+#endif
+
+/// All pairs of a row.
+class PairRow {
+ public:
+  static constexpr std::size_t size = column_pairs / pairs_at_once;
+
+  /// All 0. Not left to std::array, whose constructor GCC 12 compiles without the target's
+  /// instructions.
+  PairRow() {
+    for (auto& vector : vectors_) vector = hn::Zero(Pairs());
+  }
+  Pair& operator[](std::size_t i) { return vectors_[i]; }
+  const Pair& operator[](std::size_t i) const { return vectors_[i]; }
+
+ private:
+  Pair vectors_[size];
+};
+
+/// A vector that begins n lanes into `left` and ends in `right`.
+template <int n>
+HWY_INLINE Pair lanes_from(Pair left, Pair right) {
+#if HWY_MAX_BYTES >= 32
+  const auto middle = hn::ConcatLowerUpper(Pairs(), right, left);
+  if constexpr (n < 4)
+    return hn::CombineShiftRightLanes<n>(Pairs(), middle, left);
+  else if constexpr (n == 4)
+    return middle;
+  else
+    return hn::CombineShiftRightLanes<n - 4>(Pairs(), right, middle);
+#elif HWY_MAX_BYTES == 16
+  return hn::CombineShiftRightLanes<n>(Pairs(), right, left);
+#else
+  return n == 0 ? left : right;
+#endif
+}
+
+/// Pairs n and up of a row, from its vector `first` on.
+template <int n>
+HWY_INLINE Pair pairs_from(const PairRow& row, std::size_t first) {
+  const auto left = first + n / pairs_at_once;
+  if constexpr (n % pairs_at_once == 0) {
+    return left < PairRow::size ? row[left] : hn::Zero(Pairs());
+  } else {
+    return lanes_from<n % pairs_at_once>(
+        left < PairRow::size ? row[left] : hn::Zero(Pairs()),
+        left + 1 < PairRow::size ? row[left + 1] : hn::Zero(Pairs()));
+  }
+}
+
+/// A row whose elements are each the sum of itself and the one `n` to its right.
+template <int n>
+HWY_INLINE PairRow add_pairs(const PairRow& row) {
+  PairRow sums;
+  for (std::size_t i = 0; i < PairRow::size; ++i) sums[i] = row[i] + pairs_from<n>(row, i);
+  return sums;
+}
+
+/// Computes `count` sums of products over the window of each block in the first `rows` rows of
+/// blocks of a tile. Windows overlap, so rows and columns are summed in pairs first: this takes the
+/// time of about two windows summed on their own.
+///
+/// products(row, column) returns pair_products() in a row of pixels from a column on, both counted
+/// from the first pixel of the tile's first window; store(row, column, left, right) takes the sums
+/// over the left and the right half of the windows of pairs_at_once blocks.
+template <std::size_t count, class Products, class Store>
+HWY_INLINE void sum_windows(int rows, const Products& products, const Store& store) {
+  const Pairs pairs;
+  HWY_ALIGN std::int32_t of_rows[Tile::side + window_pairs - 1][count][column_pairs];
+  PairRow sums[count];
+  for (int row = 0; row < rows + window_pairs - 1; ++row) {
+    for (std::size_t i = 0; i < PairRow::size; ++i) {
+      const int pair = static_cast<int>(i) * pairs_at_once;
+      const auto upper = products(2 * row, 2 * pair);
+      const auto lower = products(2 * row + 1, 2 * pair);
+      for (std::size_t k = 0; k < count; ++k) {
+        const auto both = upper[k] + lower[k];
+        hn::Store(both, pairs, of_rows[row][k] + pair);
+        if (row < window_pairs - 1) sums[k][i] = sums[k][i] + both;
+      }
+    }
+  }
+  for (int row = 0; row < rows; ++row) {
+    PairRow halves[count];
+    for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t i = 0; i < PairRow::size; ++i)
+        sums[k][i] =
+            sums[k][i] + hn::Load(pairs, of_rows[row + window_pairs - 1][k] + i * pairs_at_once);
+      halves[k] = add_pairs<2>(add_pairs<1>(sums[k]));
+      for (std::size_t i = 0; i < PairRow::size; ++i)
+        sums[k][i] = sums[k][i] - hn::Load(pairs, of_rows[row][k] + i * pairs_at_once);
+    }
+    for (std::size_t i = 0; i < PairRow::size / 2; ++i) {
+      Pair left[count];
+      Pair right[count];
+      for (std::size_t k = 0; k < count; ++k) {
+        left[k] = halves[k][i];
+        right[k] = pairs_from<window_pairs / 2>(halves[k], i);
+      }
+      store(row, static_cast<int>(i) * pairs_at_once, left, right);
+    }
+  }
+}
 
 /// A window row, or part of it if vectors are shorter.
 using Values = hn::CappedTag<std::int16_t, 16>;
@@ -30,7 +167,7 @@ using Ints = hn::RebindToSigned<Floats>;
 
 constexpr int max_moves = 11;
 constexpr float min_move = 0.03F;
-/// A search that moves by more than max_late_move after early_moves has nothing to converge to.
+/// A search that still moves by more than max_late_move after early_moves does not converge.
 constexpr int early_moves = 4;
 constexpr float max_late_move = 2.0F;
 /// Two successive moves that cancel to within this distance oscillate: the search ends halfway.
@@ -72,11 +209,10 @@ HWY_INLINE void for_each_row(const Body& body) {
   }
 }
 
-/// Partial sums per ProductSum in the output of store_parts(): one per 128-bit block.
+/// Partial sums of a ProductSum that store_parts() writes: one per 128-bit block.
 constexpr std::ptrdiff_t parts = hn::MaxLanes(Sums()) == 8 ? 2 : 1;
 
-/// Reduces the lanes of four sums within 128-bit blocks: out[4 * part + k] is a partial sum of sum
-/// k.
+/// Adds up the lanes of four sums in 128-bit blocks: out[4 * part + k] is a part of sum k.
 template <class Factors>
 HWY_INLINE void store_parts(const ProductSum<Factors>& sum0, const ProductSum<Factors>& sum1,
                             const ProductSum<Factors>& sum2, const ProductSum<Factors>& sum3,
@@ -89,7 +225,7 @@ HWY_INLINE void store_parts(const ProductSum<Factors>& sum0, const ProductSum<Fa
 #endif
 }
 
-// A window row of both gradients, and a row of pixels to multiply both with.
+// A window row of both gradients, and a row of pixels by which both are multiplied.
 #if HWY_MAX_BYTES >= 64
 using BothValues = hn::FixedTag<std::int16_t, 32>;
 using Both = hn::Vec<BothValues>;
@@ -153,11 +289,11 @@ struct Windows {
   int index(const Search& search) const { return (search.y - first_row) * Tile::side + search.x; }
 };
 
-/// Sums of the windows of all blocks of a tile, moved by displacements where several blocks search.
+/// Window sums of all blocks of a tile, at displacements where several blocks search.
 ///
-/// Displacements are in whole pixels, and have an index of their own if they are near the start of
-/// the tile's first search. A search needs the sums at four corners: its displacement, and those
-/// one pixel to the right, one below, and both.
+/// Displacements are in whole pixels; each has an index if it is near the start of the tile's first
+/// search. A search needs the sums at four corners: at its displacement, one pixel to the right,
+/// one below, and both.
 class SharedSums {
  public:
   SharedSums(const Image<std::uint8_t>& to, const Windows& windows, const Flow& start)
@@ -178,8 +314,8 @@ class SharedSums {
     return hn::ConvertTo(Ints(), hn::IfThenElse(near, at, hn::Set(floats, far)));
   }
 
-  /// Computes the sums of displacements at which enough of the blocks search. False if there are
-  /// none.
+  /// Computes the sums of displacements at which at least `enough` blocks search. Returns false if
+  /// there are none.
   bool share(std::span<const std::int32_t> blocks, const std::int32_t* displacement) {
     if (blocks.size() < enough) return false;
     bool any = false;
@@ -197,18 +333,18 @@ class SharedSums {
     return sums_[corners_[displacement][c] - 1][window];
   }
 
-  /// Number of searches at one displacement that take longer than the sums of all windows.
+  /// Number of searches at one displacement from which on summing all windows is faster.
   static constexpr int enough = 5;
 
  private:
   static constexpr int side = 32;  ///< of the square of displacements that have an index
-  static constexpr float before =
-      side / 2.0F;  ///< pixels of the square on either side of the start
+  /// Pixels of the square on either side of the start.
+  static constexpr float before = side / 2.0F;
   static constexpr std::int32_t far = side * side - 1;  ///< index of all other displacements
   static constexpr int max_sums = 64;                   ///< maximum number of corners with sums
   static constexpr std::uint8_t none = 0;
 
-  /// Returns false if there is no memory left for them, or a window leaves the image.
+  /// Returns false if max_sums is reached, or a window leaves the image.
   bool compute(std::int32_t displacement) {
     const std::array<std::int32_t, corners> all{displacement, displacement + 1, displacement + side,
                                                 displacement + side + 1};
@@ -511,8 +647,7 @@ class Blocks {
       mismatch_y[c] = subtract(there_y, here_y_);
     }
     const auto bilinear = [&](const auto& at) {
-      const auto between = [](auto a, auto b, auto part) { return a + (b - a) * part; };
-      return between(between(at[0], at[1], beyond_x), between(at[2], at[3], beyond_x), beyond_y) *
+      return lerp(lerp(at[0], at[1], beyond_x), lerp(at[2], at[3], beyond_x), beyond_y) *
              hn::Set(floats, mismatch_product);
     };
     const auto x = bilinear(mismatch_x);

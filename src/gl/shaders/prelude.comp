@@ -1,4 +1,5 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later Shared by all shaders.
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Shared by all shaders.
 
 // First word of a point or block that does not exist.
 const uint none = 0x7fffffffu;
