@@ -56,7 +56,7 @@ double block_gain(const ImageView<Pixel>& last, const ImageView<Pixel>& now, con
 ExposureGain::ExposureGain(int bits, bool linear_light) : light_(std::size_t{1} << bits) {
   const int white = static_cast<int>(light_.size()) - 1;
   for (int luma = dark_luma * white / 255 + 1; luma < saturated_luma(white); ++luma)
-    light_[static_cast<std::size_t>(luma)] = static_cast<std::uint16_t>(
+    light_[luma] = static_cast<std::uint16_t>(
         std::lround(65535 * light_of(luma / static_cast<double>(white), linear_light)));
 }
 
@@ -112,7 +112,7 @@ void expose(Image<Pixel>& frame, int bits, bool linear_light, double gain, Threa
   for (int luma = 0; luma <= white; ++luma) {
     const double light = light_of(luma / static_cast<double>(white), linear_light);
     const double brighter = std::min(1.0, luma_of(gain * light, linear_light));
-    exposed[static_cast<std::size_t>(luma)] =
+    exposed[luma] =
         static_cast<Pixel>(luma < saturated_luma(white) ? std::lround(white * brighter) : luma);
   }
   for_each_row(threads, frame.height(), [&](int y) {

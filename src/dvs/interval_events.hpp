@@ -30,7 +30,7 @@ class IntervalEvents {
 
  public:
   IntervalEvents(int width, int height)
-      : width_(width), height_(height), deferred_(static_cast<std::size_t>(band_count(height))) {}
+      : width_(width), height_(height), deferred_(band_count(height)) {}
 
   /// Begins an interval of `duration` microseconds. `max_rate` is in events per second; 0 = no
   /// limit. `rolling_shutter` is as for row_delays().
@@ -93,7 +93,7 @@ class IntervalEvents {
       delays_ = events.rolling_shutter_ != 0 ? events.delays_.data() : nullptr;
       fired_ = &events.fired_;
       band_ = band;
-      deferred_ = &events.deferred_[static_cast<std::size_t>(band)];
+      deferred_ = &events.deferred_[band];
       added_.clear();
       kept_ = 0;
       for (const auto& [t, event] : *deferred_) {

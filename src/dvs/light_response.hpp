@@ -61,7 +61,7 @@ class LightResponse {
   /// Response to the luma of a frame.
   float operator()(int luma) const {
     const int seen = is_widened() ? 257 * luma : luma;
-    return table_[static_cast<std::size_t>(std::min(seen, white()))];
+    return table_[std::min(seen, white())];
   }
 
  private:

@@ -130,7 +130,7 @@ Flow flow_to(const ImageView<Flow>& flow, int x, int y) {
 
 MotionDeblur::MotionDeblur(int width, int height)
     : paths_((width + block - 1) / block, height),
-      moves_(static_cast<std::size_t>(height)),
+      moves_(height),
       frame_(width, height),
       light_(width, height, margin),
       ratio_(width, height, margin) {}
@@ -145,7 +145,7 @@ void MotionDeblur::set_motion(const ImageView<Flow>& flow, double share, bool at
       path = path_of(at_end ? flow_to(flow, x, y) : flow.row(y)[x], share);
       moves |= path.length > 1;
     }
-    moves_[static_cast<std::size_t>(y)] = moves;
+    moves_[y] = moves;
   });
 }
 
@@ -154,7 +154,7 @@ void MotionDeblur::sharpen(Image<Pixel>& frame, int bits, ThreadPool& threads) {
   const int width = frame.width();
   const int height = frame.height();
   const float scale = 255.0F / static_cast<float>((1 << bits) - 1);
-  const auto moves = [&](int y) { return moves_[static_cast<std::size_t>(y)] != 0; };
+  const auto moves = [&](int y) { return moves_[y] != 0; };
   for_each_row(threads, height, [&](int y) {
     for (int x = 0; x < width; ++x)
       frame_.row(y)[x] = static_cast<float>(frame.row(y)[x]) * scale + offset;

@@ -97,7 +97,7 @@ class Timeline {
   void make_plan(int steps);
 
   /// A plan that was made.
-  const Plan& plan(int steps) const { return plans_[static_cast<std::size_t>(steps)]; }
+  const Plan& plan(int steps) const { return plans_[steps]; }
 
   /// Ends the interval: the sub-intervals of the next one have larger numbers.
   void end();

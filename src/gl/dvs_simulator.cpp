@@ -199,7 +199,7 @@ class PixelSimulator final : public DvsSimulator {
     for (std::size_t i = 0; i < bands.size(); ++i) bands[i].begin(fired_, static_cast<int>(i));
     for (const Event& event : events) {
       const auto seventh = static_cast<int>(cause_of(event));
-      bands[static_cast<std::size_t>((event.y() & coordinate_bits) / rows_per_band)].add(
+      bands[(event.y() & coordinate_bits) / rows_per_band].add(
           event.t + (seventh > 0 ? (seventh - 0.5) / 7 : 0), without_cause(event));
     }
     for (auto& band : bands) band.end();
@@ -400,7 +400,7 @@ class PixelSimulator final : public DvsSimulator {
         plan = here();
         add_plan(timeline_.plan(steps), steps, shade_tables, words);
       }
-      words[static_cast<std::size_t>(tile)] = plan;
+      words[tile] = plan;
     }
 
     const auto response_bytes = std::as_bytes(std::span(responses));

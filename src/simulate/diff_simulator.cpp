@@ -54,7 +54,7 @@ struct PolarityFrames {
     for (std::size_t i = last.first[band]; i < last.first[band + 1]; ++i) {
       const auto& place = last.places[i];
       image.at(place.x, place.y) = 0;
-      is_black[static_cast<std::size_t>(place.y)] = 1;
+      is_black[place.y] = 1;
     }
   }
 
@@ -63,7 +63,7 @@ struct PolarityFrames {
     now.differences[i] = difference;
     image.at(place.x, place.y) =
         static_cast<std::uint8_t>(std::max(1, std::abs(difference) >> shift));
-    is_black[static_cast<std::size_t>(place.y)] = 0;
+    is_black[place.y] = 0;
   }
 
   /// Prepares to track to this difference frame and, in the next interval, from it.
@@ -150,7 +150,7 @@ class DiffSimulator final : public Simulator {
         last_(format.width, format.height),
         on_(format.width, format.height),
         off_(format.width, format.height),
-        moving_(static_cast<std::size_t>(band_count(format.height))) {}
+        moving_(band_count(format.height)) {}
 
  private:
   void start(const LumaView& frame) override {
@@ -239,7 +239,7 @@ class DiffSimulator final : public Simulator {
       frames_.emplace_back(format().width, format().height);
     threads().for_each(steps.count() - 1, [&](int i, int thread) {
       const int j = i + 1;
-      auto& frame = frames_[static_cast<std::size_t>(thread)];
+      auto& frame = frames_[thread];
       for (const auto& band : moving_) frame.add(band, j);
       frame.fire(j, steps.microseconds(j), events);
     });

@@ -255,7 +255,7 @@ void fire_row(const InterpolatedInterval<std::uint8_t>& interval, const LastSamp
 
     auto before = hn::PromoteTo(words, hn::LoadU(Bytes(), last_row + x));
     const auto end = hn::PromoteTo(words, hn::LoadU(Bytes(), now_row + x));
-    const int first = first_steps[static_cast<std::size_t>(x / tile_width)];
+    const int first = first_steps[x / tile_width];
     if (first == steps) {
       fire(before, end, steps);
       continue;
@@ -333,7 +333,7 @@ void fire_band_forward(const InterpolatedInterval<std::uint8_t>& interval,
   for (int top = rows.first; top < rows.last; top += tile_height) {
     const int bottom = std::min(top + tile_height, rows.last);
     for (int left = 0; left < width; left += tile_width)
-      first_steps[static_cast<std::size_t>(left / tile_width)] = first_step(
+      first_steps[left / tile_width] = first_step(
           interval, gradient_bound, {left, top, std::min(left + tile_width, width), bottom});
     for (int y = top; y < bottom; ++y)
       fire_row<Interpolation::forward>(interval, last, y, band, first_steps, events);

@@ -76,14 +76,14 @@ class Painter {
         auto& out = events.pixels(j, 0);
         out.begin(steps.microseconds(j));
         for (int y = 0; y < interval.now.height; ++y) {
-          const bool touched = interval.touched[static_cast<std::size_t>(y)] != 0;
+          const bool touched = interval.touched[y] != 0;
           if (!touched && !ends) continue;
           fire_differences(touched ? frames_[at].row(y) : interval.last.row(y),
                            ends ? interval.now.row(y) : frames_[at + 1].row(y), interval.now.width,
                            y, thresholds, out);
         }
       }
-      std::swap(frames_.front(), frames_[static_cast<std::size_t>(count)]);
+      std::swap(frames_.front(), frames_[count]);
     }
   }
 
@@ -91,14 +91,13 @@ class Painter {
   template <class Body>
   static void for_each_touched(const Interval<Pixel>& interval, const Body& body) {
     for (int y = 0; y < interval.now.height; ++y)
-      if (interval.touched[static_cast<std::size_t>(y)] != 0) body(y);
+      if (interval.touched[y] != 0) body(y);
   }
 
   /// Draws the background that the pixels uncover in step j into still_.
   void uncover(const Interval<Pixel>& interval, int j) {
     for (const auto& band : interval.bands)
-      for (const auto& [x, y, brightness] : band.uncovered[static_cast<std::size_t>(j)])
-        still_.at(x, y) = brightness;
+      for (const auto& [x, y, brightness] : band.uncovered[j]) still_.at(x, y) = brightness;
   }
 
   /// Draws the touched rows of `count` frames, those of step `begin` and later, into frames_[to]
@@ -139,8 +138,8 @@ class SparseSimulator final : public Simulator {
   explicit SparseSimulator(const LumaFormat& format)
       : Simulator(format),
         last_(format.width, format.height),
-        bands_(static_cast<std::size_t>(band_count(format.height))),
-        touched_(static_cast<std::size_t>(format.height)) {}
+        bands_(band_count(format.height)),
+        touched_(format.height) {}
 
  private:
   void start(const LumaView& frame) override {
@@ -164,8 +163,8 @@ class SparseSimulator final : public Simulator {
     while (static_cast<int>(painters_.size()) < runs)
       painters_.emplace_back(format().width, format().height);
     threads().for_each(runs, [&](int run, int) {
-      painters_[static_cast<std::size_t>(run)].fire(
-          interval, m * run / runs + 1, m * (run + 1) / runs, steps, thresholds, events);
+      painters_[run].fire(interval, m * run / runs + 1, m * (run + 1) / runs, steps, thresholds,
+                          events);
     });
     last_.assign(now);
   }
@@ -180,7 +179,7 @@ class SparseSimulator final : public Simulator {
       first_.push_back(first_.back() + changes_.pixels(1, band).size());
     changed_.resize(first_.back());
     threads().for_each(bands, [this](int band, int) {
-      Point* out = changed_.data() + first_[static_cast<std::size_t>(band)];
+      Point* out = changed_.data() + first_[band];
       changes_.pixels(1, band).visit([&](std::span<const Event> changes) {
         for (const auto& change : changes) *out++ = {change.x, change.y()};
       });
@@ -215,7 +214,7 @@ class SparseSimulator final : public Simulator {
     });
     std::fill(touched_.begin(), touched_.end(), 0);
     for (const auto& band : bands_)
-      for (int y = band.top; y < band.bottom; ++y) touched_[static_cast<std::size_t>(y)] = 1;
+      for (int y = band.top; y < band.bottom; ++y) touched_[y] = 1;
   }
 
   Image<Pixel> last_;

@@ -87,7 +87,7 @@ ImageView<std::uint8_t> DisFlow::padded(const ImageView<std::uint8_t>& image) {
 /// Runs body(rows, scratch) for the bands of an image of this height.
 template <class Body>
 void DisFlow::for_each_band(int height, ThreadPool& threads, const Body& body) {
-  scratch_.resize(static_cast<std::size_t>(threads.threads()));
+  scratch_.resize(threads.threads());
   threads.for_each(band_count(height),
                    [&](int band, int thread) { body(BandRows(band, height), scratch_[thread]); });
 }

@@ -70,7 +70,7 @@ void FarnebackFlow::start(int width, int height) {
 
 void FarnebackFlow::push(const ImageView<std::uint8_t>& image, ThreadPool& threads) {
   if (image.width != width_ || image.height != height_) start(image.width, image.height);
-  scratch_.resize(static_cast<std::size_t>(threads.threads()));
+  scratch_.resize(threads.threads());
   int bands = 0;
   for (auto& level : levels_) {
     std::swap(level.last, level.next);
@@ -109,7 +109,7 @@ void FarnebackFlow::expand(const ImageView<std::uint8_t>& image, Level& level, i
 
 ImageView<Flow> FarnebackFlow::flow(ThreadPool& threads) {
   assert(!levels_.empty());
-  scratch_.resize(static_cast<std::size_t>(threads.threads()));
+  scratch_.resize(threads.threads());
   const Level* coarser = nullptr;
   for (std::size_t i = levels_.size(); i-- > 0;) {
     Level& level = levels_[i];

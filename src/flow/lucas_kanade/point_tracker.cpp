@@ -24,8 +24,8 @@ std::uint64_t join_pairs(std::uint64_t bits) {
 
 void PointTracker::Blocks::clear() {
   for (int y = 0; y < region_side; ++y) {
-    if (rows_[static_cast<std::size_t>(y)] == 0) continue;
-    rows_[static_cast<std::size_t>(y)] = 0;
+    if (rows_[y] == 0) continue;
+    rows_[y] = 0;
     std::fill_n(&track(0, y), region_side, Track{});
   }
 }
@@ -85,8 +85,7 @@ std::span<const Track> PointTracker::track(std::span<const Point> points, Thread
   const int across = (image.width() + side - 1) / side;
   const int down = (image.height() + side - 1) / side;
   threads.for_each(across * down, [&](int i, int thread) {
-    track_region(points, i % across * side, i / across * side,
-                 regions_[static_cast<std::size_t>(thread)]);
+    track_region(points, i % across * side, i / across * side, regions_[thread]);
   });
   return tracks_;
 }
@@ -104,16 +103,16 @@ void PointTracker::track_region(std::span<const Point> points, int left, int top
   const int side = block_side_ * region_side;
   std::array<std::span<const Point>, std::size_t{max_block_side} * region_side> rows;
   const int bottom = std::min(top + side, static_cast<int>(rows_.size()) - 1);
-  if (rows_[static_cast<std::size_t>(top)] == rows_[static_cast<std::size_t>(bottom)]) return;
+  if (rows_[top] == rows_[bottom]) return;
   bool any = false;
   for (int y = top; y < bottom; ++y) {
-    const auto first = rows_[static_cast<std::size_t>(y)];
+    const auto first = rows_[y];
     const auto row = points.subspan(first, rows_[static_cast<std::size_t>(y) + 1] - first);
     if (row.empty()) continue;
     const auto at = [](const Point& p, int x) { return p.x < x; };
     const auto begin = std::lower_bound(row.begin(), row.end(), left, at);
     const auto end = std::lower_bound(begin, row.end(), left + side, at);
-    rows[static_cast<std::size_t>(y - top)] = {begin, end};
+    rows[y - top] = {begin, end};
     any |= begin != end;
     for (auto it = begin; it != end; ++it)
       finest.add((it->x - left) / block_side_, (y - top) / block_side_);
@@ -126,7 +125,7 @@ void PointTracker::track_region(std::span<const Point> points, int left, int top
   }
   for (std::size_t level = level_count; level-- > 0;) search(level, left, top, region);
   for (int y = top; y < bottom; ++y) {
-    for (const auto& point : rows[static_cast<std::size_t>(y - top)])
+    for (const auto& point : rows[y - top])
       tracks_[static_cast<std::size_t>(&point - points.data())] =
           block_side_ == 1 ? finest.track(point.x - left, y - top)
                            : finest.interpolated(point.x - left, y - top);

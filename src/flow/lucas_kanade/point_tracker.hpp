@@ -59,11 +59,11 @@ class PointTracker {
     Blocks() : tracks_(std::size_t{region_side} * region_side) {}
 
     void clear();
-    void add(int x, int y) { rows_[static_cast<std::size_t>(y)] |= std::uint64_t{1} << x; }
+    void add(int x, int y) { rows_[y] |= std::uint64_t{1} << x; }
     /// Adds the blocks that contain blocks of the next finer level.
     void add_coarser(const Blocks& finer);
     /// Blocks of a row: bit x.
-    std::uint64_t row(int y) const { return rows_[static_cast<std::size_t>(y)]; }
+    std::uint64_t row(int y) const { return rows_[y]; }
     /// First and last row with blocks; there must be one.
     int first_row() const;
     int last_row() const;

@@ -157,7 +157,7 @@ void Pyramid::build_level(std::size_t level, ThreadPool& threads, const MakeRow&
   auto& image = levels_[level];
   auto& is_black = is_black_[level];
   for_each_row(threads, image.height(), [&](int y) {
-    auto& was_black = is_black[static_cast<std::size_t>(y)];
+    auto& was_black = is_black[y];
     const bool black = make_row(y);
     if (black && was_black != 0) return;
     was_black = black ? 1 : 0;
@@ -171,7 +171,7 @@ void Pyramid::build(const ImageView<std::uint8_t>& image, ThreadPool& threads,
                     std::span<const std::uint8_t> is_black) {
   shape(image.width, image.height);
   build_level(0, threads, [&](int y) {
-    if (!is_black.empty() && is_black[static_cast<std::size_t>(y)] != 0) return true;
+    if (!is_black.empty() && is_black[y] != 0) return true;
     levels_[0].assign_row(y, image.row(y));
     return false;
   });
@@ -180,8 +180,7 @@ void Pyramid::build(const ImageView<std::uint8_t>& image, ThreadPool& threads,
     const auto& above = is_black_[level - 1];
     build_level(level, threads, [&](int y) {
       bool black = true;
-      for (int i = 2 * y - 2; i <= 2 * y + 2; ++i)
-        black &= above[static_cast<std::size_t>(reflected(i, from.height()))] != 0;
+      for (int i = 2 * y - 2; i <= 2 * y + 2; ++i) black &= above[reflected(i, from.height())] != 0;
       if (!black)
         HWY_DYNAMIC_DISPATCH(halve_row)(from, y, levels_[level].row(y), levels_[level].width());
       return black;

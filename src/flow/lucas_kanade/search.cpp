@@ -412,7 +412,7 @@ class Blocks {
          const Windows& windows)
       : to_(to), windows_(windows), count_(static_cast<int>(searches.size())) {
     for (int i = 0; i < count_; ++i) {
-      const auto& search = searches[static_cast<std::size_t>(i)];
+      const auto& search = searches[i];
       window_[i] = windows.index(search);
       left_[i] = static_cast<float>(windows.left + 2 * search.x);
       top_[i] = static_cast<float>(tile.top - Tile::before + 2 * search.y);
@@ -468,7 +468,7 @@ class Blocks {
 
   void store(std::span<Search> searches) const {
     for (int i = 0; i < count_; ++i) {
-      auto& search = searches[static_cast<std::size_t>(i)];
+      auto& search = searches[i];
       const float x = left_[i] + std::floor(flow_x_[i]);
       const float y = top_[i] + std::floor(flow_y_[i]);
       search.found = followed_[i] != 0 && x >= -Tile::window && y >= -Tile::window &&
@@ -526,9 +526,7 @@ class Blocks {
     moved_count_ = 0;
   }
 
-  std::span<const std::int32_t> moved() const {
-    return std::span(moved_).first(static_cast<std::size_t>(moved_count_));
-  }
+  std::span<const std::int32_t> moved() const { return std::span(moved_).first(moved_count_); }
 
   /// Removes blocks whose displacement has shared sums from moved_, and copies their sums.
   void use_shared_sums() {
