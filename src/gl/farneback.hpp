@@ -4,7 +4,7 @@
 #include <list>
 
 #include "src/flow/farneback/pyramid.hpp"
-#include "src/gl/grey_frame.hpp"
+#include "src/gl/objects.hpp"
 
 namespace eventcamera::gl {
 

@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "src/gl/event_list.hpp"
-#include "src/gl/grey_frame.hpp"
+#include "src/gl/objects.hpp"
 #include "src/simulate/simulator.hpp"
 #include "src/simulate/warp.hpp"
 

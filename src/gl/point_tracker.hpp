@@ -3,7 +3,7 @@
 
 #include <list>
 
-#include "src/gl/grey_frame.hpp"
+#include "src/gl/objects.hpp"
 
 namespace eventcamera::gl {
 

@@ -7,7 +7,6 @@
 #include "src/dvs/dvs_settings.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "src/gl/event_list.hpp"
-#include "src/gl/grey_frame.hpp"
 #include "src/gl/kernels.hpp"
 #include "src/gl/objects.hpp"
 #include "src/simulate/simulator.hpp"

@@ -21,3 +21,9 @@ int place(int i, int from, int to, out float weight) {
   weight = max(float(numerator - first * 2 * to), 0.0) / float(2 * to);
   return first;
 }
+
+// Displacement per step, in 1/65536 of a pixel, from the bits of a flow; `factor` is 65536 / steps.
+int motion_per_step(uint flow, float factor) {
+  if ((flow & 0x7fffffffu) > 0x7f800000u) return 0;  // NaN
+  return int(roundEven(clamp(uintBitsToFloat(flow), -16384.0, 16384.0) * factor));
+}
