@@ -37,7 +37,7 @@ class EventBuckets {
   EventBuckets& operator=(const EventBuckets&) = default;
 
   /// Writes the sorted events [first, last) to out + first. A FiredPixels or a time slice is
-  /// written whole, by the call whose range holds its first event.
+  /// written whole, by the call whose range contains its first event.
   virtual void write_part(std::size_t first, std::size_t last, Event* out) const = 0;
 
   std::size_t bands_ = 1;

@@ -59,7 +59,7 @@ struct LabelledEvents {
   std::span<Label> labels;  ///< one per event, or empty
 
   /// Moves the events for which keep(Event&) is true to the front, in order and with their labels,
-  /// and returns them. `keep` is called once for each event, in order, and may change it.
+  /// and returns them. Calls `keep`, which may change the event, once for each, in order.
   template <class Keep>
   LabelledEvents keep_if(Keep keep) const {
     // Locals, which stores cannot alias.

@@ -32,7 +32,7 @@ SumVector on_black(int bits, std::uint32_t black, SumVector luma, SumVector alph
   return hn::ShiftRightSame(sum + hn::ShiftRightSame(sum, bits), bits);
 }
 
-/// Loads every `step`-th sample, and reads up to the next pixel.
+/// Loads every `step`-th sample; reads all samples of the last pixel.
 template <int step, class Pixels, class Pixel>
 hn::Vec<Pixels> load_alpha(Pixels pixels, const Pixel* from) {
   if constexpr (step == 1) {

@@ -9,9 +9,9 @@ namespace eventcamera {
 namespace {
 
 /// Counting sort of a time slice of 2^slice_bits microseconds. visit_lists(visit) passes its events
-/// to visit(std::span<const Event>, const Event& last) in lists, with the last event of the array
-/// that holds the list. Bins are a microsecond or longer: at most a few times as many bins as
-/// events.
+/// to visit(std::span<const Event>, const Event& last) in lists; `last` is the last event of the
+/// array that holds the list. Bins last a microsecond or more, and there are at most a few times as
+/// many as events.
 template <class VisitLists>
 void write_slice(const VisitLists& visit_lists, int slice_bits, std::span<Event> out) {
   constexpr int max_bins_bits = 12;

@@ -35,7 +35,7 @@
 namespace eventcamera::gl {
 namespace {
 
-/// Of a pixel, as in the shader.
+/// Number of values of a pixel, as in the shader.
 constexpr int planes = 9;
 
 /// Threshold of dead pixels.
@@ -102,7 +102,7 @@ class PixelSimulator final : public DvsSimulator {
 
   bool needs_flow() const override { return settings_.upsampling == Upsampling::motion; }
 
-  /// True if the CPU prepares the frames.
+  /// True if the CPU must prepare the frames.
   bool needs_luma() const {
     return settings_.denoise != 0 || settings_.exposure_compensation || needs_flow();
   }
@@ -192,8 +192,8 @@ class PixelSimulator final : public DvsSimulator {
     return fired_.is_plain() && !has_late ? events_ : collect(list);
   }
 
-  /// Ends the interval with these events, and those of earlier intervals that are due. Events past
-  /// its end carry the rest of their times, as the shader writes it.
+  /// Ends the interval with these events, and deferred ones that are due. Events past its end carry
+  /// the fraction of their microsecond, as written by the shader.
   const EventBuckets& collect(std::span<const Event> events) {
     std::vector<IntervalEvents::Band> bands(static_cast<std::size_t>(band_count(format().height)));
     for (std::size_t i = 0; i < bands.size(); ++i) bands[i].begin(fired_, static_cast<int>(i));
@@ -479,7 +479,7 @@ class PixelSimulator final : public DvsSimulator {
   Unread unread_[max_queued];
   int last_ = 0;             ///< index of the last interval
   int count_ = 0;            ///< number of unread intervals
-  bool is_complete_ = true;  ///< the buffer of the last interval has all its events
+  bool is_complete_ = true;  ///< the last interval's events are known to fit into their buffer
   Image<Flow> read_flow_;
 
   FramePair<std::uint8_t> frames_;

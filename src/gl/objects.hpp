@@ -24,10 +24,10 @@ class Buffer {
   GLuint name() const { return name_; }
   std::size_t size() const { return size_; }
 
-  /// Makes it at least `size` bytes long; if it must grow, its contents are lost. Throws Error.
+  /// Grows the buffer to at least `size` bytes; growing loses its contents. Throws Error.
   void reserve(std::size_t size);
 
-  /// Replaces the contents from `offset` on. If it must grow for this, its contents are lost.
+  /// Replaces the contents from `offset` on, after reserve().
   void assign(std::span<const std::byte> bytes, std::size_t offset = 0);
 
   /// Replaces the contents by `size` zeros.
@@ -38,8 +38,8 @@ class Buffer {
     if (size > size_) assign_zeros(size);
   }
 
-  /// Copies bytes from `offset` on to `out`, once the GPU has written them. Throws Error if the
-  /// context is lost.
+  /// Waits for the GPU and copies bytes from `offset` on to `out`. Throws Error if the context is
+  /// lost.
   void read(std::span<std::byte> out, std::size_t offset = 0) const;
 
  private:
@@ -61,7 +61,7 @@ constexpr int groups_of(int size, int count) {
   return (count + size - 1) / size;
 }
 
-/// A compute shader.
+/// Compute shader.
 class Kernel {
  public:
   /// `name` is for error messages and measurements, and must outlive this object. The source has no
@@ -71,8 +71,8 @@ class Kernel {
   Kernel(const Kernel&) = delete;
   Kernel& operator=(const Kernel&) = delete;
 
-  /// Runs it with `buffers` at bindings 0, 1, ... and the integers `values` at uniform locations 0,
-  /// 1, ... Kernels run one after another, and see what earlier ones wrote.
+  /// Queues a run with `buffers` at bindings 0, 1, ... and the integers `values` at uniform
+  /// locations 0, 1, ... Kernels run one after another, and see what earlier ones wrote.
   void run(Groups groups, std::initializer_list<const Buffer*> buffers,
            std::initializer_list<int> values) const;
 
@@ -90,14 +90,14 @@ class Fence {
   Fence(const Fence&) = delete;
   Fence& operator=(const Fence&) = delete;
 
-  /// Moves it to the end of the queue.
+  /// Moves the fence to the end of the queue.
   void set();
 
-  /// Waits until the GPU has reached it. Throws Error.
+  /// Waits until the GPU has reached the fence. Throws Error.
   void wait() const;
 
-  /// Like wait(), but needs no context: call it in a thread whose waiting delays nobody else.
-  /// Returns at once if the context is not one of EGL, and reports no errors: wait() does.
+  /// Like wait(), but needs no context, so another thread may call it. Does not report errors, and
+  /// returns at once if the context is not one of EGL.
   void wait_without_context() const;
 
  private:

@@ -18,12 +18,12 @@ namespace eventcamera::gl {
 /// current, except hold_until(), reset(), wait() and drop(). All other functions throw Error and
 /// std::bad_alloc; after that the simulator may only be destroyed.
 ///
-/// Processing of a frame: a LumaKernel turns its texture into a GreyFrame; a method (dense_,
-/// sparse_ or difference_simulators) compares it with the last one and marks the pixels that fire
-/// in each step; an EventList counts, sorts and reads back the marked pixels, or a DrawKernel draws
-/// them. dvs_simulator has its own list, whose events have their own times; EventSort sorts it.
-/// Each kernel is a compute shader (shaders/). Dense flow is computed in farneback, tracks in
-/// point_tracker, with the formulas and bounds of their namesakes in src/flow.
+/// A LumaKernel turns the texture of a frame into a GreyFrame. A simulator (dense_simulator.cpp,
+/// sparse_simulator.cpp, difference_simulators.cpp) compares it with the last one and marks the
+/// pixels that fire in each step. An EventList sorts and reads back the marked pixels, or a
+/// DrawKernel draws them. dvs_simulator.cpp writes events with individual times, which EventSort
+/// sorts. Each kernel is a compute shader (shaders/). farneback computes dense flow, point_tracker
+/// tracks, with the formulas and limits of their namesakes in src/flow.
 ///
 /// To keep both the caller and the GPU busy, queue() the next frame before read() of the previous
 /// interval's events.
@@ -46,7 +46,7 @@ class Simulator : public IntervalSimulator {
             const Picture& picture);
 
   /// Waits until the GPU has finished the first queued frame, if that is possible without a context
-  /// (EGL). Any thread may call it, so that read() need not wait in the context's.
+  /// (EGL). Any thread may call it, so that read() does not have to wait.
   void wait() const { queue_[first_].done.wait_without_context(); }
 
   /// Waits until the GPU has finished the first queued frame. Returns the sorted events of the
@@ -123,9 +123,9 @@ std::unique_ptr<Simulator> make_sparse_simulator(const Context& gl, const LumaFo
 /// in the last bits of floating-point numbers.
 std::unique_ptr<Simulator> make_diff_simulator(const Context& gl, const LumaFormat& format);
 
-/// Like eventcamera::DvsSimulator, without labels. Solved in single precision: a pixel in 10,000
-/// may fire another time, and an event in 1,000 differ by more than a microsecond. The CPU removes
-/// noise, finds gain and flow, and delays late events. hold_until() needs the context.
+/// Like eventcamera::DvsSimulator, without labels and in single precision: a pixel in 10,000 may
+/// fire once more or less, and an event in 1,000 may differ by more than a microsecond. The CPU
+/// removes noise, computes gain and flow, and delays late events. hold_until() needs the context.
 class DvsSimulator : public Simulator {
  public:
   /// Applies to the next frames.

@@ -99,16 +99,16 @@ constexpr int block_size = 8;
 constexpr int block_area = block_size * block_size;
 /// Maximum number of blocks in a row and in a column.
 constexpr int max_blocks = 32;
-/// Fewer blocks are not enough for an estimate.
+/// Minimum number of blocks for an estimate.
 constexpr std::size_t min_blocks = 16;
-/// Share of blocks that are assumed to show only noise.
+/// Share of blocks assumed to show only noise.
 constexpr double still_share = 0.2;
 /// A fifth of the sample deviations of 64 values is below this share of the true one: with the
 /// normal approximation, 1 - 0.84 / sqrt(2 * 63).
 constexpr double quantile_bias = 0.925;
-/// Noise of this many standard deviations is smoothed.
+/// Noise up to this many standard deviations is smoothed.
 constexpr double sigmas = 4;
-/// Stronger smoothing would remove more edges than noise.
+/// Limit of the smoothing; more would remove more edges than noise.
 constexpr double max_automatic = 32;
 /// Grey levels from black or white that may hide noise.
 constexpr double margin = 4;

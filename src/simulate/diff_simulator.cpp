@@ -49,7 +49,7 @@ struct PolarityFrames {
     now.differences.resize(now.first.back());
   }
 
-  /// Removes the last frame's pixels of a band from the image.
+  /// Removes the pixels of the last difference frame from a band of the image.
   void clear(std::size_t band) {
     for (std::size_t i = last.first[band]; i < last.first[band + 1]; ++i) {
       const auto& place = last.places[i];
@@ -88,7 +88,7 @@ struct alignas(64) MovingBand {
   std::vector<Strength> strengths;
 };
 
-/// One interpolated difference frame: the strength of each pixel, 0 for those that do not fire.
+/// Interpolated difference frame: the strength of each pixel, 0 if it does not fire.
 template <class Strength>
 class DifferenceFrame {
  public:
@@ -98,7 +98,7 @@ class DifferenceFrame {
         strengths_(static_cast<std::size_t>(64 * words_) * static_cast<std::size_t>(height)),
         touched_(static_cast<std::size_t>(words_) * static_cast<std::size_t>(height)) {}
 
-  /// Adds the pixels of a band at their positions after j steps. The strongest on a pixel wins.
+  /// Adds the pixels of a band at their positions after j steps; the strongest on a pixel wins.
   void add(const MovingBand<Strength>& band, int j) {
     auto* const strengths = strengths_.data();
     auto* const touched = touched_.data();
@@ -180,7 +180,7 @@ class DiffSimulator final : public Simulator {
     has_difference_ = true;
   }
 
-  /// Keeps D(i) = I(i) - I(i-1) at pixels that fired, separately for each polarity, and then I(i).
+  /// Keeps D(i) = I(i) - I(i-1) at the pixels that fired, by polarity, and stores I(i).
   void keep_difference(const ImageView<Pixel>& now, int last_step, StepBuckets& events) {
     on_.begin_next();
     off_.begin_next();

@@ -16,7 +16,8 @@ HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-/// Tile size: pixels of a tile are skipped together or not at all. Vectors are capped at its width.
+/// Tile size: the pixels of a tile are skipped together or not at all. Vectors are capped at its
+/// width.
 constexpr int tile_width = 16;
 constexpr int tile_height = 4;
 static_assert(rows_per_band % tile_height == 0);
@@ -159,11 +160,11 @@ Vector blend(Vector earlier, Vector later, int j, int steps) {
   return earlier * hn::Set(Words(), 256 - weight) + later * hn::Set(Words(), weight);
 }
 
-/// Steps sampled in one go before their differences are thresholded.
+/// Number of steps sampled before their differences are thresholded.
 constexpr int steps_at_once = 16;
 
-/// First step to evaluate, per tile of a row of tiles: 1, or, if nothing can fire before the last
-/// step, steps - 1, or `steps` if even the frame of step steps - 1 equals the last frame there.
+/// First step to evaluate, by tile of a row: 1 or, if nothing can fire before the last step,
+/// steps - 1, or `steps` if the frame of step steps - 1 equals the last frame there.
 using FirstSteps = std::array<int, max_side / tile_width>;
 
 /// Pairs each pixel of rows [first, last) with the one below it; pixels of the bottom row with
@@ -277,7 +278,7 @@ void fire_row(const InterpolatedInterval<std::uint8_t>& interval, const LastSamp
     if (first > 1) {
       before = value_at(first);
     } else {
-      // Whether pixels fire is hard to predict: sample ahead, so that no sample waits for the
+      // Whether pixels fire is hard to predict: samples are taken ahead, so that none waits for the
       // branch.
       HWY_ALIGN std::int32_t values[steps_at_once * hn::MaxLanes(words)];
       for (int begin = 1; begin < steps; begin += steps_at_once) {
@@ -364,7 +365,7 @@ HWY_EXPORT(fire_band_blend);
 
 namespace {
 
-/// Each large cell is the maximum of its 4x4 small cells.
+/// Fills a row of large cells, each the maximum of its 4x4 small cells.
 void gather_row(const Image<std::uint8_t>& small, int row, Image<std::uint8_t>& large) {
   for (int column = 0; column < large.width(); ++column) {
     std::uint8_t largest = 0;

@@ -22,7 +22,7 @@ struct InterpolatedInterval {
   Thresholds thresholds;
 };
 
-/// Upper bounds of the differences between neighbouring pixels, per cell: 4x4 pixels for small
+/// Upper bounds of the differences between neighbouring pixels, in cells of 4x4 pixels for small
 /// boxes, 16x16 for large ones.
 class GradientBound {
  public:
@@ -55,10 +55,10 @@ class GradientBound {
 /// Generates the events of interpolated frames, pixel by pixel through all steps, without storing
 /// the frames.
 ///
-/// Most pixels cannot fire before the last step, and a conservative bound proves it: a step of (dx,
-/// dy) pixels changes a bilinear sample by at most |dx| gx + |dy| gy, where gx and gy are the
-/// largest differences of neighbours within reach. Tiles whose bound does not exceed the thresholds
-/// skip to the last step.
+/// Most pixels cannot fire before the last step, as a conservative bound proves: a step of (dx, dy)
+/// pixels changes a bilinear sample by at most |dx| gx + |dy| gy, where gx and gy are the largest
+/// differences of neighbours within reach. Tiles whose bound does not exceed the thresholds skip to
+/// the last step.
 class InterpolationKernel {
  public:
   /// Replaces the contents of `events`.

@@ -40,7 +40,7 @@ inline std::optional<MovingPoint> moving_point(const Point& start, const Track& 
   return point;
 }
 
-/// A list of moving points, packed so that the positions of several are computed at once.
+/// List of moving points, packed so that the positions of several are computed at once.
 class MovingPoints {
  public:
   /// Removes all points but keeps their memory.
@@ -60,8 +60,8 @@ class MovingPoints {
   /// Number of chunks of chunk_size points; the last one may have fewer.
   std::size_t chunks() const { return (size_ + chunk_size - 1) / chunk_size; }
 
-  /// Computes the positions of a chunk after j steps as indices of the pixels of an image whose
-  /// rows are `stride` pixels apart. Valid as long as `memory` is not changed.
+  /// Returns the positions of a chunk after j steps, as pixel indices in an image whose rows are
+  /// `stride` pixels apart. Valid as long as `memory` is not changed.
   std::span<const std::int32_t> at(int j, int stride, std::size_t chunk,
                                    std::vector<std::int32_t>& memory) const;
 

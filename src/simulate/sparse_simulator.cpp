@@ -15,7 +15,7 @@
 namespace eventcamera {
 namespace {
 
-/// Background that is uncovered where a pixel in motion starts.
+/// Background uncovered where a moving pixel started.
 template <class Pixel>
 struct Uncovered {
   std::uint16_t x;
@@ -23,13 +23,13 @@ struct Uncovered {
   Pixel brightness;
 };
 
-/// Tracked pixels in motion that start in one band of rows, in raster order. On its own cache
-/// lines, because threads fill neighbouring bands concurrently.
+/// Tracked pixels that start in one band of rows, in raster order. On its own cache lines, because
+/// threads fill neighbouring bands concurrently.
 template <class Pixel>
 struct alignas(64) MovingBand {
   MovingPoints points;
   std::vector<Pixel> brightness;
-  std::vector<std::vector<Uncovered<Pixel>>> uncovered;  ///< by each step
+  std::vector<std::vector<Uncovered<Pixel>>> uncovered;  ///< by step
   int top;  ///< the pixels start in and cross rows [top, bottom)
   int bottom;
 };
@@ -100,8 +100,8 @@ class Painter {
       for (const auto& [x, y, brightness] : band.uncovered[j]) still_.at(x, y) = brightness;
   }
 
-  /// Draws the touched rows of `count` frames, those of step `begin` and later, into frames_[to]
-  /// and later.
+  /// Draws the touched rows of the frames of steps begin ... begin + count - 1 into frames_[to] and
+  /// the following ones.
   void paint(const Interval<Pixel>& interval, int begin, std::size_t to, int count) {
     const auto frames = std::span(frames_).subspan(to, static_cast<std::size_t>(count));
     int j = begin;
@@ -124,11 +124,11 @@ class Painter {
     }
   }
 
-  /// Frames drawn at once, while a chunk of the moving pixels is in the cache.
+  /// Number of frames drawn together while a chunk of the moving pixels is in the cache.
   static constexpr int steps_at_once = 4;
 
   Image<Pixel> still_;  ///< the touched rows without the pixels that have left their start
-  std::vector<Image<Pixel>> frames_;  ///< the last one drawn before, and those drawn at once
+  std::vector<Image<Pixel>> frames_;  ///< the previous one, and those drawn together
   std::vector<std::int32_t> places_;  ///< indices in a frame of the pixels of a chunk
 };
 
@@ -158,7 +158,7 @@ class SparseSimulator final : public Simulator {
     const int m = steps.count();
     events.reset(m, 1);
     const Interval<Pixel> interval{last_.view(), now, bands_, touched_};
-    // Each thread draws consecutive steps, so that all frames but the first are used twice.
+    // Each thread draws consecutive steps, so that it uses all frames but its first twice.
     const int runs = std::min(threads().threads(), m);
     while (static_cast<int>(painters_.size()) < runs)
       painters_.emplace_back(format().width, format().height);
