@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Elementary functions with the same results on every machine, branch-free and inline. Vector
-// versions are in random-inl.hpp.
+// versions are in solver-inl.hpp.
 #pragma once
 
 #include <algorithm>

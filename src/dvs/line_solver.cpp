@@ -11,23 +11,11 @@
 #define HWY_TARGET_INCLUDE "src/dvs/line_solver.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
-#include "src/core/simd-inl.hpp"
-#include "src/dvs/random-inl.hpp"
+#include "src/dvs/solver-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
-
-using Doubles = hn::CappedTag<double, max_lanes / 2>;
-using Floats = hn::Rebind<float, Doubles>;
-using Words = hn::Rebind<std::int32_t, Doubles>;
-using Bits = hn::RebindToUnsigned<Doubles>;
-using Values = hn::Vec<Doubles>;
-using Mask = hn::Mask<Doubles>;
-
-Values all(double value) {
-  return hn::Set(Doubles(), value);
-}
 
 /// A vector of candidates.
 class Pixels {
@@ -295,7 +283,7 @@ class Lines {
   void begin_draws(const RowToSolve& row) {
     const Bits bits;
     const auto numbers = hn::BitCast(bits, pixels_.x(row)) + hn::Set(bits, row.pixels.first_number);
-    random_ = RandomSeries<Doubles>(row.model->random, numbers, Random::Purpose::event);
+    random_ = RandomSeries(row.model->random, numbers, Random::Purpose::event);
     draw_ = hn::Set(bits, row.sub_interval->number * draws_per_sub_interval);
     drawn_ = hn::FirstN(Doubles(), 0);
   }
@@ -326,7 +314,7 @@ class Lines {
   Values ready_;  ///< earliest time of the next event
   Values growth_end_;
   Values t_;  ///< of the last crossing
-  RandomSeries<Doubles> random_;
+  RandomSeries random_;
   hn::Vec<Bits> draw_;  ///< counter of the next random number
   Mask drawn_;          ///< pixels whose thresholds were drawn
 };

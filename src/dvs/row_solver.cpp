@@ -10,23 +10,11 @@
 #define HWY_TARGET_INCLUDE "src/dvs/row_solver.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
-#include "src/core/simd-inl.hpp"
-#include "src/dvs/random-inl.hpp"
+#include "src/dvs/solver-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
-
-using Doubles = hn::CappedTag<double, max_lanes / 2>;
-using Bits = hn::RebindToUnsigned<Doubles>;
-using Floats = hn::Rebind<float, Doubles>;
-using Words = hn::Rebind<std::int32_t, Doubles>;
-using Values = hn::Vec<Doubles>;
-using Mask = hn::Mask<Doubles>;
-
-Values all(double value) {
-  return hn::Set(Doubles(), value);
-}
 
 struct Points {
   Values t;
@@ -337,8 +325,7 @@ class RowSolver {
       // Noise draws its next event and its polarity first.
       counters[lane] = unsolved_.draws[index_of(i + lane)] + 2 * (noise_bits >> lane & 1);
     }
-    const RandomSeries<Doubles> random(row_.model->random, hn::Load(bits, numbers),
-                                       Random::Purpose::event);
+    const RandomSeries random(row_.model->random, hn::Load(bits, numbers), Random::Purpose::event);
     const auto normal = random.normals(hn::Load(bits, counters)).first;
     return hn::Max(t, emitted + all(model.latency_jitter) * normal);
   }

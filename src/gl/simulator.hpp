@@ -123,9 +123,10 @@ std::unique_ptr<Simulator> make_sparse_simulator(const Context& gl, const LumaFo
 /// in the last bits of floating-point numbers.
 std::unique_ptr<Simulator> make_diff_simulator(const Context& gl, const LumaFormat& format);
 
-/// Like eventcamera::DvsSimulator, without labels and in single precision: a pixel in 10,000 may
-/// fire once more or less, and an event in 1,000 may differ by more than a microsecond. The CPU
-/// removes noise, computes gain and flow, and delays late events. hold_until() needs the context.
+/// Like eventcamera::DvsSimulator, without labels and in single precision: 1 of 10,000 pixels may
+/// fire other events, and the times of 1 of 1,000 events may differ by more than a microsecond. The
+/// CPU removes noise, computes gain and flow, and delays late events. hold_until() needs the
+/// context.
 class DvsSimulator : public Simulator {
  public:
   /// Applies to the next frames.

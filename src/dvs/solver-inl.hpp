@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Vector versions of elementary.hpp and random.hpp. Included once per SIMD target, after
-// foreach_target.h.
-#if defined(EVENTCAMERA_RANDOM_INL) == defined(HWY_TARGET_TOGGLE)
-#ifdef EVENTCAMERA_RANDOM_INL
-#undef EVENTCAMERA_RANDOM_INL
+// Shared by the solvers of many pixels: vector versions of elementary.hpp and random.hpp. Included
+// once per SIMD target, after foreach_target.h.
+#if defined(EVENTCAMERA_SOLVER_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef EVENTCAMERA_SOLVER_INL
+#undef EVENTCAMERA_SOLVER_INL
 #else
-#define EVENTCAMERA_RANDOM_INL
+#define EVENTCAMERA_SOLVER_INL
 #endif
 
 #include <cstdint>
@@ -13,16 +13,27 @@
 
 #include "src/core/simd-inl.hpp"
 #include "src/dvs/random.hpp"
+#include "src/dvs/row_filter.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 
+/// One lane per pixel.
+using Doubles = hn::CappedTag<double, max_lanes / 2>;
+using Floats = hn::Rebind<float, Doubles>;
+using Words = hn::Rebind<std::int32_t, Doubles>;
+using Bits = hn::RebindToUnsigned<Doubles>;
+using Values = hn::Vec<Doubles>;
+using Mask = hn::Mask<Doubles>;
+
+HWY_INLINE Values all(double value) {
+  return hn::Set(Doubles(), value);
+}
+
 /// exp(-x)
-template <class Values>
 HWY_INLINE Values decays(Values x) {
-  const hn::DFromV<Values> doubles;
-  const hn::RebindToUnsigned<decltype(doubles)> bits;
-  const auto all = [=](double value) HWY_ATTR { return hn::Set(doubles, value); };
+  const Doubles doubles;
+  const Bits bits;
   const auto to_integers = all(0x1.8p52);
   x = hn::Min(x, all(700));
   const auto shifted = x * all(1.4426950408889634) + to_integers;
@@ -40,11 +51,9 @@ HWY_INLINE Values decays(Values x) {
 }
 
 /// ln(x)
-template <class Values>
 HWY_INLINE Values logarithms(Values x) {
-  const hn::DFromV<Values> doubles;
-  const hn::RebindToUnsigned<decltype(doubles)> bits;
-  const auto all = [=](double value) HWY_ATTR { return hn::Set(doubles, value); };
+  const Doubles doubles;
+  const Bits bits;
   const auto word = hn::BitCast(bits, x);
   // 2^52 + e has the exponent e in its lowest bits.
   const auto exponent = hn::BitCast(doubles, hn::Or(hn::ShiftRight<52>(word),
@@ -62,23 +71,17 @@ HWY_INLINE Values logarithms(Values x) {
 }
 
 /// Cosines and sines of angles from 0 to pi/4.
-template <class Values>
 HWY_INLINE void cosines_and_sines(Values x, Values& cosines, Values& sines) {
-  const hn::DFromV<Values> doubles;
   const auto x2 = x * x;
-  const auto next = [&](double a, Values rest) HWY_ATTR { return hn::Set(doubles, a) + x2 * rest; };
-  const auto last = [=](double a) HWY_ATTR { return hn::Set(doubles, a); };
-  cosines = next(1, next(-1.0 / 2, next(1.0 / 24, next(-1.0 / 720, last(1.0 / 40320)))));
-  sines = x + x * x2 * next(-1.0 / 6, next(1.0 / 120, next(-1.0 / 5040, last(1.0 / 362880))));
+  const auto next = [&](double a, Values rest) HWY_ATTR { return all(a) + x2 * rest; };
+  cosines = next(1, next(-1.0 / 2, next(1.0 / 24, next(-1.0 / 720, all(1.0 / 40320)))));
+  sines = x + x * x2 * next(-1.0 / 6, next(1.0 / 120, next(-1.0 / 5040, all(1.0 / 362880))));
 }
 
 /// Random numbers of a vector of pixels for one purpose.
-template <class Doubles>
 class RandomSeries {
  public:
-  using Bits = hn::RebindToUnsigned<Doubles>;
   using Numbers = hn::Vec<Bits>;
-  using Values = hn::Vec<Doubles>;
 
   struct Normals {
     Values first;
