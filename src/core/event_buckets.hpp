@@ -21,7 +21,6 @@ class EventBuckets {
 
   int bands() const { return static_cast<int>(bands_); }
 
-  /// Number of events.
   virtual std::size_t size() const = 0;
 
   /// Writes size() events, sorted by time, then in raster order.

@@ -46,7 +46,6 @@ class EventValidator {
     return dropped;
   }
 
-  /// Forgets all times.
   void restart() { *this = {width_, height_}; }
 
   /// Treats events before `time` as late from now on.

@@ -21,12 +21,10 @@ constexpr Event with_cause(Event event, Cause cause) {
   return event;
 }
 
-/// Cause stored by with_cause().
 constexpr Cause cause_of(const Event& event) {
   return static_cast<Cause>((event.x >> 14 & 3) | (event.y_p >> 12 & 4));
 }
 
-/// Event without the cause stored by with_cause().
 constexpr Event without_cause(Event event) {
   event.x &= coordinate_bits;
   event.y_p &= coordinate_bits | 0x8000;
@@ -43,7 +41,6 @@ struct Label {
 };
 static_assert(sizeof(Label) == 4);
 
-/// Label of an event of a labelled stream.
 constexpr Label label_of(const AbsoluteEvent& event) {
   return {.object_class = event.object_class, .cause = event.cause};
 }

@@ -21,7 +21,6 @@
 namespace eventcamera {
 namespace {
 
-/// Memory of a thread.
 struct alignas(64) Scratch {
   RowToSolve row;
   std::vector<std::uint16_t> luma;    ///< a row, padded for vectors
@@ -177,7 +176,6 @@ class PixelSimulator final : public DvsSimulator {
     }
   }
 
-  /// Advances a run of pixels through a sub-interval.
   void advance(const Run& run, const SubInterval& sub_interval, const RunLuma& luma,
                RowToSolve& row) const {
     row.candidates.count = 0;

@@ -26,7 +26,6 @@ class FramePair {
   explicit FramePair(const LumaFormat& format)
       : last(format.width, format.height), now(format.width, format.height), bits_(format.bits) {}
 
-  /// Starts over with a first frame, `last`.
   void start(const ImageView<Pixel>& frame) {
     last.assign(frame);
     blurred_last_.reset();

@@ -106,10 +106,8 @@ class IntervalEvents {
       due_ = added_.size();
     }
 
-    /// Duration of the interval, microseconds.
     double duration() const { return duration_; }
 
-    /// Adds events within the interval.
     void add(std::span<const Event> events) {
       added_.insert(added_.end(), events.begin(), events.end());
     }

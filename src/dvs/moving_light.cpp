@@ -117,7 +117,6 @@ std::uint16_t blended_luma(std::int32_t earlier, std::int32_t later, int weight)
   return static_cast<std::uint16_t>((grey * 257 + (1 << 11)) >> 12);
 }
 
-/// Blends a block of pixels one by one.
 void blend_singly(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
                   std::uint16_t* out) {
   const auto sample_of = [&](const ImageView<std::uint8_t>& frame, int i, int k) {

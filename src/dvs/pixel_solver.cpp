@@ -188,7 +188,6 @@ class Pixel {
   ShotNoise noise_;
 };
 
-/// Solves candidate i.
 void solve_pixel(RowToSolve& row, std::size_t i) {
   const int x = row.candidates.x[i];
   const auto shade = static_cast<std::size_t>(row.candidates.shade[i]);

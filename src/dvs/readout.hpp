@@ -17,12 +17,10 @@ class Readout {
  public:
   Readout(int width, int height);
 
-  /// Drops the causes of the waiting events.
   void drop_causes() {
     for (auto& waiting : waiting_) waiting &= ~cause_bits;
   }
 
-  /// Drops the waiting events.
   void reset();
 
   /// Admits the sorted events of an interval of `duration` microseconds, with_cause(), and fills

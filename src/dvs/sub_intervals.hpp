@@ -96,7 +96,6 @@ class Timeline {
   /// Makes the plan of this many steps, if it is not made yet.
   void make_plan(int steps);
 
-  /// A plan that was made.
   const Plan& plan(int steps) const { return plans_[steps]; }
 
   /// Ends the interval: the sub-intervals of the next one have larger numbers.

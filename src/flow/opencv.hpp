@@ -28,7 +28,6 @@ class OpenCvThreads {
   OpenCvThreads& operator=(const OpenCvThreads&) = delete;
 };
 
-/// FlowMethod::opencv_dis, in builds with OpenCV.
 std::unique_ptr<DenseFlow> make_opencv_dis();
 
 /// Sets the regularisation of the variational refinement as published. Since OpenCV 4.10 it is a

@@ -31,10 +31,6 @@ class RegionOfInterestFlow {
                        const Box& changed, ThreadPool& threads);
 
  private:
-  ImageView<Flow> find_in_whole(const ImageView<std::uint8_t>& from,
-                                const ImageView<std::uint8_t>& to, ThreadPool& threads);
-  void find_in_part(const ImageView<std::uint8_t>& from, const ImageView<std::uint8_t>& to,
-                    const Box& part, ThreadPool& threads);
   void clear();
 
   FlowMethod method_;

@@ -30,7 +30,6 @@ class Buffer {
   /// Replaces the contents from `offset` on, after reserve().
   void assign(std::span<const std::byte> bytes, std::size_t offset = 0);
 
-  /// Replaces the contents by `size` zeros.
   void assign_zeros(std::size_t size);
 
   /// Like reserve(), but a buffer that grows contains zeros.
@@ -49,7 +48,6 @@ class Buffer {
   std::size_t size_ = 0;
 };
 
-/// Number of workgroups along each axis.
 struct Groups {
   int x = 1;
   int y = 1;
@@ -61,7 +59,6 @@ constexpr int groups_of(int size, int count) {
   return (count + size - 1) / size;
 }
 
-/// Compute shader.
 class Kernel {
  public:
   /// `name` is for error messages and measurements, and must outlive this object. The source has no

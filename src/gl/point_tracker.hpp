@@ -7,7 +7,6 @@
 
 namespace eventcamera::gl {
 
-/// Gaussian pyramid of a picture.
 class Pyramid {
  public:
   struct Level {

@@ -53,7 +53,6 @@ class Simulator : public IntervalSimulator {
   /// interval that it ends, valid until the next call; nullptr if it ends none.
   const EventBuckets* read();
 
-  /// Forgets the queued frames.
   void drop() { queued_ = 0; }
 
  protected:
@@ -64,7 +63,6 @@ class Simulator : public IntervalSimulator {
         queue_{{{gl, format, kernels_}, Fence(gl)}, {{gl, format, kernels_}, Fence(gl)}},
         draw_(gl, format) {}
 
-  /// Stores the first frame.
   virtual void start(const TextureFrame& frame) = 0;
   /// Queues the marks of the pixels that fire between the last frame and this one, in `list`, and
   /// stores this one. If `list` has no steps, events() reads the events.
@@ -87,7 +85,6 @@ class Simulator : public IntervalSimulator {
   std::optional<StepTimes> process(const TextureFrame& frame, Nanoseconds time,
                                    const Settings& settings, EventList& list);
 
-  /// Adds a frame to the queue.
   Queued& next();
 
   const Context& gl_;
@@ -129,7 +126,6 @@ std::unique_ptr<Simulator> make_diff_simulator(const Context& gl, const LumaForm
 /// context.
 class DvsSimulator : public Simulator {
  public:
-  /// Applies to the next frames.
   void set(const DvsSettings& settings) { settings_ = settings; }
   void set_flow(const std::optional<ImageView<Flow>>& flow) override { known_flow_ = flow; }
 

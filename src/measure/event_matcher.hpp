@@ -40,7 +40,6 @@ class EventMatcher {
   /// stream.
   void add(StreamRole role, const AbsoluteEvent& event);
 
-  /// Similarity of the events so far.
   MatchFigures figures(StreamRole role) const;
 
  private:

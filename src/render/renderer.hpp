@@ -163,7 +163,6 @@ class Renderer {
   void draw(Microseconds start, Microseconds end, const PixelLayout& layout, std::byte* out,
             std::ptrdiff_t stride);
 
-  /// Size of the pictures.
   int width() const { return width_; }
   int height() const { return height_; }
 

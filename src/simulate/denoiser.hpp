@@ -24,7 +24,6 @@ class NoiseLevel {
  public:
   void restart() { *this = {}; }
 
-  /// Compares a frame with the previous one, of the same format.
   void update(const LumaView& frame);
 
   /// Median of the last estimates; 0 before the first.

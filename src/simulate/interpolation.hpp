@@ -61,7 +61,6 @@ class GradientBound {
 /// the last step.
 class InterpolationKernel {
  public:
-  /// Replaces the contents of `events`.
   void fire(const InterpolatedInterval<std::uint8_t>& interval, ThreadPool& threads,
             StepBuckets& events);
   void fire(const InterpolatedInterval<std::uint16_t>& interval, ThreadPool& threads,

@@ -25,7 +25,6 @@ struct MovingPoint {
   Motion dx;
   Motion dy;
 
-  /// Position after j steps, rounded to a pixel.
   Point at(int j) const { return {moved(start.x, dx, j), moved(start.y, dy, j)}; }
 };
 
@@ -43,7 +42,6 @@ inline std::optional<MovingPoint> moving_point(const Point& start, const Track& 
 /// List of moving points, packed so that the positions of several are computed at once.
 class MovingPoints {
  public:
-  /// Removes all points but keeps their memory.
   void clear() { size_ = 0; }
 
   void push_back(const MovingPoint& point) {

@@ -32,7 +32,6 @@ class DelayedRows final : public EventBuckets {
   /// Time from the end of the interval to the last deferred event, if any.
   std::optional<Nanoseconds> latest() const;
 
-  /// Drops the deferred events.
   void restart() { deferred_ = {}; }
 
   std::size_t size() const override { return size_; }

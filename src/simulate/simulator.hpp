@@ -73,7 +73,6 @@ class IntervalSimulator {
   IntervalSimulator(const IntervalSimulator&) = delete;
   IntervalSimulator& operator=(const IntervalSimulator&) = delete;
 
-  /// Time of the last frame, if any.
   std::optional<Nanoseconds> last_time() const { return last_time_; }
 
   /// Holds the last frame, if any, until `time`, which must not be before it: the next interval
@@ -160,7 +159,6 @@ class Simulator : public IntervalSimulator {
 
   /// Settings::denoise, unless the simulator has its own.
   virtual double denoise_setting(const Settings& settings) const { return settings.denoise; }
-  /// Stores the first frame.
   virtual void start(const LumaView& frame) = 0;
   /// Fills `events` with the events between the last frame and this one, and stores this one. Sets
   /// flow_ if it needs flow that is not known.

@@ -186,7 +186,6 @@ class SparseSimulator final : public Simulator {
     });
   }
 
-  /// Tracks the changed pixels into this frame.
   void follow_changed(const ImageView<Pixel>& now, int steps) {
     const auto tracks = tracker_.track(changed_, threads());
     threads().for_each(static_cast<int>(bands_.size()), [&](int i, int) {

@@ -43,7 +43,6 @@ class WindowQueue {
     std::span<const AbsoluteEvent> events;  ///< valid until add() or reset()
   };
 
-  /// Outcome of add().
   struct Added {
     InvalidEvents invalid{};           ///< dropped
     std::size_t excess = 0;            ///< dropped: more than max_events in a window
@@ -71,7 +70,6 @@ class WindowQueue {
   /// End of the last interval; nothing before the first.
   std::optional<Nanoseconds> reached() const { return reached_; }
 
-  /// Forgets all events and times.
   void reset();
 
  private:

@@ -77,7 +77,6 @@ HWY_INLINE void add_patch(const Image<std::uint8_t>& from, const Image<std::uint
   }
 }
 
-/// Divides sums by weights.
 void divide_row(const SumRow& sums, int y, Field& out) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));

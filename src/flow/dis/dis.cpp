@@ -163,7 +163,6 @@ void DisFlow::search(const Level* coarser, Level& level, int row) const {
              nullptr, flows);
 }
 
-/// Computes rows [first, last) of the flow from the finest level.
 void DisFlow::upsample(int first, int last, Scratch& scratch) {
   const auto& finest = levels_.front().refinement;
   std::array<int, 2> known = {-1, -1};

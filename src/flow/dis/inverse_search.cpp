@@ -34,7 +34,6 @@ constexpr double min_determinant = 1e-3;
 
 using WordSum = ProductSum<Words>;
 
-/// Adds the halves of a sum, if it has more lanes than Quarters.
 template <class Sum>
 HWY_INLINE hn::Vec<Quarters> quarters(Sum sum) {
 #if HWY_TARGET != HWY_SCALAR
@@ -326,7 +325,6 @@ class Search {
       moved_[moved_count_++] = static_cast<std::int16_t>(i + std::countr_zero(bits));
   }
 
-  /// Moves active patches to these flows.
   void move_to(const float* flow_x, const float* flow_y) {
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
@@ -335,7 +333,6 @@ class Search {
              hn::Load(floats, flow_y + i));
   }
 
-  /// Reads the cells that patches entered.
   template <Sums sums>
   void read_moved() {
     for (int k = 0; k < moved_count_; ++k) read_cell<sums>(moved_[k]);

@@ -97,7 +97,6 @@ class Linearisation {
                 Scratch& scratch, Derivatives& out)
       : from_(from), to_(to), flow_(flow), scratch_(scratch), out_(out), end_(from.height() - 1) {}
 
-  /// Rows [first, last).
   void run(int first, int last) {
     int warped = std::max(0, first - 1);
     for (int y = first; y < last; ++y) {

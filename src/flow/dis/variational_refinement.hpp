@@ -17,7 +17,6 @@ namespace eventcamera {
 /// relaxation finds the neighbours of every other pixel in contiguous memory.
 class SplitPlane {
  public:
-  /// All values are 0.
   SplitPlane(int width, int height)
       : width_(width),
         height_(height),
@@ -26,7 +25,6 @@ class SplitPlane {
 
   int width() const { return width_; }
   int height() const { return height_; }
-  /// Number of columns of a parity.
   int count(int parity) const { return (width_ + 1 - parity) / 2; }
   /// Columns of a parity: column x is at x / 2. One element before the first and two vectors past
   /// the last exist.
@@ -86,7 +84,6 @@ class SplitPlanes {
 /// Threads compute bands of rows and, for each evaluation, the rows around them that affect them.
 class VariationalRefinement {
  public:
-  /// Components of a flow field.
   struct Field {
     Field(int width, int height) : x(width, height), y(width, height) {}
     SplitPlane x;

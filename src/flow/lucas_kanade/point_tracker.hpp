@@ -16,7 +16,6 @@ struct Point {
   int y;
 };
 
-/// Result of tracking a point.
 struct Track {
   Flow flow{};         ///< meaningless if not found
   bool found = false;  ///< false: the point was lost

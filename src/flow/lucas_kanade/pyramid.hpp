@@ -47,7 +47,6 @@ class ScharrGradients {
   /// border. The image must be reflected at its border.
   void compute(const Image<std::uint8_t>& image, const Box& box);
 
-  /// Row y of the image.
   const std::int16_t* x(int y) const { return x_.row(y - box_.top) - box_.left; }
   const std::int16_t* y(int y) const { return y_.row(y - box_.top) - box_.left; }
   /// Elements from one row to the next.
