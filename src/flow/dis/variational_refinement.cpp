@@ -91,16 +91,18 @@ int ring(int y) {
 }
 
 /// Computes the derivatives of the earlier image and the later one, warped back along a flow.
-class Linearisation {
- public:
-  Linearisation(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, const Field& flow,
-                Scratch& scratch, Derivatives& out)
-      : from_(from), to_(to), flow_(flow), scratch_(scratch), out_(out), end_(from.height() - 1) {}
+struct Linearisation {
+  const Image<std::uint8_t>& from;
+  const Image<std::uint8_t>& to;
+  const Field& flow;
+  Scratch& scratch;
+  Derivatives& out;
+  int end = from.height() - 1;  ///< last row
 
   void run(int first, int last) {
     int warped = std::max(0, first - 1);
     for (int y = first; y < last; ++y) {
-      for (; warped <= std::min(y + 1, end_); ++warped) warp(warped);
+      for (; warped <= std::min(y + 1, end); ++warped) warp(warped);
       derive(y);
     }
   }
@@ -126,7 +128,7 @@ class Linearisation {
   /// Computes the mean and the difference of the earlier image and the warped later one.
   void warp(int y) {
     for (int parity = 0; parity < 2; ++parity) warp(y, parity);
-    scratch_.mean.replicate_ends(ring(y));
+    scratch.mean.replicate_ends(ring(y));
   }
   void warp(int y, int parity) {
     const Floats floats;
@@ -134,17 +136,17 @@ class Linearisation {
     const hn::Rebind<std::uint8_t, Floats> bytes;
     const int lanes = static_cast<int>(hn::Lanes(floats));
     const auto every_second = iota(floats, 0) * set(2.0F);
-    const std::uint8_t* here = from_.row(y);
-    const auto stride = static_cast<std::int32_t>(to_.stride());
-    const std::uint8_t* data = to_.row(0);
-    const float* flow_x = flow_.x.row(parity, y);
-    const float* flow_y = flow_.y.row(parity, y);
-    float* mean = scratch_.mean.row(parity, ring(y));
-    float* change = scratch_.change.row(parity, ring(y));
-    for (int k = 0; k < flow_.x.count(parity); k += lanes) {
+    const std::uint8_t* here = from.row(y);
+    const auto stride = static_cast<std::int32_t>(to.stride());
+    const std::uint8_t* data = to.row(0);
+    const float* flow_x = flow.x.row(parity, y);
+    const float* flow_y = flow.y.row(parity, y);
+    float* mean = scratch.mean.row(parity, ring(y));
+    float* change = scratch.change.row(parity, ring(y));
+    for (int k = 0; k < flow.x.count(parity); k += lanes) {
       const auto start = every_second + set(static_cast<float>(2 * k + parity));
-      const auto to_x = place(start + load(flow_x + k), to_.width());
-      const auto to_y = place(set(static_cast<float>(y)) + load(flow_y + k), to_.height());
+      const auto to_x = place(start + load(flow_x + k), to.width());
+      const auto to_y = place(set(static_cast<float>(y)) + load(flow_y + k), to.height());
       const auto cell_x = hn::Floor(to_x);
       const auto cell_y = hn::Floor(to_y);
       const auto offsets =
@@ -163,33 +165,26 @@ class Linearisation {
   void derive(int y) {
     const int here = ring(y);
     const int above = ring(std::max(y - 1, 0));
-    const int below = ring(std::min(y + 1, end_));
+    const int below = ring(std::min(y + 1, end));
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     for (int parity = 0; parity < 2; ++parity) {
-      const Neighbours mean(scratch_.mean, parity, here, above, below);
-      float* x = out_.x.row(parity, y);
-      float* y_ = out_.y.row(parity, y);
-      for (int k = 0; k < flow_.x.count(parity); k += lanes) {
+      const Neighbours mean(scratch.mean, parity, here, above, below);
+      float* x = out.x.row(parity, y);
+      float* y_ = out.y.row(parity, y);
+      for (int k = 0; k < flow.x.count(parity); k += lanes) {
         store(mean.across(k), x + k);
         store(mean.along(k), y_ + k);
       }
     }
-    out_.x.replicate_ends(y);
-    out_.t.copy_row(y, scratch_.change, here);
-    out_.t.replicate_ends(y);
+    out.x.replicate_ends(y);
+    out.t.copy_row(y, scratch.change, here);
+    out.t.replicate_ends(y);
   }
-
-  const Image<std::uint8_t>& from_;
-  const Image<std::uint8_t>& to_;
-  const Field& flow_;
-  Scratch& scratch_;
-  Derivatives& out_;
-  int end_;
 };
 
 void linearise_rows(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
                     const Field& flow, int first, int last, Scratch& scratch, Derivatives& out) {
-  Linearisation(from, to, flow, scratch, out).run(first, last);
+  Linearisation{from, to, flow, scratch, out}.run(first, last);
 }
 
 /// factor / sqrt(squares)
@@ -342,35 +337,32 @@ class Assembly {
 };
 
 /// Evaluates the penalties at a flow, and relaxes the equations that they give.
-class Relaxation {
- public:
-  Relaxation(const Derivatives& derivatives, const Field& start, const Field& flow, int first,
-             int last, Scratch& scratch, Field& out)
-      : derivatives_(derivatives),
-        start_(start),
-        flow_(flow),
-        first_(first),
-        last_(last),
-        scratch_(scratch),
-        out_(out),
-        width_(flow.x.width()),
-        height_(flow.x.height()) {}
+struct Relaxation {
+  const Derivatives& derivatives;
+  const Field& start;
+  const Field& flow;
+  int first;
+  int last;
+  Scratch& scratch;
+  Field& out;
+  int width = flow.x.width();
+  int height = flow.x.height();
 
   /// A half sweep of a row needs only the previous half sweep of the next row, so all of them are
   /// done in one pass over rows that stay in the cache.
   void run() {
-    const int begin = std::max(0, first_ - reach);
-    const int end = std::min(height_, last_ + reach);
+    const int begin = std::max(0, first - reach);
+    const int end = std::min(height, last + reach);
     load_row(begin - 1);
     load_row(begin);
-    for (int y = begin; y < last_ + reach; ++y) {
+    for (int y = begin; y < last + reach; ++y) {
       if (y < end) {
         load_row(y + 1);
         for (int parity = 0; parity < 2; ++parity)
-          Assembly(derivatives_, start_, scratch_, y, parity).run(flow_.x.count(parity));
+          Assembly(derivatives, start, scratch, y, parity).run(flow.x.count(parity));
       }
       relax(y);
-      if (y - reach >= first_) store_row(y - reach);
+      if (y - reach >= first) store_row(y - reach);
     }
   }
 
@@ -380,21 +372,20 @@ class Relaxation {
   /// are 0.
   void load_row(int y) {
     const int to = ring(y);
-    if (y < 0 || y >= height_) {
-      for (auto* plane : {&scratch_.flow.x, &scratch_.flow.y, &scratch_.weight})
-        plane->clear_row(to);
+    if (y < 0 || y >= height) {
+      for (auto* plane : {&scratch.flow.x, &scratch.flow.y, &scratch.weight}) plane->clear_row(to);
       return;
     }
-    const int below = std::min(y + 1, height_ - 1);
+    const int below = std::min(y + 1, height - 1);
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     for (int parity = 0; parity < 2; ++parity) {
-      const Neighbours x(flow_.x, parity, y, y, below);
-      const Neighbours y_(flow_.y, parity, y, y, below);
-      float* x_row = scratch_.flow.x.row(parity, to);
-      float* y_row = scratch_.flow.y.row(parity, to);
-      float* weights = scratch_.weight.row(parity, to);
-      float* right = scratch_.right.row(parity, y & 1);
-      for (int k = 0; k < flow_.x.count(parity); k += lanes) {
+      const Neighbours x(flow.x, parity, y, y, below);
+      const Neighbours y_(flow.y, parity, y, y, below);
+      float* x_row = scratch.flow.x.row(parity, to);
+      float* y_row = scratch.flow.y.row(parity, to);
+      float* weights = scratch.weight.row(parity, to);
+      float* right = scratch.right.row(parity, y & 1);
+      for (int k = 0; k < flow.x.count(parity); k += lanes) {
         const auto squared = squares(x, k) + squares(y_, k);
         const auto by = weight(smoothness, squared + set(min_residual));
         store(load(x.here + k), x_row + k);
@@ -403,20 +394,20 @@ class Relaxation {
         store(by, right + k);
       }
     }
-    scratch_.right.at(width_ - 1, y & 1) = 0;
-    clear_past_end(to, width_ & 1);
+    scratch.right.at(width - 1, y & 1) = 0;
+    clear_past_end(to, width & 1);
   }
 
   /// Sets the flow past the end of a row to 0.
   void clear_past_end(int row, int parity) {
-    const int count = flow_.x.count(parity);
-    scratch_.flow.x.row(parity, row)[count] = scratch_.flow.y.row(parity, row)[count] = 0;
+    const int count = flow.x.count(parity);
+    scratch.flow.x.row(parity, row)[count] = scratch.flow.y.row(parity, row)[count] = 0;
   }
 
   /// Squares of the differences from the neighbours to the right and below.
-  static HWY_INLINE Vector squares(const Neighbours& flow, int k) {
-    const auto value = load(flow.here + k);
-    return square(flow.right(k) - value) + square(load(flow.below + k) - value);
+  static HWY_INLINE Vector squares(const Neighbours& row, int k) {
+    const auto value = load(row.here + k);
+    return square(row.right(k) - value) + square(load(row.below + k) - value);
   }
 
   /// Every other pixel of the rows, from the first column on. All these planes have the same offset
@@ -490,19 +481,19 @@ class Relaxation {
   /// time, because a row needs mostly what has just been loaded for the row below it. Two vectors
   /// at a time, because their dependent operations then overlap.
   void relax(int y) {
-    const int begin = std::max(0, y - height_ + 1);
-    const int end = std::min({half_sweeps, y + 1, (y - first_ + reach) / 2 + 1});
+    const int begin = std::max(0, y - height + 1);
+    const int end = std::min({half_sweeps, y + 1, (y - first + reach) / 2 + 1});
     const int parity = y & 1;
-    const Pixels pixels(scratch_, parity);
+    const Pixels pixels(scratch, parity);
     std::ptrdiff_t rows[half_sweeps + 1];
     const float* equations[half_sweeps + 1];
     for (int i = begin; i <= end; ++i) {
-      rows[i] = scratch_.weight.offset(ring(y - i));
-      equations[i] = scratch_.equations.row(parity, ring(y - i));
+      rows[i] = scratch.weight.offset(ring(y - i));
+      equations[i] = scratch.equations.row(parity, ring(y - i));
     }
-    const auto below = scratch_.weight.offset(ring(y - begin + 1));
+    const auto below = scratch.weight.offset(ring(y - begin + 1));
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
-    const int count = flow_.x.count(parity);
+    const int count = flow.x.count(parity);
     for (int k = 0; k < count; k += 2 * lanes) {
       const auto at = EquationRows::offset_of(k);
       const auto next = EquationRows::offset_of(k + lanes);
@@ -517,27 +508,17 @@ class Relaxation {
   }
 
   void store_row(int y) {
-    out_.x.copy_row(y, scratch_.flow.x, ring(y));
-    out_.y.copy_row(y, scratch_.flow.y, ring(y));
-    out_.x.replicate_ends(y);
-    out_.y.replicate_ends(y);
+    out.x.copy_row(y, scratch.flow.x, ring(y));
+    out.y.copy_row(y, scratch.flow.y, ring(y));
+    out.x.replicate_ends(y);
+    out.y.replicate_ends(y);
   }
-
-  const Derivatives& derivatives_;
-  const Field& start_;
-  const Field& flow_;
-  int first_;
-  int last_;
-  Scratch& scratch_;
-  Field& out_;
-  int width_;
-  int height_;
 };
 
 /// Rows [first, last).
 void relax_rows(const Derivatives& derivatives, const Field& start, const Field& flow, int first,
                 int last, Scratch& scratch, Field& out) {
-  Relaxation(derivatives, start, flow, first, last, scratch, out).run();
+  Relaxation{derivatives, start, flow, first, last, scratch, out}.run();
 }
 
 /// Interleaves the components of a row.
