@@ -11,16 +11,15 @@
 //
 // dis/: Kroeger et al., Fast optical flow using dense inverse search, ECCV 2016
 //   pyramid.cpp                   scales and image gradients
-//   inverse_search.cpp            flow u of a patch: minimises sum((J(x + u) - I(x))^2), with the
-//                                 mean difference removed; spatial propagation
-//   densification.cpp             mean flow of the patches that cover a pixel, weighted by match
+//   patches.cpp                   flow u of a patch: minimises sum((J(x + u) - I(x))^2), with the
+//                                 mean difference removed; spatial propagation; mean flow of the
+//                                 patches that cover a pixel, weighted by match
 //   variational_refinement.cpp    brightness constancy, gradient constancy and smoothness: Brox et
 //                                 al., High accuracy optical flow estimation based on a theory for
 //                                 warping, ECCV 2004
 //   dis.cpp                       scales, coarse to fine
 // farneback/: Farneback, Two-frame motion estimation based on polynomial expansion, SCIA 2003
-//   pyramid.cpp                   scales
-//   polynomial_expansion.cpp      I(x) ~ x^T A x + b^T x + c around each pixel
+//   polynomial_expansion.cpp      scales; I(x) ~ x^T A x + b^T x + c around each pixel
 //   flow_update.cpp               A d = -(b_J - b_I) / 2 by least squares over a window
 //   farneback.cpp                 scales and iterations
 // lucas_kanade/: Lucas and Kanade, An iterative image registration technique, IJCAI 1981;

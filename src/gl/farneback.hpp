@@ -3,7 +3,7 @@
 
 #include <list>
 
-#include "src/flow/farneback/pyramid.hpp"
+#include "src/flow/farneback/polynomial_expansion.hpp"
 #include "src/gl/objects.hpp"
 
 namespace eventcamera::gl {

@@ -7,7 +7,6 @@
 #include <string_view>
 
 #include "src/core/luma.hpp"
-#include "src/core/rgb_luma.hpp"
 #include "src/gl/context.hpp"
 
 namespace eventcamera::gl {

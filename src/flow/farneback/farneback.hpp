@@ -7,7 +7,6 @@
 #include "src/flow/dense_flow.hpp"
 #include "src/flow/farneback/flow_update.hpp"
 #include "src/flow/farneback/polynomial_expansion.hpp"
-#include "src/flow/farneback/pyramid.hpp"
 #include "src/flow/resampling.hpp"
 
 namespace eventcamera {
