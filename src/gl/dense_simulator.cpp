@@ -5,7 +5,6 @@
 
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/gl/farneback.hpp"
-#include "src/gl/kernels.hpp"
 #include "src/gl/shaders.hpp"
 
 namespace eventcamera::gl {
@@ -15,7 +14,6 @@ class InterpolatingSimulator final : public DenseSimulator {
  public:
   InterpolatingSimulator(const Context& gl, const LumaFormat& format)
       : DenseSimulator(gl, format),
-        luma_(gl),
         farneback_(gl, format),
         changed_box_(gl, "changed_box", shaders::changed_box),
         stop_outside_(gl, "stop_outside", shaders::stop_outside),
@@ -57,7 +55,6 @@ class InterpolatingSimulator final : public DenseSimulator {
     farneback_.push(frames_[now_]);
   }
 
-  LumaKernel luma_;
   FarnebackFlow farneback_;
   Kernel changed_box_;
   Kernel stop_outside_;

@@ -70,7 +70,6 @@ class PixelSimulator final : public DvsSimulator {
  public:
   PixelSimulator(const Context& gl, const LumaFormat& format)
       : DvsSimulator(gl, format),
-        luma_(gl),
         kernel_(gl, "dvs", shaders::dvs),
         grey_{{gl, format}, {gl, format}},
         state_(gl),
@@ -464,7 +463,6 @@ class PixelSimulator final : public DvsSimulator {
     scene_.assign(scene_bytes_);
   }
 
-  LumaKernel luma_;
   Kernel kernel_;
   GreyFrame grey_[2];       ///< the last two frames
   int now_ = 0;             ///< index of the later one

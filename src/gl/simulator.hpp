@@ -58,6 +58,7 @@ class Simulator : public IntervalSimulator {
  protected:
   Simulator(const Context& gl, const LumaFormat& format)
       : IntervalSimulator(format),
+        luma_(gl),
         gl_(gl),
         kernels_(gl),
         queue_{{{gl, format, kernels_}, Fence(gl)}, {{gl, format, kernels_}, Fence(gl)}},
@@ -70,6 +71,8 @@ class Simulator : public IntervalSimulator {
                     EventList& list) = 0;
   /// Marks the events of an interval in `list`, to be drawn, unless mark() did.
   virtual void mark_events(const StepTimes&, const Settings&, EventList&) {}
+
+  LumaKernel luma_;
 
  private:
   struct Queued {
