@@ -53,9 +53,9 @@ class WindowQueue {
       : settings_(settings), validator_(width, height) {}
 
   /// Adds an interval, and its events in [start, end]; their times are relative to `base`. Late
-  /// events count as events of the end of the last window, or interval where windows consist of
-  /// intervals. Afterwards, call next() until there is no more window, and add the events that are
-  /// waiting, if any, again.
+  /// events get the time of the end of the last window or, if windows consist of intervals, of the
+  /// last interval. Then call next() until there is no more window, and add the waiting events, if
+  /// any, again.
   Added add(std::span<const Event> events, Microseconds base, Nanoseconds start, Nanoseconds end);
 
   /// Returns the next window if it is complete.
