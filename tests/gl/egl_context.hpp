@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "src/gl/context.hpp"
-#include "src/gl/grey_frame.hpp"
+#include "src/gl/objects.hpp"
 
 namespace gl_test {
 

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <random>
 
-#include "src/simulate/frame_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 
 namespace {
 
