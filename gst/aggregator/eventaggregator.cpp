@@ -1,15 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/aggregator/eventaggregator.hpp"
 
-#include <algorithm>
-#include <memory>
-#include <new>
-#include <utility>
-
-#include "gst/base/errors.hpp"
-#include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-
 GST_DEBUG_CATEGORY_STATIC(event_aggregator_debug);
 #define GST_CAT_DEFAULT event_aggregator_debug
 

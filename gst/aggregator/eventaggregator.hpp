@@ -8,9 +8,8 @@
 #include <vector>
 
 #include "gst/aggregator/sink_pads.hpp"
-#include "gst/base/event_faults.hpp"
-#include "gst/base/owned.hpp"
-#include "gst/base/pads.hpp"
+#include "gst/base/element.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/seek_request.hpp"
 
 /// Implementation of an element that combines event streams and video. Each subclass of

@@ -6,7 +6,7 @@
 #include <bit>
 #include <new>
 
-#include "gst/base/types.hpp"
+#include "gst/base/element.hpp"
 
 G_DECLARE_FINAL_TYPE(GstEventPool, gst_event_pool, GST, EVENT_POOL, GstBufferPool)
 

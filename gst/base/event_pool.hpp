@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include "gst/base/owned.hpp"
 
 /// Makes a pool of event buffers, whose size varies between intervals. Acquired buffers are empty;

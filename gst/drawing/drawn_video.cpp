@@ -7,7 +7,7 @@
 #include <iterator>
 #include <string_view>
 
-#include "gst/base/types.hpp"
+#include "gst/base/element.hpp"
 
 using namespace eventcamera;
 

@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/filter/eventfilter.hpp"
 
-#include <algorithm>
 #include <cstdint>
 #include <limits>
-#include <string>
 
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "src/filter/filter.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_filter_debug);
 #define GST_CAT_DEFAULT event_filter_debug

@@ -8,8 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "gst/base/element_type.hpp"
-#include "gst/base/properties.hpp"
+#include "gst/base/element.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/filter/filter.hpp"
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/glsimulator/gleventsimulator.hpp"
 
-#include <memory>
-
 #include "gst/glsimulator/shared_context.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(gl_event_simulator_debug);

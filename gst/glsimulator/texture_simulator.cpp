@@ -12,8 +12,6 @@
 #include <string>
 #include <utility>
 
-#include "gst/base/owned.hpp"
-#include "gst/base/video_frame.hpp"
 #include "gst/glsimulator/gleventsimulator.hpp"
 #include "gst/glsimulator/shared_context.hpp"
 #include "gst/simulator/frame_luma.hpp"

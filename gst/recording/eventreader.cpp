@@ -1,33 +1,16 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "gst/recording/eventreader.hpp"
 
-#include <algorithm>
 #include <array>
 #include <exception>
-#include <memory>
 #include <new>
 #include <optional>
 #include <span>
-#include <string>
-#include <utility>
 
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
-#include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/seek_request.hpp"
-#include "gst/base/types.hpp"
-#include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/reader/reader_output.hpp"
 #include "gst/recording/reader/reader_reports.hpp"
-#include "gst/recording/reader/reader_timeline.hpp"
 #include "src/formats/byte_source.hpp"
 #include "src/formats/compressed_file.hpp"
 #include "src/formats/corruption.hpp"

@@ -9,14 +9,7 @@
 #include <vector>
 
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/sensor_events.hpp"
 #include "gst/recording/writable_events.hpp"

@@ -2,9 +2,6 @@
 #include "gst/recording/frame_buffer.hpp"
 
 #include <algorithm>
-#include <new>
-
-#include "src/core/sensor_size.hpp"
 
 using namespace eventcamera;
 

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/writable_events.hpp"
 
-#include <algorithm>
-#include <new>
 #include <stdexcept>
-#include <utility>
 
 #include "src/formats/temporary_file.hpp"
 

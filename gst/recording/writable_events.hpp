@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <algorithm>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
-#include "src/core/event.hpp"
-#include "src/core/sensor_size.hpp"
+#include "gst/base/element.hpp"
 
 /// Numbers of items in a file that is being written.
 struct Written {

@@ -3,9 +3,8 @@
 
 #include <initializer_list>
 
-#include "gst/base/event_caps.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/eventcamera/eventcamera.h"
 
 namespace {
 

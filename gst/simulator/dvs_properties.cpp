@@ -9,8 +9,6 @@
 #include <type_traits>
 #include <variant>
 
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
 #include "gst/simulator/camera_profile.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 

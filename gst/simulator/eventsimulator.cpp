@@ -1,22 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "gst/simulator/eventsimulator.hpp"
 
-#include <algorithm>
 #include <atomic>
-#include <memory>
-#include <utility>
 
-#include "gst/base/element_type.hpp"
 #include "gst/base/event_pool.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
 #include "gst/base/seek_request.hpp"
-#include "gst/base/types.hpp"
-#include "gst/drawing/drawn_video.hpp"
-#include "gst/simulator/caps.hpp"
 #include "gst/simulator/simulation.hpp"
 
 GST_DEBUG_CATEGORY(event_simulator_debug);

@@ -1,25 +1,16 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/simulator/simulation.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <functional>
-#include <new>
 #include <span>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_pool.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/video_frame.hpp"
-#include "gst/drawing/drawn_video.hpp"
-#include "gst/simulator/caps.hpp"
 #include "gst/simulator/frame_luma.hpp"
-#include "src/core/sensor_size.hpp"
 
 #define GST_CAT_DEFAULT event_simulator_debug
 

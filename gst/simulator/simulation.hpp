@@ -9,12 +9,8 @@
 #include <memory>
 #include <optional>
 
-#include "gst/base/errors.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 #include "gst/simulator/repeated_frames.hpp"
-#include "gst/simulator/video_simulator.hpp"
 #include "src/core/image.hpp"
 
 GST_DEBUG_CATEGORY_EXTERN(event_simulator_debug);

@@ -2,7 +2,6 @@
 /// Device provider: event cameras that Linux knows as video devices.
 #include <fcntl.h>
 #include <glob.h>
-#include <gst/gst.h>
 #include <linux/media.h>
 #include <linux/videodev2.h>
 #include <sys/ioctl.h>
@@ -18,7 +17,7 @@
 #include <vector>
 
 #include "elements/eventcam/cameras/event_camera.hpp"
-#include "gst/base/element_type.hpp"
+#include "gst/base/element.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/evt_caps.hpp"

@@ -41,7 +41,6 @@
  *
  * Since: 0.1
  */
-#include <gst/gst.h>
 #include <gst/video/video.h>
 
 #include <algorithm>
@@ -55,14 +54,8 @@
 #include "elements/eventcam/cameras/event_camera.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
+#include "gst/base/element.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/evt_caps.hpp"
 #include "src/formats/chunker.hpp"

@@ -1,15 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "elements/eventcam/drawing/event_pictures.hpp"
 
-#include <algorithm>
-#include <string>
-#include <utility>
-
-#include "gst/base/event_caps.hpp"
-#include "gst/base/played_segment.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/drawing/drawn_video.hpp"
-#include "gst/eventcamera/eventcamera.h"
 
 #define GST_CAT_DEFAULT category_
 

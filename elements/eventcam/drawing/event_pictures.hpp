@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
 #include <gst/video/video.h>
 
 #include <mutex>
@@ -9,8 +8,6 @@
 
 #include "elements/eventcam/drawing/frame_times.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_faults.hpp"
 #include "src/render/renderer.hpp"
 
 /// Quality of service of drawn pictures: predicts which ones sinks would drop, and counts them.

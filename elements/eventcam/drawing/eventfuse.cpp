@@ -36,10 +36,6 @@
 
 #include "elements/eventcam/drawing/frame_times.hpp"
 #include "elements/eventcam/drawing/frames_with_events.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
 #include "gst/base/video_frame.hpp"
 #include "src/reconstruct/complementary_filter.hpp"
 

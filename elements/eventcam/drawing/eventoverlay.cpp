@@ -32,10 +32,6 @@
 #include <span>
 
 #include "elements/eventcam/drawing/frames_with_events.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/properties.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/drawing/drawn_video.hpp"
 #include "src/render/overlay.hpp"

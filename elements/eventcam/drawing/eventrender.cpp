@@ -38,9 +38,6 @@
 #include <limits>
 
 #include "elements/eventcam/drawing/event_pictures.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
 #include "gst/drawing/drawn_video.hpp"
 #include "src/render/renderer.hpp"
 

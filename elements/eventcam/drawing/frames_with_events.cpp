@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "elements/eventcam/drawing/frames_with_events.hpp"
 
-#include <algorithm>
 #include <cstdint>
 #include <limits>
 
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/video_frame.hpp"
-#include "gst/eventcamera/eventcamera.h"
 
 #define GST_CAT_DEFAULT category_
 

@@ -8,10 +8,6 @@
 #include <vector>
 
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "src/core/event_validator.hpp"
-#include "src/core/sensor_size.hpp"
 
 /// Video of the pad `video_sink`, and events of the pad `event_sink` up to a running time.
 class FramesWithEvents : public EventAggregator {

@@ -10,8 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "gst/base/errors.hpp"
-#include "gst/base/event_buffer.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/sensor_events.hpp"

@@ -31,14 +31,7 @@
 #include <system_error>
 #include <utility>
 
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_caps.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
-#include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/sensor_events.hpp"
 #include "gst/recording/writable_events.hpp"

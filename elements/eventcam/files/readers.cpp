@@ -5,7 +5,6 @@
 
 #include "elements/eventcam/files/es_origin.hpp"
 #include "features.hpp"
-#include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/eventreader.hpp"
 #include "gst/recording/evt_caps.hpp"

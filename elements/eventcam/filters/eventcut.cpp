@@ -37,21 +37,12 @@
 #include <vector>
 
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
+#include "gst/base/element.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/event_pool.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
 #include "gst/filter/changed_caps.hpp"
 #include "gst/recording/sensor_events.hpp"
-#include "src/core/event_validator.hpp"
-#include "src/core/sensor_size.hpp"
 #include "src/formats/waiting_items.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_cut_debug);

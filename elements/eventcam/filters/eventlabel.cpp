@@ -36,13 +36,7 @@
 #include <vector>
 
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/video_frame.hpp"
-#include "src/core/label.hpp"
-#include "src/core/sensor_size.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_label_debug);
 #define GST_CAT_DEFAULT event_label_debug

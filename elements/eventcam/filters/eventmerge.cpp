@@ -47,16 +47,7 @@
 #include "elements/eventcam/filters/merged_timeline.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/event_pool.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/seek_request.hpp"
-#include "gst/eventcamera/eventcamera.h"
 
 GST_DEBUG_CATEGORY_STATIC(event_merge_debug);
 #define GST_CAT_DEFAULT event_merge_debug

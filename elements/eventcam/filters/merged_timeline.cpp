@@ -1,14 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "elements/eventcam/filters/merged_timeline.hpp"
 
-#include <algorithm>
-#include <utility>
-
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/owned.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "src/core/sensor_size.hpp"
 
 G_DEFINE_TYPE(GstEventMergePad, gst_event_merge_pad, GST_TYPE_AGGREGATOR_PAD)
 

@@ -8,8 +8,7 @@
 #include <span>
 
 #include "gst/aggregator/sink_pads.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
+#include "gst/base/element.hpp"
 #include "gst/base/seek_request.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/filter/event_merge.hpp"

@@ -59,12 +59,6 @@
 
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
-#include "gst/eventcamera/eventcamera.h"
-#include "src/core/sensor_size.hpp"
 #include "src/measure/stream_comparison.hpp"
 #include "src/render/rgb_picture.hpp"
 

@@ -46,15 +46,7 @@
 #include <optional>
 
 #include "elements/eventcam/measures/report.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/eventcamera/eventcamera.h"
-#include "src/core/event_validator.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/render/rgb_picture.hpp"
 

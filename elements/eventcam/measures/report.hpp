@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <functional>
@@ -11,8 +9,7 @@
 #include <string>
 
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/properties.hpp"
-#include "src/core/event.hpp"
+#include "gst/base/element.hpp"
 #include "src/measure/cause_counts.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/render/rgb_picture.hpp"

@@ -35,7 +35,6 @@
  *
  * Since: 0.1
  */
-#include <gst/gst.h>
 #include <gst/net/gstnetaddressmeta.h>
 
 #include <memory>
@@ -49,13 +48,8 @@
 #include "elements/eventcam/network/reception_reports.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/owned.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "src/core/sensor_size.hpp"
 #include "src/wire/datagrams.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_depay_debug);

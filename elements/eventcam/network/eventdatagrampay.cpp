@@ -24,7 +24,6 @@
  *
  * Since: 0.1
  */
-#include <gst/gst.h>
 
 #include <limits>
 #include <memory>
@@ -36,14 +35,8 @@
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "elements/eventcam/network/flush_timer.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
 #include "src/wire/datagrams.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_pay_debug);

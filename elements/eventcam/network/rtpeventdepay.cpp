@@ -55,15 +55,8 @@
 #include "elements/eventcam/network/rtp_events.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "src/core/sensor_size.hpp"
 #include "src/wire/rtp_unpacker.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(rtp_event_depay_debug);

@@ -38,18 +38,8 @@
 
 #include "elements/eventcam/network/flush_timer.hpp"
 #include "elements/eventcam/network/rtp_events.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
-#include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/sensor_events.hpp"
 #include "src/wire/rtp_packer.hpp"
 

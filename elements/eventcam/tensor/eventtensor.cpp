@@ -56,7 +56,6 @@
  *
  * Since: 0.1
  */
-#include <gst/gst.h>
 
 #include <algorithm>
 #include <optional>
@@ -65,16 +64,8 @@
 
 #include "elements/eventcam/tensor/tensor_format.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/event_pool.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "src/core/sensor_size.hpp"
 #include "src/tensor/event_tensor.hpp"
 #include "src/tensor/window_queue.hpp"
 

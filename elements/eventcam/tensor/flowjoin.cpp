@@ -35,9 +35,6 @@
 #include <utility>
 
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
 #include "gst/base/video_frame.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(flow_join_debug);

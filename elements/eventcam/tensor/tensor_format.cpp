@@ -5,7 +5,6 @@
 #ifdef HAVE_TENSOR_META
 #include <gst/analytics/analytics.h>
 
-#include <array>
 #endif
 
 using namespace eventcamera;

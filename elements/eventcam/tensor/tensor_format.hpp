@@ -1,17 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <algorithm>
 #include <string>
 #include <utility>
 
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/owned.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
-#include "gst/eventcamera/eventcamera.h"
+#include "gst/base/element.hpp"
 #include "src/tensor/event_tensor.hpp"
 #include "src/tensor/window_queue.hpp"
 

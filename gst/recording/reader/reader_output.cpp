@@ -1,20 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/reader/reader_output.hpp"
 
-#include <gst/gst.h>
 #include <gst/video/video.h>
 
-#include <algorithm>
-#include <array>
 #include <cstddef>
-#include <mutex>
-#include <optional>
-#include <string>
-#include <utility>
 
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/owned.hpp"
-#include "gst/base/pads.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/sensor_events.hpp"
 

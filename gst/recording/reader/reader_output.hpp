@@ -8,9 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "gst/base/errors.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/guarded.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/recording/eventreader.hpp"
 #include "gst/recording/reader/reader_timeline.hpp"
 #include "src/formats/recording_reader.hpp"

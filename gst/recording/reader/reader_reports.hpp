@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
 
-#include "gst/base/errors.hpp"
-#include "gst/base/guarded.hpp"
 #include "gst/recording/reader/reader_timeline.hpp"
 #include "src/formats/recording_reader.hpp"
 

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <algorithm>
 #include <memory>
 #include <optional>
 #include <utility>
 
-#include "gst/base/guarded.hpp"
+#include "gst/base/element.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/seek_request.hpp"
 #include "src/formats/recording_reader.hpp"
