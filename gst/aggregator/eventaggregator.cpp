@@ -217,8 +217,7 @@ struct EventAggregatorFunctions {
   }
 
   static bool handle_caps(EventAggregator& self, GstAggregatorPad* pad, GstEvent* event) {
-    GstCaps* caps = nullptr;
-    gst_event_parse_caps(event, &caps);
+    GstCaps* const caps = caps_of(event);
     if (!self.handle_caps(pad, caps)) {
       GST_ERROR_OBJECT(pad, "cannot %s %" GST_PTR_FORMAT, self.role_.verb, caps);
       return false;

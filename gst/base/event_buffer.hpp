@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
@@ -14,6 +15,15 @@
 #include "src/core/label.hpp"
 #include "src/core/sensor_size.hpp"
 
+/// Time in GStreamer's unit; negative times become 0.
+constexpr GstClockTime nanoseconds(eventcamera::Microseconds t) {
+  return t < 0 ? 0 : static_cast<GstClockTime>(t) * GST_USECOND;
+}
+/// Time in the core's unit, rounded down.
+constexpr eventcamera::Microseconds microseconds(GstClockTime t) {
+  return static_cast<eventcamera::Microseconds>(t / GST_USECOND);
+}
+
 /// Interval of a buffer: the times of its events are at least `start` and at most `end`.
 struct EventInterval {
   GstClockTime start;
@@ -22,7 +32,14 @@ struct EventInterval {
 
 /// Length of an interval in microseconds: the maximum time of its events.
 inline eventcamera::Microseconds length_of(const EventInterval& interval) {
-  return static_cast<eventcamera::Microseconds>((interval.end - interval.start) / GST_USECOND);
+  return microseconds(interval.end - interval.start);
+}
+
+/// Sets the times of a new buffer, and flags it DISCONT if `is_discontinuous`, which it clears.
+inline void stamp(GstBuffer* buffer, const EventInterval& interval, bool& is_discontinuous) {
+  GST_BUFFER_PTS(buffer) = interval.start;
+  GST_BUFFER_DURATION(buffer) = interval.end - interval.start;
+  if (std::exchange(is_discontinuous, false)) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
 }
 
 /// Interval of a buffer of events. Without a duration it ends at the last event. None without a
@@ -85,11 +102,18 @@ static_assert(GST_EVENT_CAMERA_MAX_SIDE == eventcamera::max_side);
 /// Caps of an event stream in memory format.
 #define EVENT_CAPS GST_EVENT_CAMERA_MEDIA_TYPE ", format = (string) XYTP, " SIZE_CAPS
 
+/// Sensor of an event stream in memory format; none for other caps.
+inline std::optional<eventcamera::SensorSize> sensor_of(const GstCaps* caps) {
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) return std::nullopt;
+  return eventcamera::SensorSize{info.width, info.height};
+}
+
 /// Caps of events in memory format, from a sensor of this size, with a variable framerate.
-inline OwnedCaps event_caps(int width, int height) {
+inline OwnedCaps event_caps(eventcamera::SensorSize sensor) {
   GstEventCameraInfo info = {};
-  info.width = width;
-  info.height = height;
+  info.width = sensor.width;
+  info.height = sensor.height;
   info.fps_d = 1;
   return OwnedCaps(gst_event_camera_info_to_caps(&info));
 }

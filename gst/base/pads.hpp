@@ -117,6 +117,13 @@ inline void announce_latency(GstDebugCategory* category, gpointer element, const
   g_signal_connect(element, notify.c_str(), G_CALLBACK(post), category);
 }
 
+/// Caps of a CAPS event, which owns them.
+inline GstCaps* caps_of(GstEvent* event) {
+  GstCaps* caps = nullptr;
+  gst_event_parse_caps(event, &caps);
+  return caps;
+}
+
 /// Segment of a SEGMENT event, which owns it.
 inline const GstSegment& segment_of(GstEvent* event) {
   const GstSegment* segment = nullptr;

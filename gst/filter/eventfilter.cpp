@@ -146,7 +146,7 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
     const auto valid =
         keep_valid(all, priv.stream->state->sensor,
                    static_cast<guint32>(std::min(max_t, GstClockTime{G_MAXUINT32})), invalid);
-    const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
+    const auto start = microseconds(interval->start);
     const auto kept = priv.impl->filter(valid, continued(transform, valid, start));
     mapped.reset();
     truncate_events(buffer, kept.events.size());

@@ -304,7 +304,7 @@ class EventReader {
     };
     close_recording();
     const bool is_timed = timeline_.is_timed();
-    const auto length = static_cast<Microseconds>(settings_.copy().buffer_duration / GST_USECOND);
+    const auto length = microseconds(settings_.copy().buffer_duration);
     recording_ = std::make_shared<RecordingReader>(
         make, length, is_timed ? RecordingReader::Clock::stream : RecordingReader::Clock::file);
     if (decompressed_)
@@ -423,8 +423,8 @@ class EventReader {
     const bool has_end = GST_BUFFER_DURATION_IS_VALID(buffer);
     if (timeline_.is_timed() && GST_BUFFER_PTS_IS_VALID(buffer))
       interval = {
-          static_cast<Microseconds>(GST_BUFFER_PTS(buffer) / GST_USECOND),
-          has_end ? static_cast<Microseconds>(GST_BUFFER_DURATION(buffer) / GST_USECOND) : 0};
+          microseconds(GST_BUFFER_PTS(buffer)),
+          has_end ? microseconds(GST_BUFFER_DURATION(buffer)) : 0};
     GstFlowReturn result = GST_FLOW_OK;
     if (decompressor_) {
       decompressor_->push(bytes.get());
@@ -434,8 +434,8 @@ class EventReader {
       result = push_pending();
     }
     if (result == GST_FLOW_OK && interval && has_end) {
-      recording_->advance_to(static_cast<Microseconds>(
-          (GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer)) / GST_USECOND));
+      recording_->advance_to(microseconds(
+          (GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer))));
       result = push_pending();
     }
     if (result != GST_FLOW_OK) {
@@ -464,8 +464,7 @@ class EventReader {
   }
 
   gboolean handle_caps(GstEvent* event) {
-    GstCaps* caps = nullptr;
-    gst_event_parse_caps(event, &caps);
+    GstCaps* const caps = caps_of(event);
     const bool is_new = !caps_ || !gst_caps_is_equal(caps_.get(), caps);
     if (is_new) {
       drain();
@@ -538,7 +537,7 @@ class EventReader {
     if (is_known)
       flow_ = guard([&] {
         if (!recording_) open_recording();
-        recording_->advance_to(static_cast<Microseconds>((pts + duration) / GST_USECOND));
+        recording_->advance_to(microseconds(pts + duration));
         GstFlowReturn result = push_pending();
         if (recording_->has_events() || result != GST_FLOW_OK) return result;
         result = output_.begin();

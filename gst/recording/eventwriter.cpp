@@ -106,7 +106,7 @@ class WrittenFile {
     if (!triggers_.is_full()) return GST_FLOW_OK;
     ensure_segment(src_);
     const auto first = std::max<Microseconds>(*triggers_.first(), 0);
-    const auto start = static_cast<GstClockTime>(first) * GST_USECOND;
+    const auto start = nanoseconds(first);
     if (const GstFlowReturn result = push_header(start); result != GST_FLOW_OK) return result;
     encode_triggers();
     writable_.advance_to(last_);
@@ -200,7 +200,7 @@ class WrittenFile {
                              ? events.size()
                              : count_that_fits(events, room - std::min(room, bytes_.size()));
       if (count == 0) {
-        const auto end = std::max(start, static_cast<GstClockTime>(events.front().t) * GST_USECOND);
+        const auto end = std::max(start, nanoseconds(events.front().t));
         const GstFlowReturn result = push_bytes(start, end - start);
         if (result != GST_FLOW_OK) return result;
         start = end;
@@ -438,8 +438,7 @@ static bool is_file(const WrittenFile& file) {
 
 static gboolean handle_caps(GstEventWriter* self, GstEvent* event) {
   const auto& priv = priv_of(self);
-  GstCaps* caps = nullptr;
-  gst_event_parse_caps(event, &caps);
+  GstCaps* const caps = caps_of(event);
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) {
     GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are not event caps", caps);

@@ -80,7 +80,7 @@ std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> event
                        " events at %" GST_TIME_FORMAT
                        ": outside the sensor, or earlier than those written",
                        events.size() - picked_.size(), events.size(),
-                       GST_TIME_ARGS(static_cast<GstClockTime>(start) * GST_USECOND));
+                       GST_TIME_ARGS(nanoseconds(start)));
   if (picked_.size() > before_last_dropped) {
     if (earlier_.reported == 0) warn_of_earlier();
     if (outside_.reported == 0) warn_of_outside();

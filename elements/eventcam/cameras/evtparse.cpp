@@ -94,7 +94,7 @@ class CameraBuffers {
                       .lost = lost};
     if (GST_CLOCK_TIME_IS_VALID(arrival) && GST_CLOCK_TIME_IS_VALID(last) && arrival >= last &&
         arrival - last <= max_gap)
-      transfer.words.elapsed = static_cast<Microseconds>((arrival - last) / GST_USECOND);
+      transfer.words.elapsed = microseconds(arrival - last);
     return transfer;
   }
 
@@ -108,7 +108,7 @@ class CameraBuffers {
     const auto arrival = segment.format == GST_FORMAT_TIME
                              ? gst_segment_to_running_time(&segment, GST_FORMAT_TIME, pts)
                              : pts;
-    constexpr auto max = static_cast<GstClockTime>(Chunker::max_time) * GST_USECOND;
+    constexpr auto max = nanoseconds(Chunker::max_time);
     return arrival <= max ? arrival : GST_CLOCK_TIME_NONE;
   }
 
@@ -325,10 +325,6 @@ static bool start_stream(GstEvtParse* self) {
 
 /* output */
 
-static GstClockTime nanoseconds(Microseconds t) {
-  return static_cast<GstClockTime>(t) * GST_USECOND;
-}
-
 /// Pushes a segment before data of these times, if they need one.
 static void begin_segment(GstEvtParse* self, GstClockTime start, GstClockTime end) {
   auto& priv = *self->priv;
@@ -479,8 +475,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       priv.stream->state.reset();
       break;
     case GST_EVENT_CAPS: {
-      GstCaps* caps = nullptr;
-      gst_event_parse_caps(event, &caps);
+      GstCaps* const caps = caps_of(event);
       end_stream(self);
       priv.stream->state.reset();
       priv.stream->input = input_of(caps);

@@ -34,7 +34,7 @@ bool EventPictures::add_events(const MappedEvents& mapped, const EventInterval& 
     GST_LOG_OBJECT(main_pad(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, rest.size(),
                    GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
   const auto due = end && *end < interval.end
-                       ? events_until(rest, mapped.start(), static_cast<Microseconds>(*end / 1000))
+                       ? events_until(rest, mapped.start(), microseconds(*end))
                        : rest;
   *processed_ += due.size();
   state_->renderer.configure(render_settings());
@@ -170,7 +170,7 @@ GstFlowReturn EventPictures::draw(const EventInterval& events, GstBuffer* buffer
                       ("%" GST_PTR_FORMAT, buffer));
     return GST_FLOW_ERROR;
   }
-  state_->renderer.draw(window_start(events), static_cast<Microseconds>(events.end / 1000),
+  state_->renderer.draw(window_start(events), microseconds(events.end),
                         pixel_layout_of(*state_->video), frame.data(), frame.stride());
   return GST_FLOW_OK;
 }

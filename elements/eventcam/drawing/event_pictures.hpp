@@ -86,7 +86,7 @@ class EventPictures : public EventAggregator {
   virtual eventcamera::RenderSettings render_settings() const = 0;
   /// Start of the window for the picture of an interval.
   virtual eventcamera::Microseconds window_start(const EventInterval& interval) const {
-    return static_cast<eventcamera::Microseconds>(interval.start / 1000);
+    return microseconds(interval.start);
   }
 
  private:

@@ -204,7 +204,7 @@ class EventFuse final : public FramesWithEvents {
     const ImageView<std::uint8_t> view{reinterpret_cast<const std::uint8_t*>(frame.data()),
                                        frame.stride(), GST_VIDEO_INFO_WIDTH(&*video_),
                                        GST_VIDEO_INFO_HEIGHT(&*video_)};
-    const auto time = static_cast<Microseconds>(running(start) / 1000);
+    const auto time = microseconds(running(start));
     if (filter_)
       filter_->set_frame(view, time);
     else
@@ -233,7 +233,7 @@ class EventFuse final : public FramesWithEvents {
     if (!buffer) throw std::bad_alloc();
     {
       const VideoFrame picture(output_, buffer.get(), GST_MAP_WRITE);
-      filter_->draw(static_cast<Microseconds>(running(interval.start) / 1000), picture.data(),
+      filter_->draw(microseconds(running(interval.start)), picture.data(),
                     picture.stride());
     }
     GST_BUFFER_PTS(buffer.get()) = interval.start;

@@ -168,10 +168,10 @@ class EventOverlay final : public FramesWithEvents {
           ("%" GST_PTR_FORMAT, buffer));
       return GST_FLOW_ERROR;
     }
-    const auto end = static_cast<Microseconds>(interval.end / 1000);
+    const auto end = microseconds(interval.end);
     const auto start = current.accumulation_time > 0
-                           ? end - static_cast<Microseconds>(current.accumulation_time / 1000)
-                           : static_cast<Microseconds>(interval.start / 1000);
+                           ? end - microseconds(current.accumulation_time)
+                           : microseconds(interval.start);
     overlay_->draw(start, end, palette(current.palette), current.opacity, pixel_layout_of(*drawn_),
                    frame.data(), frame.stride());
     return GST_FLOW_OK;

@@ -80,10 +80,10 @@ struct Settings {
   Microseconds window_start(const EventInterval& interval) const {
     if (accumulation_time > 0)
       return interval.end > accumulation_time
-                 ? static_cast<Microseconds>((interval.end - accumulation_time) / 1000)
+                 ? microseconds(interval.end - accumulation_time)
                  : -1;
     if (event_count > 0 || area_event_count > 0) return -1;
-    return static_cast<Microseconds>(interval.start / 1000);
+    return microseconds(interval.start);
   }
 };
 

@@ -88,13 +88,13 @@ bool FramesWithEvents::add_events(GstBuffer* buffer, const EventInterval& interv
     warn(event_fault(buffer), buffer);
     return true;
   }
-  const auto origin = static_cast<Microseconds>(interval.start / 1000);
+  const auto origin = microseconds(interval.start);
   const double rate = segment_of(events_pad_).rate;
   const auto rest = mapped.events().subspan(std::min(processed_, mapped.events().size()));
   if (processed_ == 0)
     GST_LOG_OBJECT(events_pad_, "%" G_GSIZE_FORMAT " events at running time %" GST_TIME_FORMAT,
                    rest.size(), GST_TIME_ARGS(interval.start));
-  const auto length = static_cast<double>(static_cast<Microseconds>(end / 1000) - origin) * rate;
+  const auto length = static_cast<double>(microseconds(end) - origin) * rate;
   const auto due =
       end < interval.end ? events_until(rest, 0, static_cast<Microseconds>(length)) : rest;
   processed_ += due.size();

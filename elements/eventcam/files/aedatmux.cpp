@@ -381,8 +381,7 @@ static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, Gst
       file.begin_segment(segment_of(event), is_simulated(GST_PAD(pad)));
   }
   if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
-    GstCaps* caps = nullptr;
-    gst_event_parse_caps(event, &caps);
+    GstCaps* const caps = caps_of(event);
     GST_DEBUG_OBJECT(pad, "%" GST_PTR_FORMAT, caps);
     if (!handle_caps(self, pad, caps)) {
       gst_event_unref(event);

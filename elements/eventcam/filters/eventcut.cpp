@@ -150,8 +150,8 @@ static GstFlowReturn push_window(GstEventCut* self, std::span<const AbsoluteEven
   const auto stream = self->priv->stream.lock();
   GstPad* const src = GST_BASE_TRANSFORM_SRC_PAD(self);
   const Microseconds start = *stream->start;
-  const GstClockTime pts = static_cast<GstClockTime>(start) * GST_USECOND;
-  const GstClockTime duration = static_cast<GstClockTime>(end - start) * GST_USECOND;
+  const GstClockTime pts = nanoseconds(start);
+  const GstClockTime duration = nanoseconds(end - start);
   GST_LOG_OBJECT(
       self, "window of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
       events.size(), GST_TIME_ARGS(pts), GST_TIME_ARGS(pts + duration));
@@ -180,7 +180,7 @@ static GstFlowReturn push_window(GstEventCut* self, std::span<const AbsoluteEven
 static GstFlowReturn advance(GstEventCut* self, const EventInterval& interval) {
   const auto stream = self->priv->stream.lock();
   stream->reached = std::max(stream->reached, interval.end);
-  const auto reached = static_cast<Microseconds>(stream->reached / GST_USECOND);
+  const auto reached = microseconds(stream->reached);
   GstFlowReturn result = GST_FLOW_OK;
   std::span<const AbsoluteEvent> rest = stream->events;
   for (const auto& trigger : stream->triggers.pop_before(reached + 1)) {

@@ -224,7 +224,7 @@ class EventMerge final : public EventAggregator {
       gst_value_set_int_range(&range, size, max_side);
       return range;
     };
-    const OwnedCaps ours(event_caps(needed.width, needed.height));
+    const OwnedCaps ours(event_caps(needed));
     GstStructure* const structure = gst_caps_get_structure(ours.get(), 0);
     if (needed.width < max_side) {
       GValue width = at_least(needed.width);
@@ -290,8 +290,8 @@ class EventMerge final : public EventAggregator {
     while (const auto buffer = next_buffer(pad.get())) {
       if (stream.loaded != buffer) stream.discontinuous |= GST_BUFFER_IS_DISCONT(buffer.get());
       if (const auto interval = interval_of(buffer.get())) {
-        const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
-        const auto end = static_cast<Microseconds>(interval->end / GST_USECOND);
+        const auto start = microseconds(interval->start);
+        const auto end = microseconds(interval->end);
         if (stream.loaded == buffer || load_events(pad, buffer.get(), end - start)) {
           stream.input.place(start, static_cast<int>(stream.placed.x),
                              static_cast<int>(stream.placed.y));
@@ -321,7 +321,7 @@ class EventMerge final : public EventAggregator {
     stream.loaded.reset(gst_buffer_ref(buffer));
     warn(invalid, buffer);
     counts_.lock()->rejected += invalid.outside + invalid.unsorted;
-    if (!mapped.events().empty()) raise_latency(static_cast<GstClockTime>(length) * GST_USECOND);
+    if (!mapped.events().empty()) raise_latency(nanoseconds(length));
     return true;
   }
 
@@ -364,8 +364,8 @@ class EventMerge final : public EventAggregator {
   /// Pushes the events of an interval.
   GstFlowReturn push_interval(const MergedInterval& interval, EventMerger::Inputs inputs) {
     if (!gst_pad_has_current_caps(GST_AGGREGATOR_SRC_PAD(element()))) return GST_FLOW_OK;
-    const auto start = static_cast<GstClockTime>(interval.start) * GST_USECOND;
-    const auto duration = static_cast<GstClockTime>(interval.end - interval.start) * GST_USECOND;
+    const auto start = nanoseconds(interval.start);
+    const auto duration = nanoseconds(interval.end - interval.start);
     if (interval.events == 0) return push_empty_interval(start, duration);
     const gsize size = interval.events * sizeof(Event);
     OwnedBuffer buffer;

@@ -151,14 +151,10 @@ static Guarded<Settings>& settings_of(GObject* object) {
 
 /* output */
 
-static GstClockTime nanoseconds(Microseconds t) {
-  return static_cast<GstClockTime>(t) * GST_USECOND;
-}
-
 static bool push_caps(GstEventDatagramDepay* self) {
   auto& state = *self->priv->stream->state;
   if (state.has_caps) return true;
-  const OwnedCaps caps = event_caps(state.settings.width, state.settings.height);
+  const OwnedCaps caps = event_caps({state.settings.width, state.settings.height});
   GST_DEBUG_OBJECT(self, "the stream begins, with %" GST_PTR_FORMAT, caps.get());
   state.has_caps = gst_pad_push_event(self->priv->src, gst_event_new_caps(caps.get())) != FALSE;
   return state.has_caps;
@@ -257,7 +253,7 @@ static GstFlowReturn receive(GstEventDatagramDepay* self, GstBuffer* datagram,
   auto& state = *priv.stream->state;
   priv.reports.packet_arrived();
   std::optional<Microseconds> time;
-  if (GST_CLOCK_TIME_IS_VALID(arrival)) time = static_cast<Microseconds>(arrival / GST_USECOND);
+  if (GST_CLOCK_TIME_IS_VALID(arrival)) time = microseconds(arrival);
   const auto reception = state.unpacker->unpack(bytes, time, state.events);
   const bool accepted = reception.fault == nullptr && !reception.late;
   {

@@ -98,9 +98,9 @@ static Report report_of(const std::exception& error) {
 /// Keeps a datagram until push().
 static void keep(Private& priv, const Datagram& datagram) {
   OwnedBuffer buffer(copied_buffer(std::as_bytes(datagram.bytes)));
-  GST_BUFFER_PTS(buffer.get()) = static_cast<GstClockTime>(datagram.first) * GST_USECOND;
+  GST_BUFFER_PTS(buffer.get()) = nanoseconds(datagram.first);
   GST_BUFFER_DURATION(buffer.get()) =
-      static_cast<GstClockTime>(datagram.last - datagram.first) * GST_USECOND;
+      nanoseconds(datagram.last - datagram.first);
   priv.stream->datagrams.push_back(std::move(buffer));
   {
     const auto counts = priv.counts.lock();
@@ -174,7 +174,7 @@ static bool is_flush_due(GstEventDatagramPay* self, const EventInterval& interva
   const auto since = priv.stream->packer->waiting_since();
   if (!since) return false;
   const auto next = interval.end + (interval.end - interval.start);
-  return next >= static_cast<GstClockTime>(*since) * GST_USECOND + priv.settings.copy().max_latency;
+  return next >= nanoseconds(*since) + priv.settings.copy().max_latency;
 }
 
 /* data */
@@ -182,7 +182,7 @@ static bool is_flush_due(GstEventDatagramPay* self, const EventInterval& interva
 /// Maximum time between two events of a datagram; not limited if each buffer is sent at once.
 static Microseconds max_span(GstClockTime max_latency) {
   if (max_latency == 0) return std::numeric_limits<Microseconds>::max();
-  return static_cast<Microseconds>(max_latency / GST_USECOND);
+  return microseconds(max_latency);
 }
 
 /// Collects the events of a buffer.
@@ -230,8 +230,7 @@ static void handle_gap(GstEventDatagramPay* self, GstEvent* event) {
 
 static gboolean handle_caps(GstEventDatagramPay* self, GstEvent* event) {
   auto& priv = *self->priv;
-  GstCaps* caps = nullptr;
-  gst_event_parse_caps(event, &caps);
+  GstCaps* const caps = caps_of(event);
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
   if (priv.stream->packer && priv.stream->info.width == info.width &&

@@ -292,7 +292,7 @@ static std::optional<RtpEventFormat> format_of(const GstStructure* caps) {
 }
 
 static bool send_caps(GstRtpEventDepay* self, SensorSize sensor) {
-  const OwnedCaps caps = event_caps(sensor.width, sensor.height);
+  const OwnedCaps caps = event_caps(sensor);
   return gst_pad_set_caps(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), caps.get()) != FALSE;
 }
 

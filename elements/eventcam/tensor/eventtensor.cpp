@@ -305,8 +305,7 @@ static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
 
 static gboolean handle_caps(GstEventTensor* self, GstEvent* event) {
   auto& priv = *self->priv;
-  GstCaps* caps = nullptr;
-  gst_event_parse_caps(event, &caps);
+  GstCaps* const caps = caps_of(event);
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
   if (priv.stream->state && priv.stream->state->format.sensor.width == info.width &&

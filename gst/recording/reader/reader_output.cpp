@@ -136,7 +136,7 @@ class ReaderPad {
   /// Sends caps unless already sent. False if they are refused.
   bool send_caps(SensorSize size) {
     if (size == size_) return true;
-    const OwnedCaps caps = event_caps(size.width, size.height);
+    const OwnedCaps caps = event_caps(size);
     const bool accepted = push_caps(caps.get());
     if (accepted) size_ = size;
     return accepted;

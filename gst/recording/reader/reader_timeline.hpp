@@ -11,10 +11,6 @@
 #include "gst/base/seek_request.hpp"
 #include "src/formats/recording_reader.hpp"
 
-inline GstClockTime nanoseconds(eventcamera::Microseconds t) {
-  return static_cast<GstClockTime>(std::max<eventcamera::Microseconds>(t, 0)) * GST_USECOND;
-}
-
 /// Size of the upstream file in bytes; 0 if unknown.
 inline guint64 upstream_bytes(GstPad* sink) {
   gint64 size = 0;
@@ -24,11 +20,11 @@ inline guint64 upstream_bytes(GstPad* sink) {
 
 /// Bounds of a segment in whole microseconds, rounded outwards.
 inline eventcamera::Microseconds position_of(const GstSegment& segment) {
-  return static_cast<eventcamera::Microseconds>(segment.position / GST_USECOND);
+  return microseconds(segment.position);
 }
 inline std::optional<eventcamera::Microseconds> stop_of(const GstSegment& segment) {
   if (!GST_CLOCK_TIME_IS_VALID(segment.stop)) return std::nullopt;
-  return static_cast<eventcamera::Microseconds>((segment.stop + GST_USECOND - 1) / GST_USECOND);
+  return microseconds(segment.stop + GST_USECOND - 1);
 }
 
 /// Where a reader is: the segment that it plays, its position and duration, and a seek that
