@@ -22,8 +22,9 @@ inline void set_metadata(gpointer klass, const char* name, const char* kind,
                                         EVENTSIM_AUTHORS);
 }
 
-/// Defines and registers the type of an element whose data is a `Private`. The functions
-/// type_init(), which makes it, and type_class_init() must follow; `finalize` deletes it.
+/// Defines and registers the type of an element whose data is a `Private`: priv_of() returns it,
+/// field_of() one of its fields, for Properties. The functions type_init(), which makes it, and
+/// type_class_init() must follow; `finalize` deletes it.
 #define DEFINE_EVENT_ELEMENT(Type, type, OBJECT, Parent, PARENT_TYPE, element, rank, description) \
   G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, Parent)                                           \
   struct _##Type {                                                                                \
@@ -33,8 +34,15 @@ inline void set_metadata(gpointer klass, const char* name, const char* kind,
   G_DEFINE_TYPE_WITH_CODE(Type, type, PARENT_TYPE,                                                \
                           GST_DEBUG_CATEGORY_INIT(GST_CAT_DEFAULT, #element, 0, description))     \
   GST_ELEMENT_REGISTER_DEFINE(element, #element, rank, type##_get_type())                         \
+  static Private& priv_of(gpointer element) {                                                     \
+    return *GST_##OBJECT(element)->priv;                                                          \
+  }                                                                                               \
+  template <auto field>                                                                           \
+  static auto& field_of(GObject* object) {                                                        \
+    return priv_of(object).*field;                                                                \
+  }                                                                                               \
   static void finalize(GObject* object) {                                                         \
-    delete GST_##OBJECT(object)->priv;                                                            \
+    delete &priv_of(object);                                                                      \
     G_OBJECT_CLASS(type##_parent_class)->finalize(object);                                        \
   }
 

@@ -3,7 +3,6 @@
 
 #include <string>
 #include <tuple>
-#include <utility>
 
 #include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
@@ -47,18 +46,19 @@ inline GstPad* add_pad(GstElement* element, const char* name) {
   return pad;
 }
 
-/// For init: adds the pads "sink" and "src" of an element that decides the caps of its output.
-inline std::pair<GstPad*, GstPad*> add_pads(GstElement* element, GstPadChainFunction chain,
-                                            GstPadEventFunction sink_event,
-                                            GstPadQueryFunction src_query) {
+/// An element that decides the caps of its output, with the pads "sink" and "src".
+struct ElementPads {
+  GstElement* const element;
   GstPad* const sink = add_pad(element, "sink");
-  gst_pad_set_chain_function(sink, chain);
-  gst_pad_set_event_function(sink, sink_event);
   GstPad* const src = add_pad(element, "src");
-  gst_pad_set_query_function(src, src_query);
-  gst_pad_use_fixed_caps(src);
-  return {sink, src};
-}
+
+  ElementPads(GstElement* of, GstPadChainFunction chain, GstPadEventFunction sink_event)
+      : element(of) {
+    gst_pad_set_chain_function(sink, chain);
+    gst_pad_set_event_function(sink, sink_event);
+    gst_pad_use_fixed_caps(src);
+  }
+};
 
 /// True if the peer of a pad can seek in this format.
 inline bool peer_can_seek(GstPad* pad, GstFormat format) {
@@ -89,32 +89,38 @@ inline bool has_segment(GstPad* src) {
 }
 
 /// Answers a latency query on a source pad: upstream's latency plus the element's own.
-inline gboolean answer_latency(GstDebugCategory* category, GstPad* sink, GstQuery* query,
-                               GstClockTime own) {
+inline gboolean answer_latency(GstPad* sink, GstQuery* query, GstClockTime own) {
   if (!gst_pad_peer_query(sink, query)) return FALSE;
   gboolean live = FALSE;
   GstClockTime min = 0;
   GstClockTime max = 0;
   gst_query_parse_latency(query, &live, &min, &max);
-  GST_CAT_DEBUG_OBJECT(category, sink,
-                       "latency of upstream, %s: %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT
-                       "; own: %" GST_TIME_FORMAT,
-                       live ? "live" : "not live", GST_TIME_ARGS(min), GST_TIME_ARGS(max),
-                       GST_TIME_ARGS(own));
   gst_query_set_latency(query, live, min + own,
                         GST_CLOCK_TIME_IS_VALID(max) ? max + own : GST_CLOCK_TIME_NONE);
   return TRUE;
 }
 
-/// For init: posts a latency message whenever this property, part of the latency, is set.
-inline void announce_latency(GstDebugCategory* category, gpointer element, const char* property) {
-  const auto post = +[](GstElement* changed, GParamSpec* latency, gpointer log) {
-    GST_CAT_DEBUG_OBJECT(static_cast<GstDebugCategory*>(log), changed,
-                         "%s was set: latency may have changed", latency->name);
-    gst_element_post_message(changed, gst_message_new_latency(GST_OBJECT(changed)));
-  };
-  const std::string notify = std::string("notify::").append(property);
-  g_signal_connect(element, notify.c_str(), G_CALLBACK(post), category);
+/// For init: makes a source pad answer latency queries: `latency_of(element)` is the own latency.
+template <auto latency_of>
+void answer_latency_queries(GstPad* src) {
+  gst_pad_set_query_function(
+      src, +[](GstPad* pad, GstObject* element, GstQuery* query) {
+        if (GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
+          return gst_pad_query_default(pad, element, query);
+        const OwnedPad sink(gst_element_get_static_pad(GST_ELEMENT(element), "sink"));
+        return answer_latency(sink.get(), query, latency_of(element));
+      });
+}
+
+/// Says that the latency of an element may have changed.
+inline void post_latency(gpointer element) {
+  gst_element_post_message(GST_ELEMENT(element), gst_message_new_latency(GST_OBJECT(element)));
+}
+
+/// For init: posts a latency message whenever the property max-latency is set.
+inline void announce_max_latency(gpointer element) {
+  const auto post = +[](GstElement* changed, GParamSpec*, gpointer) { post_latency(changed); };
+  g_signal_connect(element, "notify::max-latency", G_CALLBACK(post), nullptr);
 }
 
 /// Caps of a CAPS event, which owns them.

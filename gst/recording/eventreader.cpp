@@ -204,7 +204,7 @@ class EventReader {
 
   gboolean src_query(GstPad* pad, GstQuery* query) {
     if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-      return answer_latency(GST_CAT_DEFAULT, sink_, query, settings_.copy().buffer_duration) ||
+      return answer_latency(sink_, query, settings_.copy().buffer_duration) ||
              gst_pad_query_default(pad, GST_OBJECT(element_), query);
     if (timeline_.is_timed()) return gst_pad_query_default(pad, GST_OBJECT(element_), query);
     return timeline_.answer(pad, query);
@@ -422,9 +422,8 @@ class EventReader {
     std::optional<RecordingReader::Interval> interval;
     const bool has_end = GST_BUFFER_DURATION_IS_VALID(buffer);
     if (timeline_.is_timed() && GST_BUFFER_PTS_IS_VALID(buffer))
-      interval = {
-          microseconds(GST_BUFFER_PTS(buffer)),
-          has_end ? microseconds(GST_BUFFER_DURATION(buffer)) : 0};
+      interval = {microseconds(GST_BUFFER_PTS(buffer)),
+                  has_end ? microseconds(GST_BUFFER_DURATION(buffer)) : 0};
     GstFlowReturn result = GST_FLOW_OK;
     if (decompressor_) {
       decompressor_->push(bytes.get());
@@ -434,8 +433,7 @@ class EventReader {
       result = push_pending();
     }
     if (result == GST_FLOW_OK && interval && has_end) {
-      recording_->advance_to(microseconds(
-          (GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer))));
+      recording_->advance_to(microseconds((GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer))));
       result = push_pending();
     }
     if (result != GST_FLOW_OK) {

@@ -242,7 +242,7 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
       gst_structure_has_name(gst_query_get_structure(query), simulated_query))
     return TRUE;
   if (direction == GST_PAD_SRC && GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(GST_CAT_DEFAULT, GST_BASE_TRANSFORM_SINK_PAD(transform), query,
+    return answer_latency(GST_BASE_TRANSFORM_SINK_PAD(transform), query,
                           simulation_of(transform).latency());
   return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 }

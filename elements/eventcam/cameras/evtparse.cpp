@@ -246,13 +246,11 @@ struct Stream {
   RepeatLevel loss_level;
 };
 
-struct Private {
-  explicit Private(const std::pair<GstPad*, GstPad*>& pads) : sink(pads.first), src(pads.second) {}
+struct Private : ElementPads {
+  using ElementPads::ElementPads;
 
   Guarded<Settings> settings;
   Guarded<Stats> stats;
-  GstPad* const sink;
-  GstPad* const src;
   StreamLocked<Stream> stream{sink};
 };
 
@@ -260,10 +258,6 @@ struct Private {
 
 DEFINE_EVENT_ELEMENT(GstEvtParse, gst_evt_parse, EVT_PARSE, GstElement, GST_TYPE_ELEMENT, evtparse,
                      GST_RANK_NONE, "words of live event cameras")
-
-static Guarded<Settings>& settings_of(GObject* object) {
-  return GST_EVT_PARSE(object)->priv->settings;
-}
 
 /* negotiation */
 
@@ -286,23 +280,23 @@ static Input input_of(const GstCaps* caps) {
 }
 
 template <class Work>
-static auto reported(GstEvtParse* self, const Work& work) {
+static auto reported(Private& self, const Work& work) {
   return catch_exceptions(
-      self, Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for the events."}, work);
+      self.element, Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for the events."},
+      work);
 }
 
 /// Begins a stream. False, after an error, if its words are unknown.
-static bool start_stream(GstEvtParse* self) {
-  auto& priv = *self->priv;
-  const auto settings = priv.settings.copy();
-  const auto input = priv.stream->input.value_or(Input{});
+static bool start_stream(Private& self) {
+  const auto settings = self.settings.copy();
+  const auto input = self.stream->input.value_or(Input{});
   auto format = input.format;
   if (settings.format != format_of_caps) format = static_cast<EvtFormat>(settings.format);
   auto sensor = input.sensor;
   if (settings.width > 0 && settings.height > 0) sensor = {settings.width, settings.height};
   if (!format || sensor.width < 1 || sensor.height < 1 || sensor.width > max_words_side ||
       sensor.height > max_words_side) {
-    post_message(self, GST_MESSAGE_ERROR,
+    post_message(self.element, GST_MESSAGE_ERROR,
                  {GST_RESOURCE_ERROR_SETTINGS,
                   "Cannot read this camera: its caps do not state the format of its words and the "
                   "size of its sensor. Set format, width and height."},
@@ -310,31 +304,31 @@ static bool start_stream(GstEvtParse* self) {
     return false;
   }
   return reported(self, [&] {
-    priv.stream->state.emplace(State{.buffers = CameraBuffers(input.framing),
+    self.stream->state.emplace(State{.buffers = CameraBuffers(input.framing),
                                      .scanner = make_word_scanner(*format, sensor, input.framing)});
     const OwnedCaps caps(gst_caps_new_simple(GST_EVENT_CAMERA_MEDIA_TYPE, "format", G_TYPE_STRING,
                                              evt_format_name(*format), "width", G_TYPE_INT,
                                              sensor.width, "height", G_TYPE_INT, sensor.height,
                                              "framerate", GST_TYPE_FRACTION, 0, 1, nullptr));
-    GST_DEBUG_OBJECT(self, "reading %s as %" GST_PTR_FORMAT,
+    GST_DEBUG_OBJECT(self.element, "reading %s as %" GST_PTR_FORMAT,
                      input.framing == Framing::padded ? "padded buffers" : "loose bytes",
                      caps.get());
-    gst_pad_push_event(priv.src, gst_event_new_caps(caps.get()));
+    gst_pad_push_event(self.src, gst_event_new_caps(caps.get()));
   });
 }
 
 /* output */
 
 /// Pushes a segment before data of these times, if they need one.
-static void begin_segment(GstEvtParse* self, GstClockTime start, GstClockTime end) {
-  auto& priv = *self->priv;
-  auto& segment = priv.stream->state->segment;
+static void begin_segment(Private& self, GstClockTime start, GstClockTime end) {
+  auto& segment = self.stream->state->segment;
   const bool is_correction = segment.has_begun();
-  const auto mapped = segment.begin(priv.src, priv.stream->segment_seqnum, start, end);
+  const auto mapped = segment.begin(self.src, self.stream->segment_seqnum, start, end);
   if (!mapped) return;
-  GST_DEBUG_OBJECT(self, "the camera's %" GST_TIME_FORMAT " is running time %" GST_TIME_FORMAT,
+  GST_DEBUG_OBJECT(self.element,
+                   "the camera's %" GST_TIME_FORMAT " is running time %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(start), GST_TIME_ARGS(*mapped));
-  const auto stats = priv.stats.lock();
+  const auto stats = self.stats.lock();
   stats->clock_offset = GST_CLOCK_DIFF(start, *mapped);
   stats->clock_corrections += is_correction ? 1 : 0;
 }
@@ -348,17 +342,16 @@ static GstBuffer* buffer_of(WordScanner::Piece&& piece) {
 }
 
 /// Pushes the pieces of a transfer.
-static GstFlowReturn push_pieces(GstEvtParse* self) {
-  auto& priv = *self->priv;
-  auto& state = *priv.stream->state;
+static GstFlowReturn push_pieces(Private& self) {
+  auto& state = *self.stream->state;
   GstFlowReturn result = GST_FLOW_OK;
   for (auto& piece : state.pieces) {
     if (result != GST_FLOW_OK) break;
     const auto start = nanoseconds(piece.start);
     begin_segment(self, start, nanoseconds(piece.end));
-    GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " bytes of events at %" GST_TIME_FORMAT,
+    GST_LOG_OBJECT(self.element, "%" G_GSIZE_FORMAT " bytes of events at %" GST_TIME_FORMAT,
                    piece.words.size(), GST_TIME_ARGS(start));
-    result = gst_pad_push(priv.src, buffer_of(std::move(piece)));
+    result = gst_pad_push(self.src, buffer_of(std::move(piece)));
   }
   state.pieces.clear();
   return result;
@@ -366,18 +359,17 @@ static GstFlowReturn push_pieces(GstEvtParse* self) {
 
 /* data */
 
-static void note_losses(GstEvtParse* self, const WordScanner::Counts& before, guint64 buffers) {
+static void note_losses(Private& self, const WordScanner::Counts& before, guint64 buffers) {
   constexpr guint64 max_skipped = 1U << 16;
-  auto& priv = *self->priv;
-  const auto& counts = priv.stream->state->scanner->counts();
+  const auto& counts = self.stream->state->scanner->counts();
   if (buffers > 0 || counts.lost_bytes != before.lost_bytes)
-    GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, priv.stream->loss_level.next(), self,
+    GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, self.stream->loss_level.next(), self.element,
                       "lost %" G_GUINT64_FORMAT " buffers, and %" G_GUINT64_FORMAT
                       " bytes with %" G_GUINT64_FORMAT " events",
                       buffers, guint64{counts.lost_bytes - before.lost_bytes},
                       guint64{counts.lost_events - before.lost_events});
   if (counts.lost_bytes > std::max<guint64>(counts.bytes, max_skipped))
-    priv.stream->warn_of_no_words(self,
+    self.stream->warn_of_no_words(self.element,
                                   {GST_STREAM_ERROR_DECODE,
                                    "Most of the camera's data is not valid in this format. Set "
                                    "format, width and height to match the camera."},
@@ -385,38 +377,36 @@ static void note_losses(GstEvtParse* self, const WordScanner::Counts& before, gu
 }
 
 /// Raises the latency to the duration of the longest transfer.
-static void note_transfer(GstEvtParse* self, GstClockTime arrival) {
-  auto& priv = *self->priv;
-  const auto& state = *priv.stream->state;
+static void note_transfer(Private& self, GstClockTime arrival) {
+  const auto& state = *self.stream->state;
   // The first transfer may hold older data from the camera's buffer.
   if (!state.segment.has_begun() || state.pieces.empty() || !GST_CLOCK_TIME_IS_VALID(arrival))
     return;
   const auto first = state.segment.running_time_of(nanoseconds(state.pieces.front().start));
   if (!first) return;
   const auto length = std::clamp<gint64>(static_cast<gint64>(arrival) - *first, 0, GST_SECOND);
-  const auto min_latency = priv.settings.copy().latency;
+  const auto min_latency = self.settings.copy().latency;
   bool has_grown = false;
   {
-    const auto stats = priv.stats.lock();
+    const auto stats = self.stats.lock();
     const auto transfer = static_cast<GstClockTime>(length);
     has_grown = transfer > std::max(min_latency, stats->max_transfer);
     // With a margin, so that the latency rarely changes.
     if (has_grown) stats->max_transfer = transfer + transfer / 8;
   }
   if (!has_grown) return;
-  GST_DEBUG_OBJECT(self, "a transfer takes %" GST_TIME_FORMAT, GST_TIME_ARGS(length));
-  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
+  GST_DEBUG_OBJECT(self.element, "a transfer takes %" GST_TIME_FORMAT, GST_TIME_ARGS(length));
+  post_latency(self.element);
 }
 
-static GstFlowReturn handle_transfer(GstEvtParse* self, GstBuffer* buffer,
+static GstFlowReturn handle_transfer(Private& self, GstBuffer* buffer,
                                      std::span<const guint8> bytes) {
-  auto& priv = *self->priv;
-  auto& state = *priv.stream->state;
+  auto& state = *self.stream->state;
   const auto before = state.scanner->counts();
-  const auto transfer = state.buffers.transfer_of(buffer, bytes, priv.stream->upstream);
+  const auto transfer = state.buffers.transfer_of(buffer, bytes, self.stream->upstream);
   state.scanner->scan(transfer.words, state.pieces);
   if (!state.pieces.empty() && state.pieces.back().end > Chunker::max_time) {
-    GST_ELEMENT_ERROR(self, STREAM, DECODE, ("The clock of the camera has jumped too far."),
+    GST_ELEMENT_ERROR(self.element, STREAM, DECODE, ("The clock of the camera has jumped too far."),
                       ("it is at %" G_GINT64_FORMAT " us", state.pieces.back().end));
     return GST_FLOW_ERROR;
   }
@@ -425,7 +415,7 @@ static GstFlowReturn handle_transfer(GstEvtParse* self, GstBuffer* buffer,
     state.segment.arrive(state.pieces.back().end, transfer.arrival, after_gap);
   }
   {
-    const auto stats = priv.stats.lock();
+    const auto stats = self.stats.lock();
     add(stats->words, before, state.scanner->counts());
     stats->clock_drift = state.segment.drift();
     ++stats->buffers;
@@ -437,27 +427,26 @@ static GstFlowReturn handle_transfer(GstEvtParse* self, GstBuffer* buffer,
 }
 
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
-  auto* self = GST_EVT_PARSE(parent);
+  auto& self = priv_of(parent);
   const OwnedBuffer buffer(received);
-  if (!self->priv->stream->state && !start_stream(self)) return GST_FLOW_ERROR;
-  const MappedBytes bytes(GST_ELEMENT(self), OwnedBuffer(gst_buffer_ref(received)));
+  if (!self.stream->state && !start_stream(self)) return GST_FLOW_ERROR;
+  const MappedBytes bytes(GST_ELEMENT(self.element), OwnedBuffer(gst_buffer_ref(received)));
   if (!bytes.is_mapped()) return GST_FLOW_ERROR;
   return reported(self, [&] { return handle_transfer(self, received, bytes.get()); });
 }
 
 /// Pushes the last words before the stream ends or changes.
-static void end_stream(GstEvtParse* self) {
-  auto& priv = *self->priv;
-  if (!priv.stream->state) return;
+static void end_stream(Private& self) {
+  if (!self.stream->state) return;
   reported(self, [&] {
-    auto& scanner = *priv.stream->state->scanner;
+    auto& scanner = *self.stream->state->scanner;
     const auto before = scanner.counts();
-    scanner.finish(priv.stream->state->pieces);
-    add(priv.stats.lock()->words, before, scanner.counts());
+    scanner.finish(self.stream->state->pieces);
+    add(self.stats.lock()->words, before, scanner.counts());
     note_losses(self, before, 0);
-    if (scanner.counts().events == 0 && priv.stats.copy().buffers > 0)
-      priv.stream->warn_of_no_words(
-          self,
+    if (scanner.counts().events == 0 && self.stats.copy().buffers > 0)
+      self.stream->warn_of_no_words(
+          self.element,
           {GST_STREAM_ERROR_DECODE,
            "No events were found. If the camera sent some, set format, width and height to match "
            "it."},
@@ -467,25 +456,24 @@ static void end_stream(GstEvtParse* self) {
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
-  auto* self = GST_EVT_PARSE(parent);
-  auto& priv = *self->priv;
+  auto& self = priv_of(parent);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_STREAM_START:
       end_stream(self);  // into the stream that ends here
-      priv.stream->state.reset();
+      self.stream->state.reset();
       break;
     case GST_EVENT_CAPS: {
       GstCaps* const caps = caps_of(event);
       end_stream(self);
-      priv.stream->state.reset();
-      priv.stream->input = input_of(caps);
+      self.stream->state.reset();
+      self.stream->input = input_of(caps);
       gst_event_unref(event);
       return start_stream(self);
     }
     case GST_EVENT_SEGMENT:
-      if (!plays_forwards(self, event, "parse")) return FALSE;
-      gst_event_copy_segment(event, &priv.stream->upstream);
-      priv.stream->segment_seqnum = gst_event_get_seqnum(event);
+      if (!plays_forwards(self.element, event, "parse")) return FALSE;
+      gst_event_copy_segment(event, &self.stream->upstream);
+      self.stream->segment_seqnum = gst_event_get_seqnum(event);
       gst_event_unref(event);
       return TRUE;
     case GST_EVENT_GAP:
@@ -495,7 +483,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       end_stream(self);
       break;
     case GST_EVENT_FLUSH_STOP:
-      priv.stream->state.reset();
+      self.stream->state.reset();
       break;
     default:
       break;
@@ -503,23 +491,18 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   return gst_pad_event_default(pad, parent, event);
 }
 
-static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
-  auto& priv = *GST_EVT_PARSE(parent)->priv;
-  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(GST_CAT_DEFAULT, priv.sink, query,
-                          std::max(priv.settings.copy().latency, priv.stats.copy().max_transfer));
-  return gst_pad_query_default(pad, parent, query);
+static GstClockTime latency_of(gpointer element) {
+  return std::max(priv_of(element).settings.copy().latency,
+                  priv_of(element).stats.copy().max_transfer);
 }
 
-/* states */
-
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
-  auto& priv = *GST_EVT_PARSE(element)->priv;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *priv.stats.lock() = {};
+  auto& self = priv_of(element);
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *self.stats.lock() = {};
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_evt_parse_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    priv.stream.reset();
+    self.stream.reset();
   }
   return result;
 }
@@ -527,7 +510,8 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 /* type */
 
 static void gst_evt_parse_init(GstEvtParse* self) {
-  self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));
+  self->priv = new Private(GST_ELEMENT(self), chain, sink_event);
+  answer_latency_queries<latency_of>(self->priv->src);
 }
 
 static GstStructure* structure_of(const Stats& stats) {
@@ -545,7 +529,7 @@ static void gst_evt_parse_class_init(GstEvtParseClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
 
-  Properties<settings_of> properties(object_class);
+  Properties<field_of<&Private::settings>> properties(object_class);
   properties.add_fixed(
       &Settings::format, "format", "Format of the camera's words",
       enum_type<int>(
@@ -566,8 +550,7 @@ static void gst_evt_parse_class_init(GstEvtParseClass* klass) {
       "Minimum latency of live sinks, which rises to the duration of the longest transfer (ns)", 0,
       GST_SECOND);
   install_stats(
-      object_class,
-      [](GObject* object) { return structure_of(GST_EVT_PARSE(object)->priv->stats.copy()); },
+      object_class, [](GObject* object) { return structure_of(priv_of(object).stats.copy()); },
       "Counts since the start: buffers received; bytes and events passed on; lost-buffers, which "
       "the driver dropped; lost-bytes, which are not valid here, and lost-events in them; gaps in "
       "the output. The mapping of the camera's clock: clock-offset (int64, ns), running time minus "

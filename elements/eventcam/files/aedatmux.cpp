@@ -59,8 +59,9 @@ struct Settings {
 using Pad = OwnedAggregatorPad;
 
 struct Private {
-  explicit Private(GstElement* self) : file(self, GST_CAT_DEFAULT) {}
+  explicit Private(GstElement* of) : element(of), file(of, GST_CAT_DEFAULT) {}
 
+  GstElement* const element;
   Guarded<Settings> settings;
   std::atomic<bool> has_header = false;  ///< no pads can be added
   AedatFile file;
@@ -138,9 +139,9 @@ static GstClockTime due_time(GstAggregatorPad* pad, GstBuffer* buffer) {
 
 /// Returns the pad with the earliest next buffer; a buffer without a time comes first, and events
 /// come before a frame of the same time. Null if no pad has a buffer.
-static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
+static Pad earliest_pad(Private& self, GstClockTime* time) {
   Pad earliest;
-  for (Pad& pad : sink_pads(self)) {
+  for (Pad& pad : sink_pads(self.element)) {
     const auto buffer = next_buffer(pad.get());
     if (!buffer) continue;
     const GstClockTime from = due_time(pad.get(), buffer.get());
@@ -155,77 +156,77 @@ static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
 /* output */
 
 /// Pushes `bytes` downstream.
-static GstFlowReturn push_bytes(GstAedatMux* self, AedatFile::Bytes bytes, bool header = false) {
+static GstFlowReturn push_bytes(Private& self, AedatFile::Bytes bytes, bool header = false) {
   if (bytes.empty()) return GST_FLOW_OK;
   GstBuffer* const buffer = owning_buffer(std::move(bytes));
   if (header) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_HEADER);
-  return gst_aggregator_finish_buffer(GST_AGGREGATOR(self), buffer);
+  return gst_aggregator_finish_buffer(GST_AGGREGATOR(self.element), buffer);
 }
 
 /// Sends the caps, with the header as streamheader for late joiners.
-static void send_caps(GstAedatMux* self, const AedatFile::Bytes& header) {
+static void send_caps(Private& self, const AedatFile::Bytes& header) {
   const OwnedBuffer buffer(copied_buffer(std::as_bytes(std::span(header))));
   const OwnedCaps caps = with_stream_header(
       OwnedCaps(gst_caps_new_simple("application/x-aedat", "version", G_TYPE_INT, 4, nullptr)),
       buffer.get());
-  gst_aggregator_set_src_caps(GST_AGGREGATOR(self), caps.get());
+  gst_aggregator_set_src_caps(GST_AGGREGATOR(self.element), caps.get());
 }
 
 /// Positions the next buffer at `position` in the file.
-static void send_segment(GstAedatMux* self, guint64 position) {
+static void send_segment(Private& self, guint64 position) {
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_BYTES);
   segment.start = segment.time = segment.position = position;
-  gst_aggregator_update_segment(GST_AGGREGATOR(self), &segment);
+  gst_aggregator_update_segment(GST_AGGREGATOR(self.element), &segment);
 }
 
 /// Writes the header.
-static GstFlowReturn begin_file(GstAedatMux* self) {
-  self->priv->has_header = true;
+static GstFlowReturn begin_file(Private& self) {
+  self.has_header = true;
   Aedat4Settings settings;
   settings.frames = std::ranges::any_of(
-      sink_pads(self), [](const Pad& pad) { return kind_of(pad.get()) != Kind::events; });
-  settings.table = peer_can_seek(GST_AGGREGATOR_SRC_PAD(self), GST_FORMAT_BYTES);
-  settings.compression = self->priv->settings.copy().compression;
-  auto header = self->priv->file.begin(std::move(settings));
+      sink_pads(self.element), [](const Pad& pad) { return kind_of(pad.get()) != Kind::events; });
+  settings.table = peer_can_seek(GST_AGGREGATOR_SRC_PAD(self.element), GST_FORMAT_BYTES);
+  settings.compression = self.settings.copy().compression;
+  auto header = self.file.begin(std::move(settings));
   send_caps(self, header);
   send_segment(self, 0);
   return push_bytes(self, std::move(header), true);
 }
 
 /// Writes the end of the file, and patches the header.
-static GstFlowReturn end_file(GstAedatMux* self) {
-  auto& file = self->priv->file;
+static GstFlowReturn end_file(Private& self) {
+  auto& file = self.file;
   const GstFlowReturn result = push_bytes(self, file.finish());
   auto patch = file.patch();
-  GST_DEBUG_OBJECT(self, "the file ends%s", patch ? "; completing its header" : "");
+  GST_DEBUG_OBJECT(self.element, "the file ends%s", patch ? "; completing its header" : "");
   if (result != GST_FLOW_OK || !patch) return result;
   send_segment(self, patch->position);
   return push_bytes(self, std::move(patch->bytes));
 }
 
 /// Segment of the events before the next frame, or of those that come first; none without events.
-static std::optional<GstSegment> segment_of_events(GstAedatMux* self) {
-  if (const auto& segment = self->priv->segment) return segment;
-  for (const Pad& pad : sink_pads(self))
+static std::optional<GstSegment> segment_of_events(Private& self) {
+  if (const auto& segment = self.segment) return segment;
+  for (const Pad& pad : sink_pads(self.element))
     if (kind_of(pad.get()) == Kind::events) return segment_of(pad.get());
   return std::nullopt;
 }
 
 /// Time of a frame in the file: the time of events at its running time, or its own PTS if there are
 /// none.
-static Microseconds frame_time(GstAedatMux* self, GstBuffer* frame, GstClockTime running) {
+static Microseconds frame_time(Private& self, GstBuffer* frame, GstClockTime running) {
   GstClockTime time = GST_BUFFER_PTS(frame);
   const auto segment = segment_of_events(self);
   if (segment &&
       gst_segment_position_from_running_time_full(&*segment, GST_FORMAT_TIME, running, &time) < 0)
     time = 0;  // timestamps are not negative
-  return self->priv->file.time_of(time);
+  return self.file.time_of(time);
 }
 
 /// Writes the earliest buffer.
-static GstFlowReturn write_next(GstAedatMux* self) {
-  auto& file = self->priv->file;
+static GstFlowReturn write_next(Private& self) {
+  auto& file = self.file;
   GstClockTime time = 0;
   const Pad pad = earliest_pad(self, &time);
   if (!pad) return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -240,7 +241,7 @@ static GstFlowReturn write_next(GstAedatMux* self) {
   const bool of_events = kind_of(pad.get()) == Kind::events;
   const Microseconds t = of_events ? file.time_of(GST_BUFFER_PTS(buffer.get()))
                                    : frame_time(self, buffer.get(), running);
-  if (of_events) self->priv->segment = segment_of(pad.get());
+  if (of_events) self.segment = segment_of(pad.get());
   return push_bytes(self, file.write(buffer.get(), t, of_events));
 }
 
@@ -250,22 +251,22 @@ static bool is_at_end(const Pad& pad) {
 
 /// True if enough is known to write the header: the caps, and the announcements before the first
 /// buffer.
-static bool is_known(GstAedatMux* self) {
-  const auto& file = self->priv->file;
+static bool is_known(Private& self) {
+  const auto& file = self.file;
   if (file.has_sensor())
-    return std::ranges::all_of(sink_pads(self), [](const Pad& pad) {
+    return std::ranges::all_of(sink_pads(self.element), [](const Pad& pad) {
       return kind_of(pad.get()) != Kind::events || is_at_end(pad) || next_buffer(pad.get());
     });
-  return file.has_video() && std::ranges::all_of(sink_pads(self), [](const Pad& pad) {
+  return file.has_video() && std::ranges::all_of(sink_pads(self.element), [](const Pad& pad) {
            return kind_of(pad.get()) == Kind::video || is_at_end(pad);
          });
 }
 
 /// Forgets the ends of segments that all inputs have reached, and returns one of them. Null if all
 /// have reached EOS.
-static OwnedEvent pop_segment_ends(GstAedatMux* self) {
+static OwnedEvent pop_segment_ends(Private& self) {
   OwnedEvent done;
-  for (const Pad& pad : sink_pads(self)) {
+  for (const Pad& pad : sink_pads(self.element)) {
     auto end = segment_end_of(pad.get());
     if (!end) continue;
     done = std::move(end);
@@ -276,13 +277,13 @@ static OwnedEvent pop_segment_ends(GstAedatMux* self) {
 }
 
 /// Writes the header, the earliest buffer, or the end of a segment or file.
-static GstFlowReturn write_some(GstAedatMux* self) {
-  auto& file = self->priv->file;
-  const bool ended = std::ranges::all_of(sink_pads(self), is_at_end);
+static GstFlowReturn write_some(Private& self) {
+  auto& file = self.file;
+  const bool ended = std::ranges::all_of(sink_pads(self.element), is_at_end);
   if (!file.has_begun()) {
     if (!is_known(self)) {
       if (!ended) return GST_AGGREGATOR_FLOW_NEED_DATA;
-      GST_ELEMENT_ERROR(self, STREAM, MUX,
+      GST_ELEMENT_ERROR(self.element, STREAM, MUX,
                         ("No stream to write. Link events or video to the muxer."),
                         ("no pad had caps before the end of the stream"));
       return GST_FLOW_ERROR;
@@ -293,7 +294,7 @@ static GstFlowReturn write_some(GstAedatMux* self) {
   if (!ended) return write_next(self);
   if (OwnedEvent done = pop_segment_ends(self)) {
     const GstFlowReturn result = push_bytes(self, file.flush());
-    gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self), done.release());
+    gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self.element), done.release());
     return result;
   }
   const GstFlowReturn result = end_file(self);
@@ -302,9 +303,9 @@ static GstFlowReturn write_some(GstAedatMux* self) {
 
 /// Runs `work`; reports any exception.
 template <class Work>
-static GstFlowReturn reported(GstAedatMux* self, const Work& work) {
+static GstFlowReturn reported(Private& self, const Work& work) {
   return catch_exceptions(
-      self,
+      self.element,
       [](const auto& error) {
         return WritableEvents::failure(error, {GST_STREAM_ERROR_MUX, "Cannot write the file."});
       },
@@ -312,17 +313,17 @@ static GstFlowReturn reported(GstAedatMux* self, const Work& work) {
 }
 
 static GstFlowReturn aggregate(GstAggregator* aggregator, gboolean /*timeout*/) {
-  auto* self = GST_AEDAT_MUX(aggregator);
+  auto& self = priv_of(aggregator);
   return reported(self, [&] { return write_some(self); });
 }
 
 /// Live pipelines wait for other pads until the running time of the earliest buffer, once the file
 /// has begun or can begin.
 static GstClockTime get_next_time(GstAggregator* aggregator) {
-  auto* self = GST_AEDAT_MUX(aggregator);
+  auto& self = priv_of(aggregator);
   GstClockTime time = GST_CLOCK_TIME_NONE;
   reported(self, [&] {
-    if (self->priv->file.has_begun() || is_known(self)) earliest_pad(self, &time);
+    if (self.file.has_begun() || is_known(self)) earliest_pad(self, &time);
     return GST_FLOW_OK;
   });
   return time;
@@ -330,20 +331,20 @@ static GstClockTime get_next_time(GstAggregator* aggregator) {
 
 /* events, queries, pads */
 
-static bool handle_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* caps) {
-  auto& file = self->priv->file;
+static bool handle_caps(Private& self, GstAggregatorPad* pad, const GstCaps* caps) {
+  auto& file = self.file;
   const Kind kind = kind_of(caps);
-  auto& latest = kind == Kind::events ? self->priv->events_pad : self->priv->video_pad;
-  for (const Pad& other : sink_pads(self)) {
+  auto& latest = kind == Kind::events ? self.events_pad : self.video_pad;
+  for (const Pad& other : sink_pads(self.element)) {
     if (other.get() == pad || (other.get() != latest && kind_of(other.get()) != kind)) continue;
-    GST_ELEMENT_ERROR(self, STREAM, MUX,
+    GST_ELEMENT_ERROR(self.element, STREAM, MUX,
                       ("Cannot write two streams of %s into one file; link one stream of events "
                        "and one of video.",
                        kind == Kind::events ? "events" : "video"),
                       ("pads %s and %s", GST_PAD_NAME(other.get()), GST_PAD_NAME(pad)));
     return false;
   }
-  for (auto* const of_kind : {&self->priv->events_pad, &self->priv->video_pad})
+  for (auto* const of_kind : {&self.events_pad, &self.video_pad})
     if (*of_kind == pad) *of_kind = nullptr;
   latest = pad;
   if (kind == Kind::video) {
@@ -364,8 +365,8 @@ static GstFlowReturn sink_event_pre_queue(GstAggregator* aggregator, GstAggregat
 }
 
 /// Writes the triggers and IMU samples if too many wait for a buffer.
-static GstFlowReturn write_waiting(GstAedatMux* self) {
-  auto& file = self->priv->file;
+static GstFlowReturn write_waiting(Private& self) {
+  auto& file = self.file;
   if (!file.is_full()) return GST_FLOW_OK;
   if (!file.has_begun())
     if (const GstFlowReturn begun = begin_file(self); begun != GST_FLOW_OK) return begun;
@@ -373,10 +374,10 @@ static GstFlowReturn write_waiting(GstAedatMux* self) {
 }
 
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
-  auto* self = GST_AEDAT_MUX(aggregator);
-  auto& file = self->priv->file;
+  auto& self = priv_of(aggregator);
+  auto& file = self.file;
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT) {
-    if (!plays_forwards(self, event, "write")) return FALSE;
+    if (!plays_forwards(self.element, event, "write")) return FALSE;
     if (kind_of(pad) == Kind::events)
       file.begin_segment(segment_of(event), is_simulated(GST_PAD(pad)));
   }
@@ -424,18 +425,18 @@ static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
 
 static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplate* templ,
                                         const gchar* wanted, const GstCaps* caps) {
-  auto* self = GST_AEDAT_MUX(aggregator);
+  auto& self = priv_of(aggregator);
   const std::string_view kind = GST_PAD_TEMPLATE_NAME_TEMPLATE(templ);
-  if (self->priv->has_header) {
-    GST_WARNING_OBJECT(self, "the header is already written, without a stream for pad %s",
+  if (self.has_header) {
+    GST_WARNING_OBJECT(self.element, "the header is already written, without a stream for pad %s",
                        kind.data());
     return nullptr;
   }
   if (kind == any_pad)
     return PARENT_AGGREGATOR_CLASS->create_new_pad(aggregator, templ, wanted, caps);
   const auto is_of_kind = [&](const Pad& pad) { return GST_PAD_PAD_TEMPLATE(pad.get()) == templ; };
-  if (std::ranges::any_of(sink_pads(self), is_of_kind)) {
-    GST_WARNING_OBJECT(self, "pad %s already exists", kind.data());
+  if (std::ranges::any_of(sink_pads(self.element), is_of_kind)) {
+    GST_WARNING_OBJECT(self.element, "pad %s already exists", kind.data());
     return nullptr;
   }
   const auto first = std::string(kind.substr(0, kind.find('%'))) + '0';
@@ -450,31 +451,27 @@ static gboolean start(GstAggregator* aggregator) {
 }
 
 static gboolean stop(GstAggregator* aggregator) {
-  auto* priv = GST_AEDAT_MUX(aggregator)->priv;
-  priv->file.reset();
-  priv->segment.reset();
-  priv->events_pad = nullptr;
-  priv->video_pad = nullptr;
-  priv->has_header = false;
+  auto& self = priv_of(aggregator);
+  self.file.reset();
+  self.segment.reset();
+  self.events_pad = nullptr;
+  self.video_pad = nullptr;
+  self.has_header = false;
   pop_segment_ends(GST_AEDAT_MUX(aggregator));
   return TRUE;
 }
 
 /// After a flush, filesink has truncated the file, so start with a new header.
 static GstFlowReturn flush(GstAggregator* aggregator) {
-  auto* priv = GST_AEDAT_MUX(aggregator)->priv;
+  auto& self = priv_of(aggregator);
   GST_DEBUG_OBJECT(aggregator, "flushed: beginning a new file");
-  priv->has_header = false;
-  priv->file.start_over();
-  priv->segment.reset();
+  self.has_header = false;
+  self.file.start_over();
+  self.segment.reset();
   return GST_FLOW_OK;
 }
 
 /* type */
-
-static Guarded<Settings>& settings_of(GObject* object) {
-  return GST_AEDAT_MUX(object)->priv->settings;
-}
 
 static void gst_aedat_mux_init(GstAedatMux* self) {
   self->priv = new Private(GST_ELEMENT(self));
@@ -483,7 +480,7 @@ static void gst_aedat_mux_init(GstAedatMux* self) {
 static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  Properties<settings_of> properties(object_class);
+  Properties<field_of<&Private::settings>> properties(object_class);
   properties.add_fixed(
       &Settings::compression, "compression", "Compression of the file",
       enum_type<Aedat4Compression>(
@@ -494,7 +491,7 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
            {Aedat4Compression::zstd, "Zstandard", "zstd"},
            {Aedat4Compression::zstd_high, "Zstandard, the smallest", "zstd-high"}}));
   install_stats(
-      object_class, [](GObject* object) { return GST_AEDAT_MUX(object)->priv->file.stats(); },
+      object_class, [](GObject* object) { return priv_of(object).file.stats(); },
       WritableEvents::stats_blurb);
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);

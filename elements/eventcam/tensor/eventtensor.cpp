@@ -111,13 +111,11 @@ struct Stream {
   WarnOnce warn_of_pause{GST_CAT_DEFAULT};
 };
 
-struct Private {
-  explicit Private(const std::pair<GstPad*, GstPad*>& pads) : sink(pads.first), src(pads.second) {}
+struct Private : ElementPads {
+  using ElementPads::ElementPads;
 
   Guarded<TensorProperties> settings;
   Guarded<GstClockTime> latency;
-  GstPad* const sink;
-  GstPad* const src;
   StreamLocked<Stream> stream{sink};
 };
 
@@ -125,10 +123,6 @@ struct Private {
 
 DEFINE_EVENT_ELEMENT(GstEventTensor, gst_event_tensor, EVENT_TENSOR, GstElement, GST_TYPE_ELEMENT,
                      eventtensor, GST_RANK_NONE, "windows of events as tensors")
-
-static Guarded<TensorProperties>& settings_of(GObject* object) {
-  return GST_EVENT_TENSOR(object)->priv->settings;
-}
 
 static const Report no_memory{
     GST_RESOURCE_ERROR_NO_SPACE_LEFT,
@@ -144,11 +138,10 @@ static GstClockTime max_pause_of(const State& state) {
 
 /* tensors */
 
-static GstFlowReturn push_tensor(GstEventTensor* self, const WindowQueue::Window& window) {
-  auto& priv = *self->priv;
-  auto& tensor = priv.stream->state->tensor;
+static GstFlowReturn push_tensor(Private& self, const WindowQueue::Window& window) {
+  auto& tensor = self.stream->state->tensor;
   OwnedBuffer buffer;
-  const GstFlowReturn result = priv.stream->buffers.acquire(tensor.bytes(), buffer);
+  const GstFlowReturn result = self.stream->buffers.acquire(tensor.bytes(), buffer);
   if (result != GST_FLOW_OK) return result;
   GstBuffer* const acquired = buffer.get();
   tensor.write(window.events, window.end / static_cast<Nanoseconds>(GST_USECOND),
@@ -157,63 +150,62 @@ static GstFlowReturn push_tensor(GstEventTensor* self, const WindowQueue::Window
   GST_BUFFER_DTS(acquired) = GST_CLOCK_TIME_NONE;
   GST_BUFFER_DURATION(acquired) = static_cast<GstClockTime>(window.end - window.start);
   GST_BUFFER_FLAG_UNSET(acquired, GST_BUFFER_FLAG_DISCONT);
-  if (std::exchange(priv.stream->discontinuous, false))
+  if (std::exchange(self.stream->discontinuous, false))
     GST_BUFFER_FLAG_SET(acquired, GST_BUFFER_FLAG_DISCONT);
-  add_tensor_meta(acquired, tensor.shape(), priv.stream->state->format.tensors);
-  GST_LOG_OBJECT(
-      self, "tensor of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
-      window.events.size(), GST_TIME_ARGS(static_cast<GstClockTime>(window.start)),
-      GST_TIME_ARGS(static_cast<GstClockTime>(window.end)));
-  return gst_pad_push(priv.src, buffer.release());
+  add_tensor_meta(acquired, tensor.shape(), self.stream->state->format.tensors);
+  GST_LOG_OBJECT(self.element,
+                 "tensor of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT
+                 " to %" GST_TIME_FORMAT,
+                 window.events.size(), GST_TIME_ARGS(static_cast<GstClockTime>(window.start)),
+                 GST_TIME_ARGS(static_cast<GstClockTime>(window.end)));
+  return gst_pad_push(self.src, buffer.release());
 }
 
 /// Ends the current windows: pushes the last tensor and forgets all events.
-static GstFlowReturn drain(GstEventTensor* self) {
-  auto& priv = *self->priv;
-  if (!priv.stream->state) return GST_FLOW_OK;
-  const GstFlowReturn result = catch_exceptions(self, no_memory, [&] {
-    const auto window = priv.stream->state->windows.finish();
+static GstFlowReturn drain(Private& self) {
+  if (!self.stream->state) return GST_FLOW_OK;
+  const GstFlowReturn result = catch_exceptions(self.element, no_memory, [&] {
+    const auto window = self.stream->state->windows.finish();
     return window ? push_tensor(self, *window) : GST_FLOW_OK;
   });
-  priv.stream->state->start_over();
-  priv.stream->discontinuous = true;
+  self.stream->state->start_over();
+  self.stream->discontinuous = true;
   return result;
 }
 
 /// Ends the current windows if an interval is too far from the last one.
-static GstFlowReturn drain_before_jump(GstEventTensor* self, const EventInterval& interval) {
-  const auto last = self->priv->stream->state->windows.reached();
+static GstFlowReturn drain_before_jump(Private& self, const EventInterval& interval) {
+  const auto last = self.stream->state->windows.reached();
   if (!last) return GST_FLOW_OK;
   const auto reached = static_cast<GstClockTime>(*last);
   const bool returns = interval.start + event_resolution < reached;
-  const bool leaps = interval.start > reached + max_pause_of(*self->priv->stream->state);
+  const bool leaps = interval.start > reached + max_pause_of(*self.stream->state);
   if (!returns && !leaps) return GST_FLOW_OK;
-  GST_DEBUG_OBJECT(self, "starting over: time %s from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
-                   returns ? "goes back" : "leaps", GST_TIME_ARGS(reached),
-                   GST_TIME_ARGS(interval.start));
+  GST_DEBUG_OBJECT(
+      self.element, "starting over: time %s from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
+      returns ? "goes back" : "leaps", GST_TIME_ARGS(reached), GST_TIME_ARGS(interval.start));
   return drain(self);
 }
 
 /// Adds an interval, and pushes the tensors of the windows that it completes.
-static GstFlowReturn add(GstEventTensor* self, std::span<const Event> events, Microseconds base,
+static GstFlowReturn add(Private& self, std::span<const Event> events, Microseconds base,
                          const EventInterval& interval, GstBuffer* buffer) {
-  auto& priv = *self->priv;
-  const GstClockTime start = std::max(interval.start, priv.stream->segment.start);
+  const GstClockTime start = std::max(interval.start, self.stream->segment.start);
   if (interval.end < start || (interval.end == start && interval.start < start)) return GST_FLOW_OK;
   const GstFlowReturn result = drain_before_jump(self, {start, interval.end});
   if (result != GST_FLOW_OK) return result;
   do {
-    const auto added = priv.stream->state->windows.add(
+    const auto added = self.stream->state->windows.add(
         events, base, static_cast<Nanoseconds>(start), static_cast<Nanoseconds>(interval.end));
-    priv.stream->faults.warn(self, added.invalid, buffer);
+    self.stream->faults.warn(self.element, added.invalid, buffer);
     if (added.excess > 0)
-      priv.stream->warn_of_excess(
-          self,
+      self.stream->warn_of_excess(
+          self.element,
           {GST_STREAM_ERROR_FAILED, "Cannot use all events: there are more than " +
                                         std::to_string(WindowQueue::max_events) +
                                         " in a window; skipping the rest. Shorten the windows."},
           std::to_string(added.excess) + " events skipped");
-    while (const auto window = priv.stream->state->windows.next()) {
+    while (const auto window = self.stream->state->windows.next()) {
       const GstFlowReturn pushed = push_tensor(self, *window);
       if (pushed != GST_FLOW_OK) return pushed;
     }
@@ -225,44 +217,43 @@ static GstFlowReturn add(GstEventTensor* self, std::span<const Event> events, Mi
 /* data */
 
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
-  auto* self = GST_EVENT_TENSOR(parent);
-  auto& priv = *self->priv;
+  auto& self = priv_of(parent);
   const OwnedBuffer buffer(received);
-  if (!priv.stream->state) return GST_FLOW_NOT_NEGOTIATED;
-  priv.stream->discontinuous |= GST_BUFFER_IS_DISCONT(received);
-  const auto gap_result = std::exchange(priv.stream->gap_result, GST_FLOW_OK);
+  if (!self.stream->state) return GST_FLOW_NOT_NEGOTIATED;
+  self.stream->discontinuous |= GST_BUFFER_IS_DISCONT(received);
+  const auto gap_result = std::exchange(self.stream->gap_result, GST_FLOW_OK);
   if (gap_result != GST_FLOW_OK) return gap_result;
   const MappedEvents mapped(received);
   if (!mapped || mapped.interval().end > max_tensor_time) {
-    priv.stream->faults.warn(self, event_fault(received), received);
+    self.stream->faults.warn(self.element, event_fault(received), received);
     return GST_FLOW_OK;
   }
-  GST_LOG_OBJECT(priv.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+  GST_LOG_OBJECT(self.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                  mapped.events().size(), GST_TIME_ARGS(mapped.interval().start));
-  return catch_exceptions(self, no_memory, [&] {
+  return catch_exceptions(self.element, no_memory, [&] {
     return add(self, mapped.events(), mapped.start(), mapped.interval(), received);
   });
 }
 
 /// Returns true if the gap is not forwarded, because tensors cover it. The next buffer returns a
 /// failure to push them.
-static bool handle_gap(GstEventTensor* self, GstEvent* event) {
-  auto& priv = *self->priv;
+static bool handle_gap(Private& self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
-  if (!priv.stream->state) return false;
-  if (priv.stream->state->format.windows.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
+  if (!self.stream->state) return false;
+  if (self.stream->state->format.windows.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
       start > max_tensor_time || duration > max_tensor_time - start)
-    return priv.stream->state->windows.is_open();
-  if (duration > max_pause_of(*priv.stream->state)) {
-    priv.stream->warn_of_pause(
-        self, {GST_STREAM_ERROR_FAILED, "The events pause; skipping the tensors of long pauses."},
+    return self.stream->state->windows.is_open();
+  if (duration > max_pause_of(*self.stream->state)) {
+    self.stream->warn_of_pause(
+        self.element,
+        {GST_STREAM_ERROR_FAILED, "The events pause; skipping the tensors of long pauses."},
         "pause of " + std::to_string(duration / GST_SECOND) + " s");
     // Ends the current window; the next events start over.
-    duration = static_cast<GstClockTime>(priv.stream->state->format.windows.duration);
+    duration = static_cast<GstClockTime>(self.stream->state->format.windows.duration);
   }
-  priv.stream->gap_result = catch_exceptions(self, no_memory, [&] {
+  self.stream->gap_result = catch_exceptions(self.element, no_memory, [&] {
     return add(self, {}, 0, {start, start + duration}, nullptr);
   });
   return true;
@@ -271,12 +262,12 @@ static bool handle_gap(GstEventTensor* self, GstEvent* event) {
 /* negotiation */
 
 /// Returns true if downstream accepts the caps; otherwise posts an error message.
-static bool post_unless_accepted(GstEventTensor* self, GstCaps* caps) {
-  const OwnedCaps wanted(gst_pad_peer_query_caps(self->priv->src, nullptr));
+static bool post_unless_accepted(Private& self, GstCaps* caps) {
+  const OwnedCaps wanted(gst_pad_peer_query_caps(self.src, nullptr));
   if (gst_caps_can_intersect(wanted.get(), caps)) return true;
   gchar* const cause = gst_info_strdup_printf(
       "downstream accepts %" GST_PTR_FORMAT ", not %" GST_PTR_FORMAT, wanted.get(), caps);
-  post_message(self, GST_MESSAGE_ERROR,
+  post_message(self.element, GST_MESSAGE_ERROR,
                {GST_STREAM_ERROR_FORMAT, "Downstream does not accept these tensors" +
                                              mismatch_text(wanted.get(), caps) + "."},
                cause);
@@ -285,13 +276,12 @@ static bool post_unless_accepted(GstEventTensor* self, GstCaps* caps) {
 }
 
 /// Starts over for a sensor.
-static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
-  auto& priv = *self->priv;
-  priv.stream->state.reset();
-  const TensorFormat format(info, priv.settings.copy());
+static bool make_state(Private& self, const GstEventCameraInfo& info) {
+  self.stream->state.reset();
+  const TensorFormat format(info, self.settings.copy());
   const auto bytes = EventTensor::memory(format.shape(), format.tensors);
   if (bytes > max_tensor_bytes) {
-    post_message(self, GST_MESSAGE_ERROR,
+    post_message(self.element, GST_MESSAGE_ERROR,
                  {GST_STREAM_ERROR_FORMAT,
                   "Cannot make tensors that take more than 1 GiB; lower bins or the resolution."},
                  in_pixels({info.width, info.height}) + " and " +
@@ -299,35 +289,35 @@ static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
                      " bytes");
     return false;
   }
-  priv.stream->state.emplace(format);
+  self.stream->state.emplace(format);
   return true;
 }
 
-static gboolean handle_caps(GstEventTensor* self, GstEvent* event) {
-  auto& priv = *self->priv;
+static gboolean handle_caps(Private& self, GstEvent* event) {
   GstCaps* const caps = caps_of(event);
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
-  if (priv.stream->state && priv.stream->state->format.sensor.width == info.width &&
-      priv.stream->state->format.sensor.height == info.height) {
-    priv.stream->state->format.sensor = info;
+  if (self.stream->state && self.stream->state->format.sensor.width == info.width &&
+      self.stream->state->format.sensor.height == info.height) {
+    self.stream->state->format.sensor = info;
   } else {
     drain(self);
-    if (!catch_exceptions(self, no_memory, [&] { return make_state(self, info); })) return FALSE;
+    if (!catch_exceptions(self.element, no_memory, [&] { return make_state(self, info); }))
+      return FALSE;
   }
-  *priv.latency.lock() = priv.stream->state->format.latency();
-  const OwnedCaps out = priv.stream->state->format.caps();
-  GST_DEBUG_OBJECT(self, "events of %dx%d pixels become %" GST_PTR_FORMAT, info.width, info.height,
-                   out.get());
+  *self.latency.lock() = self.stream->state->format.latency();
+  const OwnedCaps out = self.stream->state->format.caps();
+  GST_DEBUG_OBJECT(self.element, "events of %dx%d pixels become %" GST_PTR_FORMAT, info.width,
+                   info.height, out.get());
   if (!post_unless_accepted(self, out.get())) return FALSE;
-  const gboolean handled = gst_pad_push_event(priv.src, gst_event_new_caps(out.get()));
-  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
+  const gboolean handled = gst_pad_push_event(self.src, gst_event_new_caps(out.get()));
+  gst_element_post_message(GST_ELEMENT(self.element),
+                           gst_message_new_latency(GST_OBJECT(self.element)));
   return handled;
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
-  auto* self = GST_EVENT_TENSOR(parent);
-  auto& priv = *self->priv;
+  auto& self = priv_of(parent);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CAPS: {
       const gboolean handled = handle_caps(self, event);
@@ -337,23 +327,23 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
     case GST_EVENT_GAP:
       if (handle_gap(self, event)) {
         gst_event_unref(event);
-        return priv.stream->gap_result == GST_FLOW_OK ? TRUE : FALSE;
+        return self.stream->gap_result == GST_FLOW_OK ? TRUE : FALSE;
       }
       break;
     case GST_EVENT_SEGMENT:
-      if (!plays_events(self, event, "make tensors of")) return FALSE;
-      if (!continues(priv.stream->segment, segment_of(event))) drain(self);
-      priv.stream->segment = segment_of(event);
+      if (!plays_events(self.element, event, "make tensors of")) return FALSE;
+      if (!continues(self.stream->segment, segment_of(event))) drain(self);
+      self.stream->segment = segment_of(event);
       break;
     case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_EOS:
       drain(self);
       break;
     case GST_EVENT_FLUSH_STOP:
-      gst_segment_init(&priv.stream->segment, GST_FORMAT_UNDEFINED);
-      priv.stream->gap_result = GST_FLOW_OK;
-      if (priv.stream->state) priv.stream->state->start_over();
-      priv.stream->discontinuous = true;
+      gst_segment_init(&self.stream->segment, GST_FORMAT_UNDEFINED);
+      self.stream->gap_result = GST_FLOW_OK;
+      if (self.stream->state) self.stream->state->start_over();
+      self.stream->discontinuous = true;
       break;
     default:
       break;
@@ -361,22 +351,15 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   return gst_pad_event_default(pad, parent, event);
 }
 
-static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
-  auto& priv = *GST_EVENT_TENSOR(parent)->priv;
-  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(GST_CAT_DEFAULT, priv.sink, query, priv.latency.copy());
-  return gst_pad_query_default(pad, parent, query);
-}
-
 /* states */
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
-  auto& priv = *GST_EVENT_TENSOR(element)->priv;
+  auto& self = priv_of(element);
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_tensor_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    priv.stream.reset();
-    *priv.latency.lock() = 0;
+    self.stream.reset();
+    *self.latency.lock() = 0;
   }
   return result;
 }
@@ -384,13 +367,15 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 /* type */
 
 static void gst_event_tensor_init(GstEventTensor* self) {
-  self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));
+  self->priv = new Private(GST_ELEMENT(self), chain, sink_event);
+  answer_latency_queries<[](gpointer element) { return priv_of(element).latency.copy(); }>(
+      self->priv->src);
 }
 
 static void gst_event_tensor_class_init(GstEventTensorClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  Properties<settings_of> properties(object_class);
+  Properties<field_of<&Private::settings>> properties(object_class);
   constexpr guint max_frame_count = 10'000;
   properties.add_fixed(
       &TensorProperties::representation, "representation", "Content of a tensor",
