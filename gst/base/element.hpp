@@ -283,6 +283,15 @@ inline void install_property(GObjectClass* klass, PropertyAccess functions, GPar
   g_object_class_install_property(klass, number, spec);
 }
 
+/// Returns a structure of unsigned numbers, for the property "stats".
+inline GstStructure* new_counters(const char* name,
+                                  std::initializer_list<std::pair<const char*, guint64>> counters) {
+  GstStructure* const structure = gst_structure_new_empty(name);
+  for (const auto& [field, count] : counters)
+    gst_structure_set(structure, field, G_TYPE_UINT64, count, nullptr);
+  return structure;
+}
+
 /// For class_init: installs the read-only property "stats". `make` returns a new structure.
 inline void install_stats(GObjectClass* klass, const std::function<GstStructure*(GObject*)>& make,
                           const char* blurb) {

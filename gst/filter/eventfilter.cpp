@@ -235,9 +235,9 @@ static gboolean stop(GstBaseTransform* transform) {
 
 static GstStructure* stats_of(GObject* object) {
   const Counters counters = priv_of(object).counters.copy();
-  return gst_structure_new("application/x-event-filter-stats", "events", G_TYPE_UINT64,
-                           counters.received, "dropped-events", G_TYPE_UINT64, counters.dropped,
-                           "rejected-events", G_TYPE_UINT64, counters.rejected, nullptr);
+  return new_counters("application/x-event-filter-stats", {{"events", counters.received},
+                                                           {"dropped-events", counters.dropped},
+                                                           {"rejected-events", counters.rejected}});
 }
 
 static void finalize(GObject* object) {

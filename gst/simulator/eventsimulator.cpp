@@ -336,10 +336,11 @@ static void get_qos(GObject* object, GValue* value) {
 
 static GstStructure* stats_of(GObject* object) {
   const auto stats = simulation_of(object).stats.copy();
-  return gst_structure_new("application/x-event-simulator-stats", "frames", G_TYPE_UINT64,
-                           stats.frames, "skipped-frames", G_TYPE_UINT64, stats.skipped_frames,
-                           "repeated-frames", G_TYPE_UINT64, stats.repeated_frames,
-                           "processing-time", G_TYPE_UINT64, stats.processing_time, nullptr);
+  return new_counters("application/x-event-simulator-stats",
+                      {{"frames", stats.frames},
+                       {"skipped-frames", stats.skipped_frames},
+                       {"repeated-frames", stats.repeated_frames},
+                       {"processing-time", stats.processing_time}});
 }
 
 static void install_base_properties(GObjectClass* klass) {

@@ -140,7 +140,7 @@ void Simulation::update_latency(GstClockTime before) {
   interval_ = static_cast<GstClockTime>(stream_.interval.value());
   if (latency() == before) return;
   GST_DEBUG_OBJECT(element_, "latency is now %" GST_TIME_FORMAT, GST_TIME_ARGS(latency()));
-  gst_element_post_message(GST_ELEMENT(element_), gst_message_new_latency(GST_OBJECT(element_)));
+  post_latency(element_);
 }
 
 bool Simulation::is_live() {

@@ -55,8 +55,8 @@
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/element.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/evt_caps.hpp"
 #include "src/formats/chunker.hpp"
 #include "src/formats/evt/word_scanner.hpp"
@@ -143,50 +143,6 @@ class CameraBuffers {
   guint64 last_offset_ = GST_BUFFER_OFFSET_NONE;
 };
 
-/// Segments of a camera's stream: they map the camera's clock to running time, as its transfers
-/// arrive.
-class CameraSegment {
- public:
-  /// Records the arrival of data up to the time `sent`. After a gap, the camera's clock may have
-  /// been reset.
-  void arrive(Microseconds sent, GstClockTime arrival, bool after_gap) {
-    is_due_ |= clock_.arrive(sent, static_cast<Nanoseconds>(arrival), after_gap);
-  }
-
-  /// Pushes a segment from `start` before data of these times, unless the last segment is still
-  /// valid. Returns the running time of `start` if it did. Data before running time 0, as in a
-  /// first transfer, is late: the next data corrects the mapping.
-  std::optional<GstClockTime> begin(GstPad* src, guint32 seqnum, GstClockTime start,
-                                    GstClockTime end) {
-    std::optional<GstClockTime> mapped;
-    if (is_due_ || !segment_.continues(start, GST_CLOCK_TIME_NONE)) {
-      const auto running = running_time_of(start);
-      is_due_ = running && *running < 0;
-      mapped = segment_.begin(src, seqnum, start,
-                              running ? static_cast<GstClockTime>(std::max(*running, Nanoseconds{}))
-                                      : GST_CLOCK_TIME_NONE,
-                              start);
-    }
-    segment_.extend_to(end);
-    return mapped;
-  }
-
-  bool has_begun() const { return segment_.has_begun(); }
-  /// Running time of a camera time; none before the first transfer.
-  std::optional<Nanoseconds> running_time_of(GstClockTime time) const {
-    const auto offset = clock_.offset();
-    return offset ? std::optional(static_cast<Nanoseconds>(time) + *offset) : std::nullopt;
-  }
-
-  /// Parts per million by which the camera's clock is slow.
-  double drift() const { return clock_.drift(); }
-
- private:
-  ArrivalClock clock_;
-  ArrivalSegment segment_{0};
-  bool is_due_ = false;  ///< a segment that corrects the mapping
-};
-
 constexpr int max_words_side = 2048;
 
 /// Value of `format`: as in the caps.
@@ -231,7 +187,15 @@ struct State {
   CameraBuffers buffers;
   std::unique_ptr<WordScanner> scanner;
   std::vector<WordScanner::Piece> pieces{};
-  CameraSegment segment{};  ///< of the output
+  ArrivalClock clock{};         ///< maps the camera's clock to running time
+  ArrivalSegment segment{0};    ///< of the output
+  bool is_segment_due = false;  ///< to correct the mapping
+
+  /// Running time of a camera time; none before the first transfer.
+  std::optional<Nanoseconds> running_time_of(GstClockTime time) const {
+    const auto offset = clock.offset();
+    return offset ? std::optional(static_cast<Nanoseconds>(time) + *offset) : std::nullopt;
+  }
 };
 
 /// State from start to stop.
@@ -261,19 +225,15 @@ DEFINE_EVENT_ELEMENT(GstEvtParse, gst_evt_parse, EVT_PARSE, GstElement, GST_TYPE
 
 /* negotiation */
 
-static std::optional<EvtFormat> format_named(const char* name) {
-  const auto format = words_of_fourcc(name != nullptr ? name : "");
-  return format ? format : evt_format_named(name);
-}
-
 static Input input_of(const GstCaps* caps) {
   const GstStructure* const structure = gst_caps_get_structure(caps, 0);
   const char* const format = gst_structure_get_string(structure, "format");
-  Input input;
   if (gst_structure_has_name(structure, "video/x-raw") && g_strcmp0(format, "GRAY8") == 0)
     return {.format = {}, .sensor = {}, .framing = Framing::padded};
-  input.format = format_named(format);
-  if (input.format && evt_format_named(format) == std::nullopt) input.framing = Framing::padded;
+  const auto of_driver = words_of_fourcc(format != nullptr ? format : "");
+  Input input{.format = of_driver ? of_driver : evt_format_named(format),
+              .sensor = {},
+              .framing = of_driver ? Framing::padded : Framing::loose};
   gst_structure_get_int(structure, "width", &input.sensor.width);
   gst_structure_get_int(structure, "height", &input.sensor.height);
   return input;
@@ -319,26 +279,27 @@ static bool start_stream(Private& self) {
 
 /* output */
 
-/// Pushes a segment before data of these times, if they need one.
-static void begin_segment(Private& self, GstClockTime start, GstClockTime end) {
-  auto& segment = self.stream->state->segment;
-  const bool is_correction = segment.has_begun();
-  const auto mapped = segment.begin(self.src, self.stream->segment_seqnum, start, end);
-  if (!mapped) return;
-  GST_DEBUG_OBJECT(self.element,
-                   "the camera's %" GST_TIME_FORMAT " is running time %" GST_TIME_FORMAT,
-                   GST_TIME_ARGS(start), GST_TIME_ARGS(*mapped));
-  const auto stats = self.stats.lock();
-  stats->clock_offset = GST_CLOCK_DIFF(start, *mapped);
-  stats->clock_corrections += is_correction ? 1 : 0;
-}
-
-static GstBuffer* buffer_of(WordScanner::Piece&& piece) {
-  GstBuffer* const buffer = owning_buffer(std::move(piece.words));
-  GST_BUFFER_PTS(buffer) = nanoseconds(piece.start);
-  GST_BUFFER_DURATION(buffer) = nanoseconds(piece.end - piece.start);
-  if (piece.is_discontinuous) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
-  return buffer;
+/// Pushes a segment before data of an interval, unless the last segment is still valid. Data before
+/// running time 0, as in a first transfer, is late: the next data corrects the mapping.
+static void begin_segment(Private& self, const EventInterval& interval) {
+  auto& state = *self.stream->state;
+  if (state.is_segment_due || !state.segment.continues(interval.start, GST_CLOCK_TIME_NONE)) {
+    const bool is_correction = state.segment.has_begun();
+    const auto running = state.running_time_of(interval.start);
+    state.is_segment_due = running && *running < 0;
+    const auto mapped =
+        state.segment.begin(self.src, self.stream->segment_seqnum, interval.start,
+                            running ? static_cast<GstClockTime>(std::max(*running, Nanoseconds{}))
+                                    : GST_CLOCK_TIME_NONE,
+                            interval.start);
+    GST_DEBUG_OBJECT(self.element,
+                     "the camera's %" GST_TIME_FORMAT " is running time %" GST_TIME_FORMAT,
+                     GST_TIME_ARGS(interval.start), GST_TIME_ARGS(mapped));
+    const auto stats = self.stats.lock();
+    stats->clock_offset = GST_CLOCK_DIFF(interval.start, mapped);
+    stats->clock_corrections += is_correction ? 1 : 0;
+  }
+  state.segment.extend_to(interval.end);
 }
 
 /// Pushes the pieces of a transfer.
@@ -347,17 +308,17 @@ static GstFlowReturn push_pieces(Private& self) {
   GstFlowReturn result = GST_FLOW_OK;
   for (auto& piece : state.pieces) {
     if (result != GST_FLOW_OK) break;
-    const auto start = nanoseconds(piece.start);
-    begin_segment(self, start, nanoseconds(piece.end));
+    const EventInterval interval{nanoseconds(piece.start), nanoseconds(piece.end)};
+    begin_segment(self, interval);
     GST_LOG_OBJECT(self.element, "%" G_GSIZE_FORMAT " bytes of events at %" GST_TIME_FORMAT,
-                   piece.words.size(), GST_TIME_ARGS(start));
-    result = gst_pad_push(self.src, buffer_of(std::move(piece)));
+                   piece.words.size(), GST_TIME_ARGS(interval.start));
+    GstBuffer* const buffer = owning_buffer(std::move(piece.words));
+    stamp(buffer, interval, piece.is_discontinuous);
+    result = gst_pad_push(self.src, buffer);
   }
   state.pieces.clear();
   return result;
 }
-
-/* data */
 
 static void note_losses(Private& self, const WordScanner::Counts& before, guint64 buffers) {
   constexpr guint64 max_skipped = 1U << 16;
@@ -382,7 +343,7 @@ static void note_transfer(Private& self, GstClockTime arrival) {
   // The first transfer may hold older data from the camera's buffer.
   if (!state.segment.has_begun() || state.pieces.empty() || !GST_CLOCK_TIME_IS_VALID(arrival))
     return;
-  const auto first = state.segment.running_time_of(nanoseconds(state.pieces.front().start));
+  const auto first = state.running_time_of(nanoseconds(state.pieces.front().start));
   if (!first) return;
   const auto length = std::clamp<gint64>(static_cast<gint64>(arrival) - *first, 0, GST_SECOND);
   const auto min_latency = self.settings.copy().latency;
@@ -411,13 +372,15 @@ static GstFlowReturn handle_transfer(Private& self, GstBuffer* buffer,
     return GST_FLOW_ERROR;
   }
   if (!state.pieces.empty() && GST_CLOCK_TIME_IS_VALID(transfer.arrival)) {
+    // After a gap, the camera's clock may have been reset.
     const bool after_gap = std::ranges::any_of(state.pieces, &WordScanner::Piece::is_discontinuous);
-    state.segment.arrive(state.pieces.back().end, transfer.arrival, after_gap);
+    state.is_segment_due |= state.clock.arrive(
+        state.pieces.back().end, static_cast<Nanoseconds>(transfer.arrival), after_gap);
   }
   {
     const auto stats = self.stats.lock();
     add(stats->words, before, state.scanner->counts());
-    stats->clock_drift = state.segment.drift();
+    stats->clock_drift = state.clock.drift();
     ++stats->buffers;
     stats->lost_buffers += transfer.lost;
   }
@@ -430,7 +393,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   auto& self = priv_of(parent);
   const OwnedBuffer buffer(received);
   if (!self.stream->state && !start_stream(self)) return GST_FLOW_ERROR;
-  const MappedBytes bytes(GST_ELEMENT(self.element), OwnedBuffer(gst_buffer_ref(received)));
+  const MappedBytes bytes(self.element, OwnedBuffer(gst_buffer_ref(received)));
   if (!bytes.is_mapped()) return GST_FLOW_ERROR;
   return reported(self, [&] { return handle_transfer(self, received, bytes.get()); });
 }
@@ -462,14 +425,12 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       end_stream(self);  // into the stream that ends here
       self.stream->state.reset();
       break;
-    case GST_EVENT_CAPS: {
-      GstCaps* const caps = caps_of(event);
+    case GST_EVENT_CAPS:
       end_stream(self);
       self.stream->state.reset();
-      self.stream->input = input_of(caps);
+      self.stream->input = input_of(caps_of(event));
       gst_event_unref(event);
       return start_stream(self);
-    }
     case GST_EVENT_SEGMENT:
       if (!plays_forwards(self.element, event, "parse")) return FALSE;
       gst_event_copy_segment(event, &self.stream->upstream);
@@ -501,9 +462,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *self.stats.lock() = {};
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_evt_parse_parent_class)->change_state(element, transition);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    self.stream.reset();
-  }
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) self.stream.reset();
   return result;
 }
 

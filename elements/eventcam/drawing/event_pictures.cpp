@@ -33,9 +33,8 @@ bool EventPictures::add_events(const MappedEvents& mapped, const EventInterval& 
   if (*processed_ == 0)
     GST_LOG_OBJECT(main_pad(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, rest.size(),
                    GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
-  const auto due = end && *end < interval.end
-                       ? events_until(rest, mapped.start(), microseconds(*end))
-                       : rest;
+  const auto due =
+      end && *end < interval.end ? events_until(rest, mapped.start(), microseconds(*end)) : rest;
   *processed_ += due.size();
   state_->renderer.configure(render_settings());
   warn(state_->renderer.add(due, mapped.start(), length_of(interval)), buffer);

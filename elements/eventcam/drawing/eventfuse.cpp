@@ -233,8 +233,7 @@ class EventFuse final : public FramesWithEvents {
     if (!buffer) throw std::bad_alloc();
     {
       const VideoFrame picture(output_, buffer.get(), GST_MAP_WRITE);
-      filter_->draw(microseconds(running(interval.start)), picture.data(),
-                    picture.stride());
+      filter_->draw(microseconds(running(interval.start)), picture.data(), picture.stride());
     }
     GST_BUFFER_PTS(buffer.get()) = interval.start;
     GST_BUFFER_DURATION(buffer.get()) = interval.end - interval.start;

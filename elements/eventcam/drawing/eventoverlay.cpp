@@ -169,9 +169,8 @@ class EventOverlay final : public FramesWithEvents {
       return GST_FLOW_ERROR;
     }
     const auto end = microseconds(interval.end);
-    const auto start = current.accumulation_time > 0
-                           ? end - microseconds(current.accumulation_time)
-                           : microseconds(interval.start);
+    const auto start = current.accumulation_time > 0 ? end - microseconds(current.accumulation_time)
+                                                     : microseconds(interval.start);
     overlay_->draw(start, end, palette(current.palette), current.opacity, pixel_layout_of(*drawn_),
                    frame.data(), frame.stride());
     return GST_FLOW_OK;

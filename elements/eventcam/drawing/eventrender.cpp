@@ -79,9 +79,7 @@ struct Settings {
   /// Start of the window for the picture of an interval.
   Microseconds window_start(const EventInterval& interval) const {
     if (accumulation_time > 0)
-      return interval.end > accumulation_time
-                 ? microseconds(interval.end - accumulation_time)
-                 : -1;
+      return interval.end > accumulation_time ? microseconds(interval.end - accumulation_time) : -1;
     if (event_count > 0 || area_event_count > 0) return -1;
     return microseconds(interval.start);
   }

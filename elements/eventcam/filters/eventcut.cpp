@@ -376,10 +376,10 @@ static gboolean stop(GstBaseTransform* transform) {
 
 static GstStructure* stats_of(GObject* object) {
   const Counters counters = priv_of(object).counters.copy();
-  return gst_structure_new("application/x-event-cut-stats", "events", G_TYPE_UINT64,
-                           counters.events, "dropped-events", G_TYPE_UINT64, counters.dropped,
-                           "rejected-events", G_TYPE_UINT64, counters.rejected, "windows",
-                           G_TYPE_UINT64, counters.windows, nullptr);
+  return new_counters("application/x-event-cut-stats", {{"events", counters.events},
+                                                        {"dropped-events", counters.dropped},
+                                                        {"rejected-events", counters.rejected},
+                                                        {"windows", counters.windows}});
 }
 
 static void gst_event_cut_init(GstEventCut* self) {

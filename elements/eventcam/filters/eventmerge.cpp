@@ -246,9 +246,9 @@ class EventMerge final : public EventAggregator {
 
   GstStructure* stats() const {
     const Counts counts = counts_.copy();
-    return gst_structure_new("application/x-event-merge-stats", "events", G_TYPE_UINT64,
-                             counts.events, "late-events", G_TYPE_UINT64, counts.late,
-                             "rejected-events", G_TYPE_UINT64, counts.rejected, nullptr);
+    return new_counters("application/x-event-merge-stats", {{"events", counts.events},
+                                                            {"late-events", counts.late},
+                                                            {"rejected-events", counts.rejected}});
   }
 
   Guarded<Settings> settings;

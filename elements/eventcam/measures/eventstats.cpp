@@ -177,7 +177,7 @@ static void start_over(Private& self) {
 /// no inter-event interval spans the discontinuity.
 static void cover(Private& self, const EventInterval& interval) {
   auto& measurement = *self.stream->measurement;
-  const auto& segment = GST_BASE_TRANSFORM(self.element)->segment;
+  const auto& segment = self.element->segment;
   const Nanoseconds start = stream_time(segment, interval.start);
   const Nanoseconds end = stream_time(segment, interval.end);
   if (measurement.end && start < *measurement.end - static_cast<Nanoseconds>(event_resolution)) {
@@ -215,8 +215,7 @@ static void count(Private& self, Measurement& measurement, GstBuffer* buffer,
   const auto [events, labels] = ClippedEvents(mapped, buffer, clipped);
   const bool is_labelled = !labels.empty();
   const auto skipped = measurement.validator.for_each_valid(
-      events,
-      stream_time(GST_BASE_TRANSFORM(self.element)->segment, mapped.interval().start) / 1000,
+      events, stream_time(self.element->segment, mapped.interval().start) / 1000,
       length_of(mapped.interval()),
       [&](const AbsoluteEvent& event) {
         measurement.concluded = false;
@@ -259,7 +258,7 @@ static void handle_gap(Private& self, GstEvent* event) {
   gst_event_parse_gap(event, &start, &duration);
   if (!measurement || !GST_CLOCK_TIME_IS_VALID(duration) || start > G_MAXINT64) return;
   const GstClockTime end = start + std::min(duration, GstClockTime{G_MAXINT64} - start);
-  const auto clipped = clip({start, end}, GST_BASE_TRANSFORM(self.element)->segment);
+  const auto clipped = clip({start, end}, self.element->segment);
   if (!clipped) return;
   cover(self, *clipped);
   post_if_due(self, *measurement);

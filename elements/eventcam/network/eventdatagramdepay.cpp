@@ -154,19 +154,6 @@ static bool push_caps(Private& self) {
   return state.has_caps;
 }
 
-/// Buffer of the events of the interval from start to end.
-static GstBuffer* buffer_of(std::span<const AbsoluteEvent> events, Microseconds start,
-                            Microseconds end) {
-  std::vector<Event> stream;
-  stream.reserve(events.size());
-  for (const auto& event : events)
-    stream.push_back({static_cast<std::uint32_t>(event.t - start), event.x, event.y_p});
-  GstBuffer* const buffer = copied_buffer(std::as_bytes(std::span(stream)));
-  GST_BUFFER_PTS(buffer) = nanoseconds(start);
-  GST_BUFFER_DURATION(buffer) = nanoseconds(end - start);
-  return buffer;
-}
-
 /// Pushes the events of a datagram.
 static GstFlowReturn push(Private& self, const Reception& reception, GstClockTime arrival) {
   auto& state = *self.stream->state;
@@ -190,15 +177,18 @@ static GstFlowReturn push(Private& self, const Reception& reception, GstClockTim
     gst_pad_push_event(self.src, gap);
     state.end = first - 1;
   }
-  GstBuffer* const buffer = buffer_of(state.events, state.end, state.events.back().t);
+  std::vector<Event> events;
+  events.reserve(state.events.size());
+  for (const auto& event : state.events)
+    events.push_back({static_cast<std::uint32_t>(event.t - state.end), event.x, event.y_p});
+  const EventInterval interval{nanoseconds(state.end), nanoseconds(state.events.back().t)};
   state.end = state.events.back().t;
-  GST_LOG_OBJECT(self.element,
-                 "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
-                 state.events.size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)),
-                 GST_TIME_ARGS(GST_BUFFER_DURATION(buffer)));
-  state.segment.extend_to(nanoseconds(state.end));
-  if (std::exchange(state.is_discontinuous, false))
-    GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
+  GST_LOG_OBJECT(
+      self.element, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
+      events.size(), GST_TIME_ARGS(interval.start), GST_TIME_ARGS(interval.end - interval.start));
+  state.segment.extend_to(interval.end);
+  GstBuffer* const buffer = copied_buffer(std::as_bytes(std::span(events)));
+  stamp(buffer, interval, state.is_discontinuous);
   return gst_pad_push(self.src, buffer);
 }
 
@@ -231,15 +221,6 @@ static void reject_second_sender(Private& self, GstClockTime arrival) {
   g_free(cause);
 }
 
-static void log_late(Private& self, GstClockTime arrival) {
-  const auto level = self.stream->late_level.next();
-  GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self.element,
-                    "dropped the datagram of running time %" GST_TIME_FORMAT
-                    ": later events arrived before it",
-                    GST_TIME_ARGS(arrival));
-}
-
-/// Receives a datagram with these bytes.
 static GstFlowReturn receive(Private& self, GstBuffer* datagram,
                              std::span<const std::uint8_t> bytes, GstClockTime arrival) {
   auto& state = *self.stream->state;
@@ -261,23 +242,21 @@ static GstFlowReturn receive(Private& self, GstBuffer* datagram,
     reject(self, reception.fault, bytes.size(), arrival);
   else
     state.sender.follow(datagram, arrival);
-  if (reception.late) log_late(self, arrival);
+  if (reception.late)
+    GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, self.stream->late_level.next(), self.element,
+                      "dropped the datagram of running time %" GST_TIME_FORMAT
+                      ": later events arrived before it",
+                      GST_TIME_ARGS(arrival));
   if (reception.lost > 0) {
     GST_DEBUG_OBJECT(self.element,
                      "lost %" G_GUINT64_FORMAT
                      " datagrams before the one of running time %" GST_TIME_FORMAT,
                      guint64{reception.lost}, GST_TIME_ARGS(arrival));
-    self.reports.packets_lost(GST_ELEMENT(self.element), reception.lost);
+    self.reports.packets_lost(self.element, reception.lost);
   }
   // A datagram without events, such as one with jAER's frame samples, may reveal a loss, too.
   state.is_discontinuous |= GST_BUFFER_IS_DISCONT(datagram) || reception.lost > 0;
   return state.events.empty() ? GST_FLOW_OK : push(self, reception, arrival);
-}
-
-/// Running time at which a datagram arrived, if its buffer has a PTS.
-static GstClockTime arrival_of(const State& state, GstBuffer* buffer) {
-  if (state.upstream.format != GST_FORMAT_TIME) return GST_CLOCK_TIME_NONE;
-  return gst_segment_to_running_time(&state.upstream, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
 }
 
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
@@ -285,7 +264,10 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   OwnedBuffer buffer(received);
   auto& state = self.stream->state;
   if (!state) return GST_FLOW_FLUSHING;
-  const auto arrival = arrival_of(*state, received);
+  const auto arrival = state->upstream.format != GST_FORMAT_TIME
+                           ? GST_CLOCK_TIME_NONE
+                           : gst_segment_to_running_time(&state->upstream, GST_FORMAT_TIME,
+                                                         GST_BUFFER_PTS(received));
   if (!GST_CLOCK_TIME_IS_VALID(arrival) && state->settings.format == DatagramFormat::spif) {
     GST_ELEMENT_ERROR(self.element, STREAM, FORMAT,
                       ("SPIF events have no timestamps, and their datagrams no arrival time. Set "
@@ -297,7 +279,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
     reject_second_sender(self, arrival);
     return GST_FLOW_OK;
   }
-  const MappedBytes bytes(GST_ELEMENT(self.element), std::move(buffer));
+  const MappedBytes bytes(self.element, std::move(buffer));
   if (!bytes.is_mapped()) return GST_FLOW_ERROR;
   return catch_exceptions(
       self.element,
@@ -315,9 +297,8 @@ static bool start_stream(Private& self, const DatagramSettings& settings) {
                       error.what() + ". Select another format, or correct width and height."};
   };
   return catch_exceptions(self.element, report, [&] {
-    auto unpacker = make_datagram_unpacker(settings);
-    auto& state = self.stream->state;
-    state.emplace(State{.settings = settings, .unpacker = std::move(unpacker)});
+    self.stream->state.emplace(
+        State{.settings = settings, .unpacker = make_datagram_unpacker(settings)});
   });
 }
 
@@ -371,9 +352,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_datagram_depay_parent_class)->change_state(element, transition);
   self.reports.follow(transition, self.sink);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    self.stream.reset();
-  }
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) self.stream.reset();
   return result;
 }
 
@@ -403,11 +382,13 @@ static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klas
       object_class,
       [](GObject* object) {
         const DatagramCounts counts = priv_of(object).counts.copy();
-        return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
-                                 counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",
-                                 G_TYPE_UINT64, counts.bytes, "lost-packets", G_TYPE_UINT64,
-                                 counts.lost, "late-packets", G_TYPE_UINT64, counts.late,
-                                 "rejected-packets", G_TYPE_UINT64, counts.rejected, nullptr);
+        return new_counters("application/x-event-datagram-stats",
+                            {{"packets", counts.packets},
+                             {"events", counts.events},
+                             {"bytes", counts.bytes},
+                             {"lost-packets", counts.lost},
+                             {"late-packets", counts.late},
+                             {"rejected-packets", counts.rejected}});
       },
       "Counters since the start: packets, events and bytes received; lost packets, if they have a "
       "sequence number; late packets, older than earlier ones and dropped; rejected packets, "

@@ -56,7 +56,7 @@ struct Settings : DatagramSettings, PayloaderSettings {};
 
 /// State from start to stop.
 struct Stream {
-  GstEventCameraInfo info{};
+  SensorSize sensor;
   std::unique_ptr<DatagramPacker> packer;
   std::vector<AbsoluteEvent> events;   ///< of the current buffer
   std::vector<OwnedBuffer> datagrams;  ///< complete but not yet pushed
@@ -95,12 +95,10 @@ static void keep(Private& self, const Datagram& datagram) {
   GST_BUFFER_PTS(buffer.get()) = nanoseconds(datagram.first);
   GST_BUFFER_DURATION(buffer.get()) = nanoseconds(datagram.last - datagram.first);
   self.stream->datagrams.push_back(std::move(buffer));
-  {
-    const auto counts = self.counts.lock();
-    ++counts->packets;
-    counts->events += datagram.events;
-    counts->bytes += datagram.bytes.size();
-  }
+  const auto counts = self.counts.lock();
+  ++counts->packets;
+  counts->events += datagram.events;
+  counts->bytes += datagram.bytes.size();
 }
 
 /// Pushes the kept datagrams as a list, which udpsink sends with one system call.
@@ -156,7 +154,7 @@ static void drop(Private& self) noexcept {
 /// Sends events that have waited for max-latency.
 static void flush_late(GstObject* element) {
   GST_LOG_OBJECT(element, "max-latency elapsed: sending an incomplete datagram");
-  flush(GST_EVENT_DATAGRAM_PAY(element));
+  flush(priv_of(element));
 }
 
 /// True if events would wait for too long in the incomplete datagram. `interval` is the current
@@ -170,22 +168,15 @@ static bool is_flush_due(Private& self, const EventInterval& interval) {
 
 /* data */
 
-/// Maximum time between two events of a datagram; not limited if each buffer is sent at once.
-static Microseconds max_span(GstClockTime max_latency) {
-  if (max_latency == 0) return std::numeric_limits<Microseconds>::max();
-  return microseconds(max_latency);
-}
-
 /// Collects the events of a buffer.
 static void collect(Private& self, GstBuffer* buffer, const MappedEvents& mapped) {
   GST_LOG_OBJECT(self.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                  mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
   const auto stream = self.stream.lock();
   stream->events.clear();
-  for (const auto& event : mapped.events()) {
-    if (event.x < stream->info.width && event.y() < stream->info.height)
+  for (const auto& event : mapped.events())
+    if (event.x < stream->sensor.width && event.y() < stream->sensor.height)
       stream->events.push_back({mapped.start() + event.t, event.x, event.y_p});
-  }
   if (stream->events.size() < mapped.events().size())
     stream->faults.warn(self.element, EventFault::beyond_sensor, buffer);
 }
@@ -201,7 +192,9 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   }
   return pack(self, [&](DatagramPacker& packer, const auto& send) {
     collect(self, received, mapped);
-    packer.set_max_span(max_span(self.settings.copy().max_latency));
+    const auto max_latency = self.settings.copy().max_latency;  // 0: each buffer is sent at once
+    packer.set_max_span(max_latency == 0 ? std::numeric_limits<Microseconds>::max()
+                                         : microseconds(max_latency));
     packer.pack(self.stream->events, send);
     if (is_flush_due(self, mapped.interval())) packer.flush(send);
   });
@@ -217,25 +210,22 @@ static void handle_gap(Private& self, GstEvent* event) {
     flush(self);
 }
 
-static gboolean handle_caps(Private& self, GstEvent* event) {
-  GstCaps* const caps = caps_of(event);
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
-  if (self.stream->packer && self.stream->info.width == info.width &&
-      self.stream->info.height == info.height)
-    return TRUE;
+static gboolean handle_caps(Private& self, const GstCaps* caps) {
+  const auto sensor = sensor_of(caps);
+  if (!sensor) return FALSE;
+  if (self.stream->packer && self.stream->sensor == *sensor) return TRUE;
   flush(self);
   Settings settings = self.settings.copy();
-  settings.width = info.width;
-  settings.height = info.height;
+  settings.width = sensor->width;
+  settings.height = sensor->height;
   if (!catch_exceptions(self.element, report_of,
                         [&] { self.stream->packer = make_datagram_packer(settings); }))
     return FALSE;
-  self.stream->info = info;
+  self.stream->sensor = *sensor;
   const OwnedCaps out(gst_caps_new_simple("application/x-event-datagram", "format", G_TYPE_STRING,
                                           name_of(settings.format), nullptr));
   GST_DEBUG_OBJECT(self.element, "sending the events of %dx%d pixels as %" GST_PTR_FORMAT,
-                   info.width, info.height, out.get());
+                   sensor->width, sensor->height, out.get());
   return gst_pad_push_event(self.src, gst_event_new_caps(out.get()));
 }
 
@@ -243,9 +233,8 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   auto& self = priv_of(parent);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CAPS: {
-      const gboolean handled = handle_caps(self, event);
-      gst_event_unref(event);
-      return handled;
+      const OwnedEvent owned(event);
+      return handle_caps(self, caps_of(event));
     }
     case GST_EVENT_GAP:
       handle_gap(self, event);
@@ -303,9 +292,9 @@ static void gst_event_datagram_pay_class_init(GstEventDatagramPayClass* klass) {
       object_class,
       [](GObject* object) {
         const DatagramCounts counts = priv_of(object).counts.copy();
-        return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
-                                 counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",
-                                 G_TYPE_UINT64, counts.bytes, nullptr);
+        return new_counters(
+            "application/x-event-datagram-stats",
+            {{"packets", counts.packets}, {"events", counts.events}, {"bytes", counts.bytes}});
       },
       "Counters since the start: packets, events and bytes packed");
 

@@ -119,7 +119,7 @@ DEFINE_EVENT_ELEMENT(GstRtpEventDepay, gst_rtp_event_depay, RTP_EVENT_DEPAY, Gst
 /// Maps the sender's time `start` to the running time of its packet, unless the segment already
 /// does.
 static void update_segment(Private& self, GstClockTime start, GstClockTime arrival) {
-  const GstSegment& in = GST_RTP_BASE_DEPAYLOAD(self.element)->segment;
+  const GstSegment& in = self.element->segment;
   if (in.format != GST_FORMAT_TIME) arrival = GST_CLOCK_TIME_NONE;
   const guint64 running = gst_segment_to_running_time(&in, in.format, arrival);
   auto& segment = self.stream->state->segment;
@@ -131,9 +131,8 @@ static void update_segment(Private& self, GstClockTime start, GstClockTime arriv
                 running, gst_segment_to_stream_time(&in, in.format, arrival));
 }
 
-static Report no_memory(const std::exception&) {
-  return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
-}
+static const Report no_memory{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+                              "Not enough memory to receive events."};
 
 static void push(Private& self, const RtpInterval& interval) {
   const auto start = static_cast<GstClockTime>(interval.start);
@@ -152,12 +151,9 @@ static void push(Private& self, const RtpInterval& interval) {
     return;
   }
   GstBuffer* buffer = copied_buffer(std::as_bytes(interval.events));
-  GST_BUFFER_PTS(buffer) = start;
+  stamp(buffer, {start, start + duration}, state.is_discontinuous);
   GST_BUFFER_DTS(buffer) = start;  // else the base class sets the packet's, in receiver time
-  GST_BUFFER_DURATION(buffer) = duration;
-  if (std::exchange(state.is_discontinuous, false))
-    GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
-  gst_rtp_base_depayload_push(GST_RTP_BASE_DEPAYLOAD(self.element), buffer);
+  gst_rtp_base_depayload_push(self.element, buffer);
 }
 
 static void flush(Private& self) {
@@ -168,31 +164,6 @@ static void flush(Private& self) {
 }
 
 /* input */
-
-static void warn_of_rejected(Private& self, guint number) {
-  self.stream->warn_of_rejected(
-      self.element,
-      {GST_STREAM_ERROR_DECODE,
-       "Rejected a packet: it is corrupt, or of another sensor or format. Set width, height and "
-       "format in the caps to match the sender; stats counts the rejected packets."},
-      "packet number " + std::to_string(number));
-}
-
-static void warn_of_second_sender(Private& self, guint number) {
-  self.stream->warn_of_second_sender(
-      self.element,
-      {GST_RESOURCE_ERROR_BUSY,
-       "Rejected the packets of a second sender; stats counts them. Let each sender use a port of "
-       "its own, or separate them by rtpssrcdemux or rtpbin."},
-      "packet number " + std::to_string(number) + " has an SSRC beside the current one");
-}
-
-static void log_late(Private& self, guint number) {
-  const auto level = self.stream->late_level.next();
-  GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self.element,
-                    "dropped packet number %u: later ones arrived before it, or it came twice",
-                    number);
-}
 
 static RtpPacket packet_of(GstRTPBuffer* rtp) {
   return {
@@ -215,10 +186,23 @@ static void update_statistics(Private& self, guint number) {
     self.reports.packets_lost(GST_ELEMENT(self.element), lost);
   }
   if (counted.second_sender_packets > before.second_sender_packets)
-    warn_of_second_sender(self, number);
+    self.stream->warn_of_second_sender(
+        self.element,
+        {GST_RESOURCE_ERROR_BUSY,
+         "Rejected the packets of a second sender; stats counts them. Let each sender use a port "
+         "of its own, or separate them by rtpssrcdemux or rtpbin."},
+        "packet number " + std::to_string(number) + " has an SSRC beside the current one");
   else if (counted.rejected_packets > before.rejected_packets)
-    warn_of_rejected(self, number);
-  if (counted.late_packets > before.late_packets) log_late(self, number);
+    self.stream->warn_of_rejected(
+        self.element,
+        {GST_STREAM_ERROR_DECODE,
+         "Rejected a packet: it is corrupt, or of another sensor or format. Set width, height and "
+         "format in the caps to match the sender; stats counts the rejected packets."},
+        "packet number " + std::to_string(number));
+  if (counted.late_packets > before.late_packets)
+    GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, self.stream->late_level.next(), self.element,
+                      "dropped packet number %u: later ones arrived before it, or it came twice",
+                      number);
 }
 
 static GstBuffer* process_packet(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
@@ -293,11 +277,6 @@ static std::optional<RtpEventFormat> format_of(const GstStructure* caps) {
   return std::nullopt;
 }
 
-static bool send_caps(Private& self, SensorSize sensor) {
-  const OwnedCaps caps = event_caps(sensor);
-  return gst_pad_set_caps(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self.element), caps.get()) != FALSE;
-}
-
 static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
   auto& self = priv_of(depayload);
   auto& state = self.stream->state;
@@ -322,14 +301,14 @@ static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
   flush(self);
   GST_DEBUG_OBJECT(self.element, "receiving the events of %dx%d pixels as %s", sensor.width,
                    sensor.height, rtp_event_formats[static_cast<std::size_t>(*format)]);
-  const auto follow = [&] {
+  const bool follows = catch_exceptions(self.element, no_memory, [&] {
     if (state)
       state->change(sensor, *format);
     else
       state.emplace(sensor, *format);
-  };
-  if (!catch_exceptions(self.element, no_memory, follow)) return FALSE;
-  return send_caps(self, sensor);
+  });
+  if (!follows) return FALSE;
+  return gst_pad_set_caps(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self.element), event_caps(sensor).get());
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
@@ -338,9 +317,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_rtp_event_depay_parent_class)->change_state(element, transition);
   self.reports.follow(transition, GST_RTP_BASE_DEPAYLOAD_SINKPAD(element));
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    self.stream.reset();
-  }
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) self.stream.reset();
   return result;
 }
 

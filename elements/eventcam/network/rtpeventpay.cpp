@@ -179,7 +179,7 @@ static gsize max_payload_size(Private& self) {
 static GstBuffer* make_packet(Private& self, std::span<const std::uint8_t> payload, bool is_last,
                               GstClockTime pts) {
   GstBuffer* packet = gst_rtp_base_payload_allocate_output_buffer(
-      GST_RTP_BASE_PAYLOAD(self.element), static_cast<guint>(payload.size()), 0, 0);
+      self.element, static_cast<guint>(payload.size()), 0, 0);
   GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
   gst_rtp_buffer_map(packet, GST_MAP_WRITE, &rtp);
   std::ranges::copy(payload, static_cast<std::uint8_t*>(gst_rtp_buffer_get_payload(&rtp)));
@@ -194,20 +194,15 @@ static void send(Private& self) {
   if (!self.stream->state || self.stream->state->pending.empty()) return;
   auto& pending = self.stream->state->pending;
   Sent sent;
-  GstBufferList* list = gst_buffer_list_new();
-  try {
-    self.stream->state->packer.pack(
-        pending.start(), pending.end() - pending.start(), pending.events(), max_payload_size(self),
-        [&](std::span<const std::uint8_t> payload, bool is_last) {
-          gst_buffer_list_add(list, make_packet(self, payload, is_last,
-                                                static_cast<GstClockTime>(pending.start())));
-          ++sent.packets;
-          sent.bytes += payload.size();
-        });
-  } catch (...) {
-    gst_buffer_list_unref(list);
-    throw;
-  }
+  std::unique_ptr<GstBufferList, Unref> list(gst_buffer_list_new());
+  self.stream->state->packer.pack(
+      pending.start(), pending.end() - pending.start(), pending.events(), max_payload_size(self),
+      [&](std::span<const std::uint8_t> payload, bool is_last) {
+        gst_buffer_list_add(list.get(), make_packet(self, payload, is_last,
+                                                    static_cast<GstClockTime>(pending.start())));
+        ++sent.packets;
+        sent.bytes += payload.size();
+      });
   sent.events = pending.events().size();
   GST_LOG_OBJECT(self.element,
                  "%" G_GUINT64_FORMAT " events from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT
@@ -222,8 +217,7 @@ static void send(Private& self) {
     total->bytes += sent.bytes;
     total->events += sent.events;
   }
-  const GstFlowReturn flow =
-      gst_rtp_base_payload_push_list(GST_RTP_BASE_PAYLOAD(self.element), list);
+  const GstFlowReturn flow = gst_rtp_base_payload_push_list(self.element, list.release());
   if (self.stream->flow == GST_FLOW_OK) self.stream->flow = flow;
 }
 
@@ -356,24 +350,24 @@ static GstClockTime latency_of(gpointer element) {
 
 static gboolean set_caps(GstRTPBasePayload* payload, GstCaps* caps) {
   auto& self = priv_of(payload);
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
-  const SensorSize sensor{info.width, info.height};
-  const auto format = self.settings.copy().format;
-  const std::string width = std::to_string(info.width);
-  const std::string height = std::to_string(info.height);
-  if (!self.stream->state || self.stream->state->sensor != sensor) {
-    const auto first_event = self.stream->state ? self.stream->state->packer.next_event() : 0;
+  const auto sensor = sensor_of(caps);
+  if (!sensor) return FALSE;
+  const std::string width = std::to_string(sensor->width);
+  const std::string height = std::to_string(sensor->height);
+  auto& state = self.stream->state;
+  if (!state || state->sensor != *sensor) {
+    const auto first_event = state ? state->packer.next_event() : 0;
     const Report too_large{GST_STREAM_ERROR_FORMAT,
                            "EVT3 words support sensors of 1x1 to 2048x2048 pixels, not " + width +
                                "x" + height + "; set format=XYTP."};
-    if (!catch_exceptions(self.element, too_large,
-                          [&] { self.stream->state.emplace(sensor, format, first_event); }))
+    if (!catch_exceptions(self.element, too_large, [&] {
+          state.emplace(*sensor, self.settings.copy().format, first_event);
+        }))
       return FALSE;
   }
-  const char* format_name = rtp_event_formats[static_cast<std::size_t>(self.stream->state->format)];
-  GST_DEBUG_OBJECT(self.element, "sending the events of %dx%d pixels as %s", info.width,
-                   info.height, format_name);
+  const char* format_name = rtp_event_formats[static_cast<std::size_t>(state->format)];
+  GST_DEBUG_OBJECT(self.element, "sending the events of %dx%d pixels as %s", sensor->width,
+                   sensor->height, format_name);
   gst_rtp_base_payload_set_options(payload, "application", TRUE, "X-EVENT-CAMERA", rtp_clock_rate);
   return gst_rtp_base_payload_set_outcaps(payload, "width", G_TYPE_STRING, width.c_str(), "height",
                                           G_TYPE_STRING, height.c_str(), "format", G_TYPE_STRING,

@@ -146,18 +146,14 @@ static GstFlowReturn push_tensor(Private& self, const WindowQueue::Window& windo
   GstBuffer* const acquired = buffer.get();
   tensor.write(window.events, window.end / static_cast<Nanoseconds>(GST_USECOND),
                WritableBytes(acquired).get().data());
-  GST_BUFFER_PTS(acquired) = static_cast<GstClockTime>(window.start);
-  GST_BUFFER_DTS(acquired) = GST_CLOCK_TIME_NONE;
-  GST_BUFFER_DURATION(acquired) = static_cast<GstClockTime>(window.end - window.start);
-  GST_BUFFER_FLAG_UNSET(acquired, GST_BUFFER_FLAG_DISCONT);
-  if (std::exchange(self.stream->discontinuous, false))
-    GST_BUFFER_FLAG_SET(acquired, GST_BUFFER_FLAG_DISCONT);
+  const EventInterval interval{static_cast<GstClockTime>(window.start),
+                               static_cast<GstClockTime>(window.end)};
+  stamp(acquired, interval, self.stream->discontinuous);
   add_tensor_meta(acquired, tensor.shape(), self.stream->state->format.tensors);
   GST_LOG_OBJECT(self.element,
                  "tensor of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT
                  " to %" GST_TIME_FORMAT,
-                 window.events.size(), GST_TIME_ARGS(static_cast<GstClockTime>(window.start)),
-                 GST_TIME_ARGS(static_cast<GstClockTime>(window.end)));
+                 window.events.size(), GST_TIME_ARGS(interval.start), GST_TIME_ARGS(interval.end));
   return gst_pad_push(self.src, buffer.release());
 }
 
@@ -293,8 +289,7 @@ static bool make_state(Private& self, const GstEventCameraInfo& info) {
   return true;
 }
 
-static gboolean handle_caps(Private& self, GstEvent* event) {
-  GstCaps* const caps = caps_of(event);
+static gboolean handle_caps(Private& self, const GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
   if (self.stream->state && self.stream->state->format.sensor.width == info.width &&
@@ -311,8 +306,7 @@ static gboolean handle_caps(Private& self, GstEvent* event) {
                    info.height, out.get());
   if (!post_unless_accepted(self, out.get())) return FALSE;
   const gboolean handled = gst_pad_push_event(self.src, gst_event_new_caps(out.get()));
-  gst_element_post_message(GST_ELEMENT(self.element),
-                           gst_message_new_latency(GST_OBJECT(self.element)));
+  post_latency(self.element);
   return handled;
 }
 
@@ -320,9 +314,8 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   auto& self = priv_of(parent);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CAPS: {
-      const gboolean handled = handle_caps(self, event);
-      gst_event_unref(event);
-      return handled;
+      const OwnedEvent owned(event);
+      return handle_caps(self, caps_of(event));
     }
     case GST_EVENT_GAP:
       if (handle_gap(self, event)) {

@@ -73,12 +73,7 @@ class ReaderReports {
   /// The property `stats`. May be called from any thread.
   GstStructure* stats() const {
     const auto counts = counts_.copy();
-    GstStructure* const stats = gst_structure_new(
-        has_many_streams_ ? "application/x-event-demux-stats" : "application/x-event-decoder-stats",
-        "events", G_TYPE_UINT64, counts.events, "triggers", G_TYPE_UINT64, counts.triggers,
-        "corrupt-places", G_TYPE_UINT64, counts.corrupt_places, "outside-events", G_TYPE_UINT64,
-        counts.outside, "late-items", G_TYPE_UINT64, counts.late, "stray-items", G_TYPE_UINT64,
-        counts.stray, "skipped-items", G_TYPE_UINT64, counts.skipped, nullptr);
+    GstStructure* const stats = new_counters(has_many_streams_ ? "application/x-event-demux-stats" : "application/x-event-decoder-stats", {{"events", counts.events}, {"triggers", counts.triggers}, {"corrupt-places", counts.corrupt_places}, {"outside-events", counts.outside}, {"late-items", counts.late}, {"stray-items", counts.stray}, {"skipped-items", counts.skipped}});
     if (has_many_streams_)
       gst_structure_set(stats, "frames", G_TYPE_UINT64, counts.frames, "imu-samples", G_TYPE_UINT64,
                         counts.imu_samples, nullptr);
