@@ -203,10 +203,7 @@ GstFlowReturn EventPictures::push_picture(const EventInterval& events,
   OwnedBuffer buffer(acquired);
   result = draw(events, acquired);
   if (result != GST_FLOW_OK) return result;
-  GST_BUFFER_PTS(acquired) = picture.start;
-  GST_BUFFER_DTS(acquired) = GST_CLOCK_TIME_NONE;
-  GST_BUFFER_DURATION(acquired) = picture.end - picture.start;
-  if (std::exchange(discontinuous_, false)) GST_BUFFER_FLAG_SET(acquired, GST_BUFFER_FLAG_DISCONT);
+  stamp(acquired, picture, discontinuous_);
   GST_LOG_OBJECT(element(),
                  "picture at %" GST_TIME_FORMAT " of the events from %" GST_TIME_FORMAT
                  " to %" GST_TIME_FORMAT,
@@ -272,13 +269,12 @@ bool EventPictures::set_video(const GstCaps* caps) {
 }
 
 bool EventPictures::handle_caps(GstAggregatorPad*, GstCaps* caps) {
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-  if (state_ && state_->width == info.width && state_->height == info.height) return true;
+  const auto sensor = sensor_of(caps);
+  if (!sensor) return false;
+  if (state_ && state_->sensor == *sensor) return true;
   drain();
   state_.reset();  // before allocating the next: pictures can be large
-  state_.emplace(
-      State{info.width, info.height, Renderer(info.width, info.height, render_settings())});
+  state_.emplace(State{*sensor, Renderer(sensor->width, sensor->height, render_settings())});
   gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
   return true;
 }

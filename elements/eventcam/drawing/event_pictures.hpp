@@ -92,8 +92,7 @@ class EventPictures : public EventAggregator {
  private:
   /// State from caps to stop.
   struct State {
-    int width;  ///< of the sensor
-    int height;
+    eventcamera::SensorSize sensor;
     eventcamera::Renderer renderer;
     std::optional<GstVideoInfo> video{};  ///< output format, once negotiated
 

@@ -235,10 +235,7 @@ class EventFuse final : public FramesWithEvents {
       const VideoFrame picture(output_, buffer.get(), GST_MAP_WRITE);
       filter_->draw(microseconds(running(interval.start)), picture.data(), picture.stride());
     }
-    GST_BUFFER_PTS(buffer.get()) = interval.start;
-    GST_BUFFER_DURATION(buffer.get()) = interval.end - interval.start;
-    if (std::exchange(discontinuous_, false))
-      GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
+    stamp(buffer.get(), interval, discontinuous_);
     GST_LOG_OBJECT(element(), "picture at %" GST_TIME_FORMAT, GST_TIME_ARGS(interval.start));
     return push(std::move(buffer));
   }

@@ -38,10 +38,13 @@ void FramesWithEvents::flush() noexcept {
 }
 
 bool FramesWithEvents::handle_caps(GstAggregatorPad* pad, GstCaps* caps) {
-  return pad == main_pad() ? handle_video_caps(caps) : handle_event_caps(caps);
-}
-
-bool FramesWithEvents::handle_video_caps(const GstCaps* caps) {
+  if (pad != main_pad()) {
+    const auto sensor = sensor_of(caps);
+    if (!sensor) return false;
+    if (sensor_ && sensor_ != sensor) start_over();
+    sensor_ = sensor;
+    return true;
+  }
   GstVideoInfo video;
   if (!gst_video_info_from_caps(&video, caps)) return false;
   if (!video_ || GST_VIDEO_INFO_WIDTH(&*video_) != GST_VIDEO_INFO_WIDTH(&video) ||
@@ -57,15 +60,6 @@ bool FramesWithEvents::handle_video_caps(const GstCaps* caps) {
                       "No events to draw: link a source of events to the pad \"event_sink\". Until "
                       "then, video from a live source passes unchanged, and other video waits."},
                      "the pad \"event_sink\" is not linked");
-  return true;
-}
-
-bool FramesWithEvents::handle_event_caps(const GstCaps* caps) {
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-  const SensorSize sensor{info.width, info.height};
-  if (sensor_ && sensor_ != sensor) start_over();
-  sensor_ = sensor;
   return true;
 }
 

@@ -36,8 +36,6 @@ class FramesWithEvents : public EventAggregator {
   GstClockTime known_ = 0;  ///< running time up to which events are complete
 
  private:
-  bool handle_video_caps(const GstCaps* caps);
-  bool handle_event_caps(const GstCaps* caps);
   std::span<const eventcamera::Event> in_running_time(std::span<const eventcamera::Event> events,
                                                       double rate);
   bool add_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end);

@@ -353,9 +353,8 @@ static bool handle_caps(Private& self, GstAggregatorPad* pad, const GstCaps* cap
     file.set_video(video);
     return true;
   }
-  GstEventCameraInfo info;
-  return gst_event_camera_info_from_caps(&info, caps) &&
-         file.handle_sensor({info.width, info.height});
+  const auto sensor = sensor_of(caps);
+  return sensor && file.handle_sensor(*sensor);
 }
 
 static GstFlowReturn sink_event_pre_queue(GstAggregator* aggregator, GstAggregatorPad* pad,

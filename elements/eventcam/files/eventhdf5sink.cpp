@@ -53,7 +53,7 @@ struct Settings {
 
 /// State of the file, from caps to READY.
 struct State {
-  GstEventCameraInfo info = {};
+  SensorSize sensor;
   std::unique_ptr<Hdf5Writer> writer;  ///< null before caps and after the end
   bool begun = false;                  ///< events were written
   bool ended = false;
@@ -117,15 +117,15 @@ static bool end_file(Private& self) {
 }
 
 /// Starts a new file for events of this sensor, overwriting any existing file.
-static bool begin_file(Private& self, const GstEventCameraInfo& info) {
+static bool begin_file(Private& self, SensorSize sensor) {
   self.state = State();  // close first: HDF5 treats two open files of the same name as one
-  self.state.info = info;
-  self.writable.begin_file({info.width, info.height});
+  self.state.sensor = sensor;
+  self.writable.begin_file(sensor);
   const auto [location, format, compression, commit_interval] = self.settings.copy();
-  GST_DEBUG_OBJECT(self.element, "writing the events of %dx%d pixels to %s", info.width,
-                   info.height, location.c_str());
-  const Hdf5Writer::Settings settings{
-      format, compression, {info.width, info.height}, std::chrono::nanoseconds(commit_interval)};
+  GST_DEBUG_OBJECT(self.element, "writing the events of %dx%d pixels to %s", sensor.width,
+                   sensor.height, location.c_str());
+  const Hdf5Writer::Settings settings{format, compression, sensor,
+                                      std::chrono::nanoseconds(commit_interval)};
   return reported(self, [&, &path = location] {
     self.state.writer = std::make_unique<Hdf5Writer>(path, settings);
   });
@@ -134,16 +134,15 @@ static bool begin_file(Private& self, const GstEventCameraInfo& info) {
 static gboolean set_caps(GstBaseSink* sink, GstCaps* caps) {
   auto& self = priv_of(sink);
   const State& state = self.state;
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) {
+  const auto sensor = sensor_of(caps);
+  if (!sensor) {
     GST_ERROR_OBJECT(self.element, "%" GST_PTR_FORMAT " are not event caps", caps);
     return FALSE;
   }
   if (state.ended) return TRUE;
-  if (state.writer && info.width == state.info.width && info.height == state.info.height)
-    return TRUE;
-  if (state.begun && !self.writable.accepts({info.width, info.height})) return FALSE;
-  return begin_file(self, info);
+  if (state.writer && state.sensor == *sensor) return TRUE;
+  if (state.begun && !self.writable.accepts(*sensor)) return FALSE;
+  return begin_file(self, *sensor);
 }
 
 /* data */
@@ -193,8 +192,8 @@ static gboolean event(GstBaseSink* sink, GstEvent* event) {
     self.writable.begin_segment(segment_of(event), is_simulated(GST_BASE_SINK_PAD(sink)));
   bool done = true;
   if (GST_EVENT_TYPE(event) == GST_EVENT_EOS) done = end_file(self);
-  if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && state.info.width > 0)
-    done = begin_file(self, GstEventCameraInfo(state.info));
+  if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && state.sensor != SensorSize{})
+    done = begin_file(self, state.sensor);
   if (GST_EVENT_TYPE(event) == GST_EVENT_GAP) done = keep_up(self);
   if (const auto triggers = triggers_of(event)) done = write_triggers(self, *triggers);
   if (!done) {

@@ -166,10 +166,7 @@ static GstFlowReturn push_window(Private& self, std::span<const AbsoluteEvent> e
                          });
   if (stream->is_labelled)
     std::ranges::transform(events, add_labels(buffer.get(), events.size()).begin(), label_of);
-  GST_BUFFER_PTS(buffer.get()) = pts;
-  GST_BUFFER_DURATION(buffer.get()) = duration;
-  if (std::exchange(stream->is_discontinuous, false))
-    GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
+  stamp(buffer.get(), {pts, pts + duration}, stream->is_discontinuous);
   return gst_pad_push(src, buffer.release());
 }
 
@@ -350,14 +347,13 @@ static GstCaps* transform_caps(GstBaseTransform*, GstPadDirection direction, Gst
 
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
   auto& self = priv_of(transform);
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, in)) return FALSE;
+  const auto sensor = sensor_of(in);
+  if (!sensor) return FALSE;
   const auto stream = self.stream.lock();
-  const SensorSize sensor{info.width, info.height};
-  if (stream->validator && stream->sensor == sensor) return TRUE;
+  if (stream->validator && stream->sensor == *sensor) return TRUE;
   start_over(self);
-  stream->sensor = sensor;
-  stream->validator.emplace(info.width, info.height);
+  stream->sensor = *sensor;
+  stream->validator.emplace(sensor->width, sensor->height);
   return TRUE;
 }
 

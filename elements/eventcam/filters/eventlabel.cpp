@@ -87,9 +87,9 @@ class EventLabeller final : public EventAggregator {
 
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
     if (pad == main_pad()) {
-      GstEventCameraInfo info;
-      if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-      sensor_ = {info.width, info.height};
+      const auto sensor = sensor_of(caps);
+      if (!sensor) return false;
+      sensor_ = sensor;
       if (!gst_pad_is_linked(GST_PAD(images_pad_)))
         warn_of_missing_(
             element(),

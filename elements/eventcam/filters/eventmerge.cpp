@@ -114,9 +114,9 @@ class EventMerge final : public EventAggregator {
   void release_memory() noexcept override { flush(); }
 
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
-    GstEventCameraInfo info;
-    if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-    GST_EVENT_MERGE_PAD(pad)->priv->sensor = {info.width, info.height};
+    const auto sensor = sensor_of(caps);
+    if (!sensor) return false;
+    GST_EVENT_MERGE_PAD(pad)->priv->sensor = *sensor;
     gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
     return true;
   }
@@ -218,22 +218,11 @@ class EventMerge final : public EventAggregator {
       return GST_FLOW_NOT_NEGOTIATED;
     }
     GST_DEBUG_OBJECT(element(), "the sensors need %s", text.c_str());
-    const auto at_least = [](int size) {
-      GValue range = G_VALUE_INIT;
-      g_value_init(&range, GST_TYPE_INT_RANGE);
-      gst_value_set_int_range(&range, size, max_side);
-      return range;
-    };
     const OwnedCaps ours(event_caps(needed));
-    GstStructure* const structure = gst_caps_get_structure(ours.get(), 0);
-    if (needed.width < max_side) {
-      GValue width = at_least(needed.width);
-      gst_structure_take_value(structure, "width", &width);
-    }
-    if (needed.height < max_side) {
-      GValue height = at_least(needed.height);
-      gst_structure_take_value(structure, "height", &height);
-    }
+    for (const auto& [side, size] :
+         {std::pair("width", needed.width), std::pair("height", needed.height)})
+      if (size < max_side)
+        gst_caps_set_simple(ours.get(), side, GST_TYPE_INT_RANGE, size, max_side, nullptr);
     *result = gst_caps_intersect_full(downstream, ours.get(), GST_CAPS_INTERSECT_FIRST);
     if (!gst_caps_is_empty(*result)) return GST_FLOW_OK;
     GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
@@ -377,10 +366,7 @@ class EventMerge final : public EventAggregator {
       if (interval.labelled) events.labels = add_labels(buffer.get(), interval.events);
       EventMerger::merge(inputs, interval, events);
     }
-    GST_BUFFER_PTS(buffer.get()) = start;
-    GST_BUFFER_DURATION(buffer.get()) = duration;
-    if (std::exchange(discontinuous_, false))
-      GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
+    stamp(buffer.get(), {start, start + duration}, discontinuous_);
     GST_LOG_OBJECT(element(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, interval.events,
                    GST_TIME_ARGS(start));
     return push(std::move(buffer));

@@ -168,10 +168,9 @@ class EventCompare final : public EventAggregator {
   void release_memory() noexcept override { flush(); }
 
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
-    GstEventCameraInfo info;
-    if (!gst_event_camera_info_from_caps(&info, caps)) return false;
+    const auto next = sensor_of(caps);
+    if (!next) return false;
     auto& sensor = sensors_[pad == main_pad() ? StreamRole::candidate : StreamRole::reference];
-    const SensorSize next{info.width, info.height};
     if (sensor == next) return true;
     for (GstAggregatorPad* other : {pads_[StreamRole::reference], pads_[StreamRole::candidate]})
       if (!gst_pad_is_linked(GST_PAD(other)))

@@ -79,16 +79,14 @@ struct Part {
 
 /// Statistics of the stream of one sensor.
 struct Measurement {
-  Measurement(int sensor_width, int sensor_height)
-      : width(sensor_width),
-        height(sensor_height),
-        validator(width, height),
-        last_times(width, height),
-        cumulative{.statistics = EventStatistics(width, height)},
-        recent{.statistics = EventStatistics(width, height)} {}
+  explicit Measurement(SensorSize of)
+      : sensor(of),
+        validator(of.width, of.height),
+        last_times(of.width, of.height),
+        cumulative{.statistics = EventStatistics(of.width, of.height)},
+        recent{.statistics = EventStatistics(of.width, of.height)} {}
 
-  int width;
-  int height;
+  SensorSize sensor;
   EventValidator validator;
   LastTimes last_times;
   Part cumulative;
@@ -145,7 +143,7 @@ static void post(Private& self, GstStructure* structure) {
 
 /// Reports the statistics of the whole stream, which is empty if no caps were received.
 static void conclude(Private& self, const ReportFiles& files) {
-  Measurement nothing(1, 1);
+  Measurement nothing({1, 1});
   auto& measurement = self.stream->measurement ? *self.stream->measurement : nothing;
   measurement.concluded = true;
   GstStructure* figures = figures_of(measurement.cumulative, measurement.end.value_or(0), true);
@@ -160,15 +158,15 @@ static bool has_news(Private& self) {
 }
 
 /// Starts measuring a sensor of this size.
-static void measure(Private& self, int width, int height) {
-  GST_DEBUG_OBJECT(self.element, "counting the events of %dx%d pixels", width, height);
-  self.stream->measurement.emplace(width, height);
+static void measure(Private& self, SensorSize sensor) {
+  GST_DEBUG_OBJECT(self.element, "counting the events of %dx%d pixels", sensor.width,
+                   sensor.height);
+  self.stream->measurement.emplace(sensor);
 }
 
 /// Starts over with the same sensor, if it is known.
 static void start_over(Private& self) {
-  if (const auto& measurement = self.stream->measurement)
-    measure(self, measurement->width, measurement->height);
+  if (const auto& measurement = self.stream->measurement) measure(self, measurement->sensor);
 }
 
 /* events */
@@ -298,14 +296,13 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
   auto& self = priv_of(transform);
   auto& measurement = self.stream->measurement;
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, in)) return FALSE;
-  if (measurement && measurement->width == info.width && measurement->height == info.height)
-    return TRUE;
+  const auto sensor = sensor_of(in);
+  if (!sensor) return FALSE;
+  if (measurement && measurement->sensor == *sensor) return TRUE;
   // Each sensor size is measured separately.
   const bool is_measured = reported(self, [&] {
     if (measurement) conclude(self, {});
-    measure(self, info.width, info.height);
+    measure(self, *sensor);
   });
   return is_measured ? TRUE : FALSE;
 }

@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
-#include "gst/base/event_buffer.hpp"
 #include "gst/base/element.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "src/tensor/event_tensor.hpp"
 #include "src/tensor/window_queue.hpp"
 
