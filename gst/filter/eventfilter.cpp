@@ -67,7 +67,6 @@ EventFilter& gst_event_filter_impl(GstEventFilter* self) {
   return *priv_of(self).impl;
 }
 
-/// Runs `work`; reports any exception.
 template <class Work>
 static auto reported(gpointer self, const Work& work) {
   return catch_exceptions(
@@ -80,8 +79,6 @@ static auto reported(gpointer self, const Work& work) {
       },
       work);
 }
-
-/* events */
 
 /// Skips a buffer that cannot be filtered.
 static GstFlowReturn reject(gpointer self, GstBuffer* buffer) {
@@ -194,8 +191,6 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
 }
 
-/* negotiation, states */
-
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
   auto& priv = priv_of(transform);
   GstEventCameraInfo from;
@@ -230,8 +225,6 @@ static gboolean stop(GstBaseTransform* transform) {
   priv.stream.reset();
   return TRUE;
 }
-
-/* type */
 
 static GstStructure* stats_of(GObject* object) {
   const Counters counters = priv_of(object).counters.copy();

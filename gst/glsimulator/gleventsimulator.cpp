@@ -40,8 +40,6 @@ static gboolean query(GstBaseTransform* self, GstPadDirection direction, GstQuer
   return PARENT_TRANSFORM_CLASS->query(self, direction, query);
 }
 
-/* allocation */
-
 /// Proposes no pool, because upstream's textures may belong to another context.
 static gboolean propose_allocation(GstBaseTransform* self, GstQuery* decide, GstQuery* query) {
   gst_query_add_allocation_meta(query, GST_GL_SYNC_META_API_TYPE, nullptr);
@@ -82,8 +80,6 @@ static gboolean decide_allocation(GstBaseTransform* self, GstQuery* query) {
   }
   return PARENT_TRANSFORM_CLASS->decide_allocation(self, query);
 }
-
-/* type */
 
 static void finalize(GObject* object) {
   std::destroy_at(&context_of(object));

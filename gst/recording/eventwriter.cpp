@@ -281,7 +281,6 @@ class WrittenFile {
   std::uint64_t pauses_reported_ = 0;  ///< removed microseconds that a warning reported
 };
 
-/// User-settable values.
 struct Settings {
   EventWriterFormat::Choice choice;
   guint mtu = G_MAXUINT;
@@ -325,7 +324,6 @@ static const EventWriterFormat& format_of(GstEventWriter* self) {
   return *GST_EVENT_WRITER_GET_CLASS(self)->format;
 }
 
-/// Runs `work`; reports any exception.
 template <class Work>
 static GstFlowReturn reported(GstEventWriter* self, const Work& work) {
   return catch_exceptions(
@@ -335,8 +333,6 @@ static GstFlowReturn reported(GstEventWriter* self, const Work& work) {
       },
       work);
 }
-
-/* negotiation */
 
 /// Begins a file.
 static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, OwnedCaps caps) {
@@ -411,8 +407,6 @@ static gboolean sink_query(GstPad* pad, GstObject* parent, GstQuery* query) {
       return gst_pad_query_default(pad, parent, query);
   }
 }
-
-/* data */
 
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   auto* self = GST_EVENT_WRITER(parent);
@@ -499,8 +493,6 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   return gst_pad_event_default(pad, parent, event);
 }
 
-/* states */
-
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_writer_parent_class)->change_state(element, transition);
@@ -514,8 +506,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   }
   return result;
 }
-
-/* type */
 
 static EventWriterFormat::Choice default_choice(const EventWriterFormat& format) {
   EventWriterFormat::Choice choice;

@@ -240,7 +240,6 @@ Overrides read_profile(const std::string& path, GObjectClass* klass) {
   return overrides;
 }
 
-/// User-settable values.
 struct Settings {
   DvsPreset preset = DvsPreset::standard;
   std::string profile;

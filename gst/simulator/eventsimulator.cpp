@@ -38,8 +38,6 @@ void* event_simulator_settings(GObject* object) {
   return priv_of(object).method_settings.get();
 }
 
-/* negotiation */
-
 static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection direction,
                                GstCaps* caps, GstCaps* filter) {
   const SimulatorVideo& video = method_of(transform).video;
@@ -63,8 +61,6 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
     gst_base_transform_set_qos_enabled(transform, event_simulator_draws(out));
   return TRUE;
 }
-
-/* buffers */
 
 static gboolean propose_allocation(GstBaseTransform* transform, GstQuery* decide, GstQuery* query) {
   gst_query_add_allocation_meta(query, GST_VIDEO_META_API_TYPE,
@@ -126,8 +122,6 @@ GstFlowReturn event_simulator_prepare_buffer(GstBaseTransform* element, GstBuffe
                                              GstBuffer** out) {
   return PARENT_TRANSFORM_CLASS->prepare_output_buffer(element, in, out);
 }
-
-/* data, events, queries */
 
 /// Takes a frame, unless GstBaseTransform skips it for QoS: then the next interval is longer.
 static GstFlowReturn submit_input_buffer(GstBaseTransform* transform, gboolean is_discont,
@@ -263,8 +257,6 @@ static gboolean stop(GstBaseTransform* transform) {
   return TRUE;
 }
 
-/* properties */
-
 static Guarded<SimulatorSettings>& settings_of(GObject* object) {
   return simulation_of(object).settings;
 }
@@ -374,8 +366,6 @@ static void install_base_properties(GObjectClass* klass) {
                 "Counters since start: frames (processed), skipped-frames (due to qos), "
                 "repeated-frames (by upstream), processing-time (of all processed frames, ns)");
 }
-
-/* type */
 
 /// Makes the method's settings here, because the method is not yet known in init.
 static void constructed(GObject* object) {

@@ -184,8 +184,6 @@ static std::vector<FoundDevice> find_video_devices() {
 
 #define DEVICE_CLASS "EventCamera/Source"
 
-/* devices */
-
 G_DECLARE_FINAL_TYPE(GstEventCameraDevice, gst_event_camera_device, GST, EVENT_CAMERA_DEVICE,
                      GstDevice)
 
@@ -266,8 +264,6 @@ static GstDevice* device_of(const FoundDevice& found, const EventCamera& camera)
   if (camera.is_grey) device->elements = g_strdup(elements_of(found, camera).c_str());
   return GST_DEVICE(device);
 }
-
-/* provider */
 
 G_DECLARE_FINAL_TYPE(GstEventCameraProvider, gst_event_camera_provider, GST, EVENT_CAMERA_PROVIDER,
                      GstDeviceProvider)

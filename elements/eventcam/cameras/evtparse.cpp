@@ -148,7 +148,6 @@ constexpr int max_words_side = 2048;
 /// Value of `format`: as in the caps.
 constexpr int format_of_caps = -1;
 
-/// User-settable values.
 struct Settings {
   int format = format_of_caps;
   int width = 0;
@@ -223,8 +222,6 @@ struct Private : ElementPads {
 DEFINE_EVENT_ELEMENT(GstEvtParse, gst_evt_parse, EVT_PARSE, GstElement, GST_TYPE_ELEMENT, evtparse,
                      GST_RANK_NONE, "words of live event cameras")
 
-/* negotiation */
-
 static Input input_of(const GstCaps* caps) {
   const GstStructure* const structure = gst_caps_get_structure(caps, 0);
   const char* const format = gst_structure_get_string(structure, "format");
@@ -276,8 +273,6 @@ static bool start_stream(Private& self) {
     gst_pad_push_event(self.src, gst_event_new_caps(caps.get()));
   });
 }
-
-/* output */
 
 /// Pushes a segment before data of an interval, unless the last segment is still valid. Data before
 /// running time 0, as in a first transfer, is late: the next data corrects the mapping.
@@ -465,8 +460,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) self.stream.reset();
   return result;
 }
-
-/* type */
 
 static void gst_evt_parse_init(GstEvtParse* self) {
   self->priv = new Private(GST_ELEMENT(self), chain, sink_event);

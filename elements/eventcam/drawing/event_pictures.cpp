@@ -23,8 +23,6 @@ EventPictures::EventPictures(GstAggregator* element, GstDebugCategory* category)
       category_(category),
       warn_of_pause_(category) {}
 
-/* events */
-
 /// Adds the events of a buffer up to `end`, or all if there is none. Returns true if these were
 /// all.
 bool EventPictures::add_events(const MappedEvents& mapped, const EventInterval& interval,
@@ -144,8 +142,6 @@ GstClockTime EventPictures::next_time() {
   return waiting_since_ ? *waiting_since_ + max_wait : GST_CLOCK_TIME_NONE;
 }
 
-/* pictures */
-
 /// Skips a picture that sinks would drop anyway.
 void EventPictures::skip(const EventInterval& picture, GstClockTime running_time,
                          GstClockTimeDiff lateness) {
@@ -232,8 +228,6 @@ void EventPictures::drain() {
   if (has_begun_picture()) push_next_picture();
 }
 
-/* negotiation */
-
 GstFlowReturn EventPictures::choose_caps(GstCaps* downstream, GstCaps** result) const {
   if (!state_) return GST_AGGREGATOR_FLOW_NEED_DATA;
   GstCaps* ours = gst_pad_get_pad_template_caps(GST_AGGREGATOR_SRC_PAD(element()));
@@ -278,8 +272,6 @@ bool EventPictures::handle_caps(GstAggregatorPad*, GstCaps* caps) {
   gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
   return true;
 }
-
-/* segments, states */
 
 void EventPictures::handle_segment(const GstSegment& segment) {
   if (continues(segment_of(main_pad()), segment)) return;

@@ -82,8 +82,6 @@ DEFINE_EVENT_ELEMENT(GstAedatMux, gst_aedat_mux, AEDAT_MUX, GstAggregator, GST_T
 
 constexpr const char* any_pad = "sink_%u";
 
-/* input */
-
 enum class Kind { events, video, unknown };
 
 static Kind kind_of(const GstCaps* caps) {
@@ -152,8 +150,6 @@ static Pad earliest_pad(Private& self, GstClockTime* time) {
   }
   return earliest;
 }
-
-/* output */
 
 /// Pushes `bytes` downstream.
 static GstFlowReturn push_bytes(Private& self, AedatFile::Bytes bytes, bool header = false) {
@@ -301,7 +297,6 @@ static GstFlowReturn write_some(Private& self) {
   return result == GST_FLOW_OK ? GST_FLOW_EOS : result;
 }
 
-/// Runs `work`; reports any exception.
 template <class Work>
 static GstFlowReturn reported(Private& self, const Work& work) {
   return catch_exceptions(
@@ -328,8 +323,6 @@ static GstClockTime get_next_time(GstAggregator* aggregator) {
   });
   return time;
 }
-
-/* events, queries, pads */
 
 static bool handle_caps(Private& self, GstAggregatorPad* pad, const GstCaps* caps) {
   auto& file = self.file;
@@ -469,8 +462,6 @@ static GstFlowReturn flush(GstAggregator* aggregator) {
   self.segment.reset();
   return GST_FLOW_OK;
 }
-
-/* type */
 
 static void gst_aedat_mux_init(GstAedatMux* self) {
   self->priv = new Private(GST_ELEMENT(self));

@@ -75,8 +75,6 @@ DEFINE_EVENT_ELEMENT(GstEventHdf5Sink, gst_event_hdf5_sink, EVENT_HDF5_SINK, Gst
                      GST_TYPE_BASE_SINK, eventhdf5sink, GST_RANK_NONE,
                      "writer of HDF5 files of events")
 
-/* the file */
-
 static bool is_full(const std::exception& error) {
   const auto* const failed = dynamic_cast<const std::system_error*>(&error);
   const int code = failed != nullptr ? failed->code().value() : 0;
@@ -145,8 +143,6 @@ static gboolean set_caps(GstBaseSink* sink, GstCaps* caps) {
   return begin_file(self, *sensor);
 }
 
-/* data */
-
 static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
   auto& self = priv_of(sink);
   State& state = self.state;
@@ -203,8 +199,6 @@ static gboolean event(GstBaseSink* sink, GstEvent* event) {
   return GST_BASE_SINK_CLASS(gst_event_hdf5_sink_parent_class)->event(sink, event);
 }
 
-/* states */
-
 /// GstBaseSink's start and stop are of READY, in which the properties may still be set.
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
   auto& self = priv_of(element);
@@ -221,8 +215,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   }
   return result;
 }
-
-/* type */
 
 static void gst_event_hdf5_sink_init(GstEventHdf5Sink* self) {
   self->priv = new Private(GST_ELEMENT(self));

@@ -62,7 +62,6 @@ constexpr GstClockTime max_latency = GST_SECOND;
 
 enum class Edge { rising, falling, both };
 
-/// User-settable values.
 struct Settings {
   Edge edge = Edge::rising;
   gint64 input = -1;
@@ -112,13 +111,10 @@ DEFINE_EVENT_ELEMENT(GstEventCut, gst_event_cut, EVENT_CUT, GstBaseTransform,
                      GST_TYPE_BASE_TRANSFORM, eventcut, GST_RANK_NONE, "windows between triggers")
 #define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_cut_parent_class)
 
-/// Runs `work`; reports any exception.
 template <class Work>
 static auto reported(Private& self, const Work& work) {
   return catch_exceptions(self.element, events_report("cut"), work);
 }
-
-/* windows */
 
 /// Drops the window, and waits for the trigger that starts the next one.
 static void start_over(Private& self) {
@@ -264,8 +260,6 @@ static GstFlowReturn submit_input_buffer(GstBaseTransform* transform, gboolean, 
   });
 }
 
-/* events, queries */
-
 /// Passes a GAP as an interval without events.
 static bool handle_gap(Private& self, GstEvent* event) {
   GstClockTime start = 0;
@@ -331,8 +325,6 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
   return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 }
 
-/* negotiation, states */
-
 /// Windows have no framerate.
 static GstCaps* transform_caps(GstBaseTransform*, GstPadDirection direction, GstCaps* caps,
                                GstCaps* filter) {
@@ -367,8 +359,6 @@ static gboolean stop(GstBaseTransform* transform) {
   *priv_of(transform).latency.lock() = 0;
   return TRUE;
 }
-
-/* type */
 
 static GstStructure* stats_of(GObject* object) {
   const Counters counters = priv_of(object).counters.copy();

@@ -46,7 +46,6 @@ using namespace eventcamera;
 
 namespace {
 
-/// User-settable values.
 struct Settings : HotPixelFilter::Settings {
   std::string location;
 };

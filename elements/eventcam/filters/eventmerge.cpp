@@ -393,8 +393,6 @@ class EventMerge final : public EventAggregator {
 
 }  // namespace
 
-/* type */
-
 G_DECLARE_FINAL_TYPE(GstEventMerge, gst_event_merge, GST, EVENT_MERGE, GstEventAggregator)
 
 struct _GstEventMerge {

@@ -77,8 +77,6 @@ GstClockTime MergedTimeline::timestamp_at(gint64 stream_time) const {
   return static_cast<GstClockTime>(zero) + static_cast<GstClockTime>(stream_time);
 }
 
-/* segments */
-
 GstSegment MergedTimeline::longest_segment(const OwnedAggregatorPad& of,
                                            std::span<const OwnedAggregatorPad> pads) {
   GstSegment segment = segment_of(of.get());
@@ -104,8 +102,6 @@ GstSegment MergedTimeline::segment(const OwnedAggregatorPad& first,
   return segment;
 }
 
-/* seeks */
-
 /// Replaces the next seek with `seek` if they have the same sequence number.
 static GstPadProbeReturn replace_seek(GstPad*, GstPadProbeInfo* info, gpointer seek) {
   GstEvent* const next = GST_PAD_PROBE_INFO_EVENT(info);
@@ -130,8 +126,6 @@ void MergedTimeline::seek(const SeekRequest& request) {
         +[](gpointer event) { gst_event_unref(GST_EVENT(event)); });
   });
 }
-
-/* queries */
 
 /// Duration up to the end of the last stream; none if no end is known.
 std::optional<gint64> MergedTimeline::duration() const {

@@ -57,7 +57,6 @@ using namespace eventcamera;
 
 namespace {
 
-/// User-settable values.
 struct Settings : ReportFiles {
   GstClockTime interval = GST_SECOND;
 };
@@ -117,13 +116,10 @@ DEFINE_EVENT_ELEMENT(GstEventStats, gst_event_stats, EVENT_STATS, GstBaseTransfo
                      "statistics of event streams")
 #define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_stats_parent_class)
 
-/// Runs `work`; reports any exception.
 template <class Work>
 static auto reported(Private& self, const Work& work) {
   return catch_exceptions(self.element, events_report("count"), work);
 }
-
-/* figures */
 
 static GstStructure* figures_of(const Part& part, Nanoseconds end, bool cumulative) {
   const Nanoseconds start = part.start.value_or(end);
@@ -168,8 +164,6 @@ static void measure(Private& self, SensorSize sensor) {
 static void start_over(Private& self) {
   if (const auto& measurement = self.stream->measurement) measure(self, measurement->sensor);
 }
-
-/* events */
 
 /// Adds an interval. Gaps between intervals count as time without events; if time goes backwards,
 /// no inter-event interval spans the discontinuity.
@@ -291,8 +285,6 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
 }
 
-/* negotiation, states */
-
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
   auto& self = priv_of(transform);
   auto& measurement = self.stream->measurement;
@@ -319,8 +311,6 @@ static gboolean stop(GstBaseTransform* transform) {
   self.stream.reset();
   return TRUE;
 }
-
-/* type */
 
 static void gst_event_stats_init(GstEventStats* self) {
   self->priv = new Private(GST_BASE_TRANSFORM(self));

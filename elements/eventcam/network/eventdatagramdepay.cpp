@@ -115,7 +115,6 @@ struct State {
   bool has_caps = false;
 };
 
-/// User-settable values.
 struct Settings : DatagramSettings {
   GstClockTime latency = 10 * GST_MSECOND;
 };
@@ -142,8 +141,6 @@ struct Private : ElementPads {
 DEFINE_EVENT_ELEMENT(GstEventDatagramDepay, gst_event_datagram_depay, EVENT_DATAGRAM_DEPAY,
                      GstElement, GST_TYPE_ELEMENT, eventdatagramdepay, GST_RANK_NONE,
                      "datagrams of events from other tools")
-
-/* output */
 
 static bool push_caps(Private& self) {
   auto& state = *self.stream->state;
@@ -191,8 +188,6 @@ static GstFlowReturn push(Private& self, const Reception& reception, GstClockTim
   stamp(buffer, interval, state.is_discontinuous);
   return gst_pad_push(self.src, buffer);
 }
-
-/* data */
 
 static void reject(Private& self, const char* fault, gsize size, GstClockTime arrival) {
   gchar* cause = g_strdup_printf("%" G_GSIZE_FORMAT " bytes at running time %" GST_TIME_FORMAT,
@@ -332,8 +327,6 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   return gst_pad_event_default(pad, parent, event);
 }
 
-/* states */
-
 static bool start(Private& self) {
   const auto settings = self.settings.copy();
   *self.counts.lock() = {};
@@ -355,8 +348,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) self.stream.reset();
   return result;
 }
-
-/* type */
 
 static void gst_event_datagram_depay_init(GstEventDatagramDepay* self) {
   self->priv = new Private(GST_ELEMENT(self), chain, sink_event);

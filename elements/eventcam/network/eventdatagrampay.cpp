@@ -51,7 +51,6 @@ using namespace eventcamera;
 
 namespace {
 
-/// User-settable values.
 struct Settings : DatagramSettings, PayloaderSettings {};
 
 /// State from start to stop.
@@ -78,8 +77,6 @@ struct Private : ElementPads {
 DEFINE_EVENT_ELEMENT(GstEventDatagramPay, gst_event_datagram_pay, EVENT_DATAGRAM_PAY, GstElement,
                      GST_TYPE_ELEMENT, eventdatagrampay, GST_RANK_NONE,
                      "datagrams of events for other tools")
-
-/* datagrams */
 
 static Report report_of(const std::exception& error) {
   if (is_a<std::invalid_argument>(error))
@@ -165,8 +162,6 @@ static bool is_flush_due(Private& self, const EventInterval& interval) {
   const auto next = interval.end + (interval.end - interval.start);
   return next >= nanoseconds(*since) + self.settings.copy().max_latency;
 }
-
-/* data */
 
 /// Collects the events of a buffer.
 static void collect(Private& self, GstBuffer* buffer, const MappedEvents& mapped) {
@@ -272,8 +267,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   }
   return result;
 }
-
-/* type */
 
 static void gst_event_datagram_pay_init(GstEventDatagramPay* self) {
   self->priv = new Private(GST_ELEMENT(self), chain, sink_event);

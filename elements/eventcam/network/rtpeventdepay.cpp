@@ -114,8 +114,6 @@ DEFINE_EVENT_ELEMENT(GstRtpEventDepay, gst_rtp_event_depay, RTP_EVENT_DEPAY, Gst
                      "RTP depayloader of events")
 #define PARENT_DEPAYLOAD_CLASS GST_RTP_BASE_DEPAYLOAD_CLASS(gst_rtp_event_depay_parent_class)
 
-/* output */
-
 /// Maps the sender's time `start` to the running time of its packet, unless the segment already
 /// does.
 static void update_segment(Private& self, GstClockTime start, GstClockTime arrival) {
@@ -162,8 +160,6 @@ static void flush(Private& self) {
       state->unpacker.flush([&](const RtpInterval& interval) { push(self, interval); });
   });
 }
-
-/* input */
 
 static RtpPacket packet_of(GstRTPBuffer* rtp) {
   return {
@@ -254,8 +250,6 @@ static gboolean packet_lost(GstRTPBaseDepayload*, GstEvent*) {
   return TRUE;
 }
 
-/* negotiation, states */
-
 /// Value of a parameter, an integer or a string from SDP, within 1 ... max_side.
 static std::optional<int> side_of(const GstStructure* caps, const char* name) {
   int side = 0;
@@ -320,8 +314,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) self.stream.reset();
   return result;
 }
-
-/* type */
 
 static GstStructure* stats_of(GObject* object) {
   GstStructure* stats = base_rtp_stats(object, GST_TYPE_RTP_BASE_DEPAYLOAD);

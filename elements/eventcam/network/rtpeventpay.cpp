@@ -112,7 +112,6 @@ class RtpHeaderExtensions {
   gsize size_ = 0;
 };
 
-/// User-settable values.
 struct Settings : PayloaderSettings {
   RtpEventFormat format = RtpEventFormat::evt3;
 };
@@ -160,8 +159,6 @@ DEFINE_EVENT_ELEMENT(GstRtpEventPay, gst_rtp_event_pay, RTP_EVENT_PAY, GstRTPBas
                      GST_TYPE_RTP_BASE_PAYLOAD, rtpeventpay, GST_RANK_SECONDARY,
                      "RTP payloader of events")
 #define PARENT_PAYLOAD_CLASS GST_RTP_BASE_PAYLOAD_CLASS(gst_rtp_event_pay_parent_class)
-
-/* packets */
 
 /// Maximum size of the RTP header, with the CSRCs and header extensions that the base class writes.
 static gsize max_header_size(Private& self) {
@@ -273,8 +270,6 @@ static InvalidEvents add_interval(Private& self, EventInterval interval,
   return rejected;
 }
 
-/* streaming */
-
 static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* received) {
   auto& self = priv_of(payload);
   const OwnedBuffer buffer(received);
@@ -346,8 +341,6 @@ static GstClockTime latency_of(gpointer element) {
   return priv_of(element).settings.copy().max_latency;
 }
 
-/* negotiation, states */
-
 static gboolean set_caps(GstRTPBasePayload* payload, GstCaps* caps) {
   auto& self = priv_of(payload);
   const auto sensor = sensor_of(caps);
@@ -385,8 +378,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   }
   return result;
 }
-
-/* type */
 
 static GstStructure* stats_of(GObject* object) {
   GstStructure* stats = base_rtp_stats(object, GST_TYPE_RTP_BASE_PAYLOAD);

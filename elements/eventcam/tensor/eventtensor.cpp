@@ -136,8 +136,6 @@ static GstClockTime max_pause_of(const State& state) {
   return std::max(duration, std::min(max_pause, max_windows * duration));
 }
 
-/* tensors */
-
 static GstFlowReturn push_tensor(Private& self, const WindowQueue::Window& window) {
   auto& tensor = self.stream->state->tensor;
   OwnedBuffer buffer;
@@ -210,8 +208,6 @@ static GstFlowReturn add(Private& self, std::span<const Event> events, Microseco
   return GST_FLOW_OK;
 }
 
-/* data */
-
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
   auto& self = priv_of(parent);
   const OwnedBuffer buffer(received);
@@ -254,8 +250,6 @@ static bool handle_gap(Private& self, GstEvent* event) {
   });
   return true;
 }
-
-/* negotiation */
 
 /// Returns true if downstream accepts the caps; otherwise posts an error message.
 static bool post_unless_accepted(Private& self, GstCaps* caps) {
@@ -344,8 +338,6 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   return gst_pad_event_default(pad, parent, event);
 }
 
-/* states */
-
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
   auto& self = priv_of(element);
   const GstStateChangeReturn result =
@@ -356,8 +348,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   }
   return result;
 }
-
-/* type */
 
 static void gst_event_tensor_init(GstEventTensor* self) {
   self->priv = new Private(GST_ELEMENT(self), chain, sink_event);
