@@ -30,20 +30,29 @@
  * Since: 0.1
  */
 #include <gst/base/gstaggregator.h>
+#include <gst/video/video.h>
 
 #include <algorithm>
 #include <atomic>
+#include <memory>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
-#include "elements/eventcam/files/aedat_file.hpp"
 #include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element.hpp"
+#include "gst/base/video_frame.hpp"
 #include "gst/recording/file_extensions.hpp"
+#include "gst/recording/frame_buffer.hpp"
+#include "gst/recording/sensor_events.hpp"
+#include "gst/recording/writable_events.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
+#include "src/formats/waiting_items.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(aedat_mux_debug);
 #define GST_CAT_DEFAULT aedat_mux_debug
@@ -52,6 +61,195 @@ using namespace eventcamera;
 
 namespace {
 
+/// An AEDAT 4 file that is being written: knows its streams, and makes its bytes.
+class AedatFile {
+ public:
+  using Bytes = std::vector<guint8>;
+
+  explicit AedatFile(GstElement* element)
+      : writable(element, GST_CAT_DEFAULT, GST_STREAM_ERROR_MUX), element_(element) {}
+
+  /// Sets the sensor of the events. False, after an error message, if the file has another sensor.
+  bool handle_sensor(SensorSize size) {
+    if (encoder_ && !writable.accepts(size)) return false;
+    size_ = size;
+    return true;
+  }
+
+  void set_video(const GstVideoInfo& video) { video_ = video; }
+  /// Sets the name of the camera.
+  void set_source(const gchar* name) { source_ = name; }
+  /// Queues the triggers or IMU samples of an event for the next buffer. False for other events.
+  bool handle_items(GstEvent* event) {
+    return queue(triggers_of(event), triggers_) || queue(imu_samples_of(event), imu_samples_);
+  }
+
+  /// True if too many items wait to wait any longer.
+  bool is_full() const {
+    const auto is_full = [](const auto& waiting) { return waiting && waiting->is_full(); };
+    return is_full(triggers_) || is_full(imu_samples_);
+  }
+
+  bool has_sensor() const { return size_ != SensorSize{}; }
+  bool has_video() const { return video_.has_value(); }
+  bool has_begun() const { return encoder_ != nullptr; }
+
+  /// Returns the header. `settings` has the compression, and whether there are frames and a table.
+  Bytes begin(Aedat4Settings settings) {
+    settings.size = size_;
+    if (!has_sensor() && video_)
+      settings.size = {GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)};
+    settings.source = source_;
+    settings.triggers = triggers_.has_value();
+    settings.imu_samples = imu_samples_.has_value();
+    writable.begin_file(size_);
+    GST_DEBUG_OBJECT(element_, "beginning a file of %dx%d pixels%s%s%s, %s a table of packets",
+                     settings.size.width, settings.size.height, settings.frames ? ", frames" : "",
+                     settings.triggers ? ", triggers" : "",
+                     settings.imu_samples ? ", IMU samples" : "",
+                     settings.table ? "with" : "without");
+    encoder_ = std::make_unique<Aedat4Encoder>(settings);
+    Bytes header;
+    encoder_->flush(header);
+    return header;
+  }
+
+  /// Encodes the items that wait.
+  Bytes write_items() {
+    Bytes out;
+    const auto triggers = encode(triggers_, "triggers", out);
+    const auto imu_samples = encode(imu_samples_, "IMU samples", out);
+    const auto written = writable.written().lock();
+    written->triggers += triggers;
+    written->imu_samples += imu_samples;
+    return out;
+  }
+
+  /// Encodes the items that wait and a buffer of time `t`: events, a frame, or neither if empty.
+  Bytes write(GstBuffer* buffer, Microseconds t, bool has_events) {
+    Bytes out = write_items();
+    if (gst_buffer_get_size(buffer) > 0)
+      has_events ? write_events(buffer, out) : write_frame(buffer, t, out);
+    if (t - flushed_ >= max_wait) {
+      flushed_ = t;
+      encoder_->flush(out);
+    }
+    return out;
+  }
+
+  /// Ends incomplete packets.
+  Bytes flush() {
+    Bytes out = write_items();
+    encoder_->flush(out);
+    return out;
+  }
+
+  /// Returns the end of the file.
+  Bytes finish() {
+    writable.end_file();
+    Bytes bytes = write_items();
+    encoder_->finish(bytes);
+    return bytes;
+  }
+
+  /// Bytes of the header to overwrite after finish().
+  std::optional<FilePatch> patch() { return encoder_->patch(); }
+
+  /// Warns about skipped input.
+  void warn_skipped(const char* what, const std::string& cause) {
+    warn_(element_, {GST_STREAM_ERROR_MUX, std::string("Dropped ") + what + "."}, cause);
+  }
+
+  /// Starts a new file of the same streams.
+  void start_over() {
+    encoder_.reset();
+    triggers_.reset();
+    imu_samples_.reset();
+    flushed_ = 0;
+    warn_.reset();
+  }
+
+  /// Forgets the streams, too.
+  void reset() {
+    if (encoder_) writable.end_file();
+    start_over();
+    size_ = {};
+    video_.reset();
+    source_.clear();
+  }
+
+  WritableEvents writable;
+
+ private:
+  /// Maximum time that events wait to be written as a packet.
+  static constexpr Microseconds max_wait = 100'000;
+
+  /// Items that wait for the next buffer. Set once they are announced, so that the header has a
+  /// stream for them.
+  template <class Item>
+  using Waiting = std::optional<WaitingItems<Item>>;
+
+  template <class Item>
+  bool queue(std::optional<std::vector<Item>>&& items, Waiting<Item>& waiting) {
+    if (!items) return false;
+    if (!waiting) waiting.emplace();
+    waiting->push(*items);
+    return true;
+  }
+
+  /// Encodes the waiting items of a stream, and returns how many were written.
+  template <class Item>
+  std::size_t encode(Waiting<Item>& waiting, const char* name, Bytes& out) {
+    const std::span<const Item> items =
+        waiting ? waiting->pop_before(after_all_items) : std::span<Item>();
+    const auto count = encoder_->encode(items, out);
+    if (!items.empty())
+      GST_LOG_OBJECT(element_, "wrote %" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT " %s", count,
+                     items.size(), name);
+    return count;
+  }
+
+  void write_events(GstBuffer* buffer, Bytes& out) {
+    const MappedEvents mapped(buffer);
+    if (!mapped)
+      return warn_skipped("a buffer with a partial event",
+                          std::to_string(gst_buffer_get_size(buffer)) + " bytes");
+    GST_LOG_OBJECT(element_, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+                   mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
+    encoder_->encode(writable.pick(mapped.events(), writable.time_of(GST_BUFFER_PTS(buffer))), out);
+  }
+
+  void write_frame(GstBuffer* buffer, Microseconds t, Bytes& out) {
+    GST_LOG_OBJECT(element_, "frame at %" G_GINT64_FORMAT " us", gint64{t});
+    const auto reject = [&](const char* cause) {
+      warn_skipped("a frame that does not fit into the file",
+                   std::string(cause) + ", at " + std::to_string(t) + " us");
+    };
+    if (!video_) return reject("no caps");
+    const VideoFrame video(*video_, buffer, GST_MAP_READ);
+    if (!video) return reject(video.fault().c_str());
+    const auto frame = recorded_frame(video.get(), t);
+    try {
+      encoder_->encode(frame, out);
+      ++writable.written().lock()->frames;
+    } catch (const std::invalid_argument& error) {
+      reject(error.what());
+    }
+  }
+
+  GstElement* element_;
+  WarnOnce warn_{GST_CAT_DEFAULT};
+
+  SensorSize size_;  ///< of the event stream
+  std::optional<GstVideoInfo> video_;
+  std::string source_;
+  Waiting<Trigger> triggers_;
+  Waiting<ImuSample> imu_samples_;
+
+  std::unique_ptr<Aedat4Encoder> encoder_;  ///< null until the header is written
+  Microseconds flushed_ = 0;                ///< time of the last flushed packet
+};
+
 struct Settings {
   Aedat4Compression compression = Aedat4Compression::lz4;
 };
@@ -59,7 +257,7 @@ struct Settings {
 using Pad = OwnedAggregatorPad;
 
 struct Private {
-  explicit Private(GstElement* of) : element(of), file(of, GST_CAT_DEFAULT) {}
+  explicit Private(GstElement* of) : element(of), file(of) {}
 
   GstElement* const element;
   Guarded<Settings> settings;
@@ -111,25 +309,13 @@ static std::optional<GstSegment> segment_of(GstAggregatorPad* pad) {
   return segment;
 }
 
-/// Running time of a buffer; GST_CLOCK_TIME_NONE if it has none.
-static GstClockTime running_time(GstAggregatorPad* pad, GstBuffer* buffer) {
-  const auto segment = segment_of(pad);
-  if (!segment) return GST_CLOCK_TIME_NONE;
-  return gst_segment_to_running_time(&*segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
-}
-
-/// True if a buffer stands for a gap.
-static bool is_silent(GstBuffer* buffer) {
-  return gst_buffer_get_size(buffer) == 0;
-}
-
 /// Running time at which a buffer is written: its start, or the end of a gap, until
 /// which its pad has nothing to wait for.
 static GstClockTime due_time(GstAggregatorPad* pad, GstBuffer* buffer) {
   const auto segment = segment_of(pad);
   GstClockTime time = GST_BUFFER_PTS(buffer);
   if (!segment || time > segment->stop) return 0;
-  if (is_silent(buffer) && GST_BUFFER_DURATION_IS_VALID(buffer))
+  if (gst_buffer_get_size(buffer) == 0 && GST_BUFFER_DURATION_IS_VALID(buffer))
     time += std::min(GST_BUFFER_DURATION(buffer), segment->stop - time);
   const auto running = gst_segment_to_running_time(&*segment, GST_FORMAT_TIME, time);
   return GST_CLOCK_TIME_IS_VALID(running) ? running : 0;
@@ -151,7 +337,6 @@ static Pad earliest_pad(Private& self, GstClockTime* time) {
   return earliest;
 }
 
-/// Pushes `bytes` downstream.
 static GstFlowReturn push_bytes(Private& self, AedatFile::Bytes bytes, bool header = false) {
   if (bytes.empty()) return GST_FLOW_OK;
   GstBuffer* const buffer = owning_buffer(std::move(bytes));
@@ -217,7 +402,7 @@ static Microseconds frame_time(Private& self, GstBuffer* frame, GstClockTime run
   if (segment &&
       gst_segment_position_from_running_time_full(&*segment, GST_FORMAT_TIME, running, &time) < 0)
     time = 0;  // timestamps are not negative
-  return self.file.time_of(time);
+  return self.file.writable.time_of(time);
 }
 
 /// Writes the earliest buffer.
@@ -228,16 +413,19 @@ static GstFlowReturn write_next(Private& self) {
   if (!pad) return GST_AGGREGATOR_FLOW_NEED_DATA;
   const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pad.get()));
   if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
-  const GstClockTime running = running_time(pad.get(), buffer.get());
+  const auto segment = segment_of(pad.get());
+  const GstClockTime running = segment ? gst_segment_to_running_time(&*segment, GST_FORMAT_TIME,
+                                                                     GST_BUFFER_PTS(buffer.get()))
+                                       : GST_CLOCK_TIME_NONE;
   if (!GST_CLOCK_TIME_IS_VALID(running)) {
     file.warn_skipped("a buffer without a timestamp, or outside its segment",
                       "pad " + std::string(GST_PAD_NAME(pad.get())) + ", no running time");
     return GST_FLOW_OK;
   }
   const bool of_events = kind_of(pad.get()) == Kind::events;
-  const Microseconds t = of_events ? file.time_of(GST_BUFFER_PTS(buffer.get()))
+  const Microseconds t = of_events ? file.writable.time_of(GST_BUFFER_PTS(buffer.get()))
                                    : frame_time(self, buffer.get(), running);
-  if (of_events) self.segment = segment_of(pad.get());
+  if (of_events) self.segment = segment;
   return push_bytes(self, file.write(buffer.get(), t, of_events));
 }
 
@@ -371,7 +559,7 @@ static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, Gst
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT) {
     if (!plays_forwards(self.element, event, "write")) return FALSE;
     if (kind_of(pad) == Kind::events)
-      file.begin_segment(segment_of(event), is_simulated(GST_PAD(pad)));
+      file.writable.begin_segment(segment_of(event), is_simulated(GST_PAD(pad)));
   }
   if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
     GstCaps* const caps = caps_of(event);
@@ -481,7 +669,7 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
            {Aedat4Compression::zstd, "Zstandard", "zstd"},
            {Aedat4Compression::zstd_high, "Zstandard, the smallest", "zstd-high"}}));
   install_stats(
-      object_class, [](GObject* object) { return priv_of(object).file.stats(); },
+      object_class, [](GObject* object) { return priv_of(object).file.writable.stats(); },
       WritableEvents::stats_blurb);
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
