@@ -150,7 +150,7 @@ struct ReaderSettings {
 };
 
 class EventReader;
-static EventReader& event_reader_of(GstObject* element);
+static EventReader& reader_of(gpointer element);
 
 /// Implementation of the element: gets the bytes of a recording from its sink pad, and passes what
 /// they contain to its output. Except where noted, functions run under the sink pad's stream lock,
@@ -164,25 +164,25 @@ class EventReader {
         timeline_(sink_),
         reports_(element, format.has_many_streams),
         output_(
-            element, sink_, format, format_settings_, timeline_,
+            element, sink_, format, format_settings, timeline_,
             +[](GstPad* pad, GstObject* parent, GstEvent* event) {
-              return event_reader_of(parent).src_event(pad, event);
+              return reader_of(parent).src_event(pad, event);
             },
             +[](GstPad* pad, GstObject* parent, GstQuery* query) {
-              return event_reader_of(parent).src_query(pad, query);
+              return reader_of(parent).src_query(pad, query);
             }) {
     gst_pad_set_activate_function(sink_, choose_mode);
     gst_pad_set_activatemode_function(
         sink_, +[](GstPad*, GstObject* parent, GstPadMode mode, gboolean active) {
-          return event_reader_of(parent).activate(mode, active != FALSE);
+          return reader_of(parent).activate(mode, active != FALSE);
         });
     gst_pad_set_chain_function(
         sink_, +[](GstPad*, GstObject* parent, GstBuffer* buffer) {
-          return event_reader_of(parent).chain(buffer);
+          return reader_of(parent).chain(buffer);
         });
     gst_pad_set_event_function(
         sink_, +[](GstPad*, GstObject* parent, GstEvent* event) {
-          return event_reader_of(parent).sink_event(event);
+          return reader_of(parent).sink_event(event);
         });
   }
 
@@ -190,8 +190,8 @@ class EventReader {
   EventReader& operator=(const EventReader&) = delete;
 
   // From any thread.
-  Guarded<ReaderSettings>& settings() { return settings_; }
-  Guarded<FormatSettings>& format_settings() { return format_settings_; }
+  Guarded<ReaderSettings> settings;
+  Guarded<FormatSettings> format_settings;
   GstStructure* stats() const { return reports_.stats(); }
 
   gboolean src_event(GstPad* pad, GstEvent* event) {
@@ -204,7 +204,7 @@ class EventReader {
 
   gboolean src_query(GstPad* pad, GstQuery* query) {
     if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-      return answer_latency(sink_, query, settings_.copy().buffer_duration) ||
+      return answer_latency(sink_, query, settings.copy().buffer_duration) ||
              gst_pad_query_default(pad, GST_OBJECT(element_), query);
     if (timeline_.is_timed()) return gst_pad_query_default(pad, GST_OBJECT(element_), query);
     return timeline_.answer(pad, query);
@@ -250,7 +250,6 @@ class EventReader {
         drain();  // into the stream that ends here, before the new one
         if (recording_ && timeline_.is_timed()) recording_->interrupt();
         output_.start_stream(event);
-        gst_event_unref(event);
         return TRUE;
       case GST_EVENT_CAPS:
         return handle_caps(event);
@@ -299,12 +298,12 @@ class EventReader {
   /// Creates the recording, to read a file from its start or a stream of words.
   void open_recording() {
     const std::shared_ptr<GstCaps> caps(caps_ ? gst_caps_copy(caps_.get()) : nullptr, unref_caps);
-    auto make = [make_decoder = format_.make_decoder, caps, settings = format_settings_.copy()] {
+    auto make = [make_decoder = format_.make_decoder, caps, settings = format_settings.copy()] {
       return make_decoder(caps.get(), settings);
     };
     close_recording();
     const bool is_timed = timeline_.is_timed();
-    const auto length = microseconds(settings_.copy().buffer_duration);
+    const auto length = microseconds(settings.copy().buffer_duration);
     recording_ = std::make_shared<RecordingReader>(
         make, length, is_timed ? RecordingReader::Clock::stream : RecordingReader::Clock::file);
     if (decompressed_)
@@ -652,9 +651,6 @@ class EventReader {
   GstElement* element_;
   GstPad* sink_;
   const EventReaderFormat& format_;
-  Guarded<ReaderSettings> settings_;
-  Guarded<FormatSettings> format_settings_;
-
   ReaderTimeline timeline_;
   ReaderReports reports_;
   ReaderOutput output_;
@@ -667,9 +663,7 @@ class EventReader {
   GstFlowReturn flow_ = GST_FLOW_OK;  ///< anything else refuses pushed bytes
 };
 
-struct GstEventReaderPrivate {
-  EventReader* reader;
-};
+using GstEventReaderPrivate = EventReader*;
 
 #define GST_TYPE_EVENT_READER (gst_event_reader_get_type())
 G_DECLARE_DERIVABLE_TYPE(GstEventReader, gst_event_reader, GST, EVENT_READER, GstElement)
@@ -684,40 +678,39 @@ G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventReader, gst_event_reader, GST_TYPE_ELEM
                                      GST_DEBUG_CATEGORY_INIT(event_reader_debug, "eventreader", 0,
                                                              "readers of recordings"))
 
-static EventReader*& reader_of(GObject* object) {
-  return static_cast<GstEventReaderPrivate*>(
-             gst_event_reader_get_instance_private(GST_EVENT_READER(object)))
-      ->reader;
+static EventReader*& priv_of(gpointer element) {
+  return *static_cast<EventReader**>(
+      gst_event_reader_get_instance_private(GST_EVENT_READER(element)));
 }
 
-static EventReader& event_reader_of(GstObject* element) {
-  return *reader_of(G_OBJECT(element));
+static EventReader& reader_of(gpointer element) {
+  return *priv_of(element);
 }
 
 static Guarded<ReaderSettings>& settings_of(GObject* object) {
-  return reader_of(object)->settings();
+  return reader_of(object).settings;
 }
 
 Guarded<FormatSettings>& format_settings_of(GObject* reader) {
-  return reader_of(reader)->format_settings();
+  return reader_of(reader).format_settings;
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
   const auto result =
       GST_ELEMENT_CLASS(gst_event_reader_parent_class)->change_state(element, transition);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) event_reader_of(GST_OBJECT(element)).reset();
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) reader_of(element).reset();
   return result;
 }
 
 /// Creates the reader here, because the subclass's format is not yet known in init.
 static void constructed(GObject* object) {
-  reader_of(object) =
+  priv_of(object) =
       new EventReader(GST_ELEMENT(object), *GST_EVENT_READER_GET_CLASS(object)->format);
   G_OBJECT_CLASS(gst_event_reader_parent_class)->constructed(object);
 }
 
 static void finalize(GObject* object) {
-  delete reader_of(object);
+  delete priv_of(object);
   G_OBJECT_CLASS(gst_event_reader_parent_class)->finalize(object);
 }
 
@@ -733,7 +726,7 @@ static void gst_event_reader_class_init(GstEventReaderClass* klass) {
                  "Duration of a buffer of events (nanoseconds, in whole microseconds)", GST_USECOND,
                  10 * GST_SECOND);
   install_stats(
-      object_class, [](GObject* object) { return reader_of(object)->stats(); },
+      object_class, [](GObject* object) { return reader_of(object).stats(); },
       "Counts since the start or the last seek: events, triggers, frames and imu-samples read; "
       "corrupt-places where bytes were skipped; and what was dropped: outside-events, outside the "
       "sensor; late-items, after their buffer was sent; stray-items, at an impossible time. "

@@ -73,7 +73,15 @@ class ReaderReports {
   /// The property `stats`. May be called from any thread.
   GstStructure* stats() const {
     const auto counts = counts_.copy();
-    GstStructure* const stats = new_counters(has_many_streams_ ? "application/x-event-demux-stats" : "application/x-event-decoder-stats", {{"events", counts.events}, {"triggers", counts.triggers}, {"corrupt-places", counts.corrupt_places}, {"outside-events", counts.outside}, {"late-items", counts.late}, {"stray-items", counts.stray}, {"skipped-items", counts.skipped}});
+    GstStructure* const stats = new_counters(
+        has_many_streams_ ? "application/x-event-demux-stats" : "application/x-event-decoder-stats",
+        {{"events", counts.events},
+         {"triggers", counts.triggers},
+         {"corrupt-places", counts.corrupt_places},
+         {"outside-events", counts.outside},
+         {"late-items", counts.late},
+         {"stray-items", counts.stray},
+         {"skipped-items", counts.skipped}});
     if (has_many_streams_)
       gst_structure_set(stats, "frames", G_TYPE_UINT64, counts.frames, "imu-samples", G_TYPE_UINT64,
                         counts.imu_samples, nullptr);
