@@ -62,12 +62,19 @@
 #include <string>
 #include <utility>
 
-#include "elements/eventcam/tensor/tensor_format.hpp"
+#include "features.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/event_pool.hpp"
 #include "gst/base/pads.hpp"
 #include "src/tensor/event_tensor.hpp"
 #include "src/tensor/window_queue.hpp"
+#ifdef HAVE_TENSOR_META
+#include <gst/analytics/analytics.h>
+
+#include <array>
+#endif
 
 GST_DEBUG_CATEGORY_STATIC(event_tensor_debug);
 #define GST_CAT_DEFAULT event_tensor_debug
@@ -75,6 +82,171 @@ GST_DEBUG_CATEGORY_STATIC(event_tensor_debug);
 using namespace eventcamera;
 
 namespace {
+
+/// Maximum gap between buffers that windows by time continue through; no interval is longer.
+constexpr GstClockTime max_tensor_gap = GstClockTime{G_MAXUINT32} * GST_USECOND;
+
+/// Times beyond this are not used: the ends of windows would not fit into 64 bits.
+constexpr GstClockTime max_tensor_time = GstClockTime{1} << 62;
+
+/// User-settable values of eventtensor.
+struct TensorProperties {
+  Representation representation = Representation::voxel_grid;
+  guint bins = 5;
+  Decay decay = Decay::exponential;
+  GstClockTime time_constant = 50 * GST_MSECOND;
+  Normalization normalization = Normalization::none;
+  ElementType type = ElementType::float32;
+  guint event_count = 0;
+  GstClockTime accumulation_time = 0;
+  guint frame_count = 1;
+  gdouble overlap = 0;
+
+  TensorSettings of_tensors() const {
+    return {
+        .representation = representation,
+        .bins = static_cast<int>(bins),
+        .decay = decay,
+        .time_constant = static_cast<Microseconds>(std::max(time_constant / 1000, GstClockTime{1})),
+        .normalization = normalization,
+        .type = type};
+  }
+
+  WindowSettings of_windows() const {
+    const auto duration = accumulation_time > 0 ? std::max(accumulation_time, event_resolution) : 0;
+    return {.events = event_count,
+            .duration = static_cast<Nanoseconds>(duration),
+            .intervals = frame_count,
+            .overlap = overlap};
+  }
+};
+
+GType tensor_data_type() {
+  return enum_type<ElementType>("GstEventTensorDataType",
+                                {{ElementType::float32, "32-bit floating point", "float32"},
+                                 {ElementType::float16, "16-bit floating point", "float16"},
+                                 {ElementType::uint8, "Unsigned bytes", "uint8"}});
+}
+
+/// Format of the tensors of a sensor's events.
+struct TensorFormat {
+  TensorFormat(const GstEventCameraInfo& input, const TensorProperties& properties)
+      : sensor(input), tensors(properties.of_tensors()), windows(properties.of_windows()) {}
+
+  TensorShape shape() const { return {sensor.width, sensor.height, tensors}; }
+  OwnedCaps caps() const {
+    const auto of = shape();
+    const auto dimensions = std::to_string(of.width) + ":" + std::to_string(of.height) + ":" +
+                            std::to_string(of.channels) + ":1";
+    const auto [fps_n, fps_d] = framerate();
+    const auto* const type =
+        g_enum_get_value(static_cast<GEnumClass*>(g_type_class_peek(tensor_data_type())),
+                         static_cast<gint>(tensors.type));
+    return OwnedCaps(gst_caps_new_simple(
+        "other/tensors", "format", G_TYPE_STRING, "static", "num_tensors", G_TYPE_INT, 1,
+        "dimensions", G_TYPE_STRING, dimensions.c_str(), "types", G_TYPE_STRING, type->value_nick,
+        "framerate", GST_TYPE_FRACTION, fps_n, fps_d, nullptr));
+  }
+
+  /// Time from the start of a window to its end, as far as it is known.
+  GstClockTime latency() const {
+    if (windows.events > 0) return 0;
+    if (windows.duration > 0) return static_cast<GstClockTime>(windows.duration);
+    if (sensor.fps_n <= 0) return 0;
+    return gst_util_uint64_scale((windows.intervals - 1) * GST_SECOND,
+                                 static_cast<guint64>(sensor.fps_d),
+                                 static_cast<guint64>(sensor.fps_n));
+  }
+
+  GstEventCameraInfo sensor;
+  TensorSettings tensors;
+  WindowSettings windows;
+
+ private:
+  /// Framerate of the tensors: 0/1 if it varies or is not a fraction of integers.
+  std::pair<gint, gint> framerate() const {
+    gint n = 0;
+    gint d = 1;
+    if (windows.events > 0) return {n, d};
+    const auto hop = windows.duration > 0
+                         ? windows.hop(windows.duration)
+                         : static_cast<Nanoseconds>(windows.hop(windows.intervals));
+    if (hop > G_MAXINT) return {n, d};
+    const gboolean fits = windows.duration > 0
+                              ? gst_util_fraction_multiply(static_cast<gint>(GST_SECOND), 1, 1,
+                                                           static_cast<gint>(hop), &n, &d)
+                              : gst_util_fraction_multiply(sensor.fps_n, sensor.fps_d, 1,
+                                                           static_cast<gint>(hop), &n, &d);
+    return fits ? std::pair(n, d) : std::pair(0, 1);
+  }
+};
+
+/// Caps fields, and the properties that determine them.
+constexpr std::pair<const char*, const char*> advice[] = {
+    {"types", "set data-type"},
+    {"dimensions", "set representation or bins, or scale the events"},
+    {"framerate", "set accumulation-time, frame-count or overlap"}};
+
+/// Text: the fields in which `wanted` differs from fixed caps, and the properties to set.
+std::string mismatch_text(GstCaps* wanted, GstCaps* made) {
+  std::string wishes;
+  if (gst_caps_get_size(wanted) == 0) return wishes;
+  for (const auto& [field, remedy] : advice) {
+    const auto* value = gst_structure_get_value(gst_caps_get_structure(wanted, 0), field);
+    if (value == nullptr ||
+        gst_value_intersect(nullptr, value,
+                            gst_structure_get_value(gst_caps_get_structure(made, 0), field)))
+      continue;
+    gchar* const text = gst_value_serialize(value);
+    wishes +=
+        (wishes.empty() ? ": " : ", ") + (std::string(field) + "=") + text + " (" + remedy + ")";
+    g_free(text);
+  }
+  return wishes;
+}
+
+#ifdef HAVE_TENSOR_META
+
+GstTensorDataType data_type_of(ElementType type) {
+  switch (type) {
+    case ElementType::float32:
+      return GST_TENSOR_DATA_TYPE_FLOAT32;
+    case ElementType::float16:
+      return GST_TENSOR_DATA_TYPE_FLOAT16;
+    case ElementType::uint8:
+      break;
+  }
+  return GST_TENSOR_DATA_TYPE_UINT8;
+}
+
+/// Returns a buffer of the same memory, because a meta that refers to its own buffer is never
+/// freed.
+GstBuffer* same_memory(GstBuffer* buffer) {
+  GstBuffer* const same = gst_buffer_new();
+  for (guint i = 0; i < gst_buffer_n_memory(buffer); ++i)
+    gst_buffer_append_memory(same, gst_buffer_get_memory(buffer, i));
+  return same;
+}
+
+/// Describes the bytes of a buffer in a GstTensorMeta, with its dimensions in C order: 1, channels,
+/// rows, columns.
+void add_tensor_meta(GstBuffer* buffer, const TensorShape& shape, const TensorSettings& settings) {
+  static const GQuark id = g_quark_from_static_string("event-tensor");
+  std::array<gsize, 4> dimensions = {1, static_cast<gsize>(shape.channels),
+                                     static_cast<gsize>(shape.height),
+                                     static_cast<gsize>(shape.width)};
+  auto** const tensors = g_new(GstTensor*, 1);
+  tensors[0] =
+      gst_tensor_new_simple(id, data_type_of(settings.type), same_memory(buffer),
+                            GST_TENSOR_DIM_ORDER_ROW_MAJOR, dimensions.size(), dimensions.data());
+  gst_tensor_meta_set(gst_buffer_add_tensor_meta(buffer), 1, tensors);
+}
+
+#else
+
+void add_tensor_meta(GstBuffer*, const TensorShape&, const TensorSettings&) {}
+
+#endif
 
 /// Maximum memory of a tensor and its intermediate values.
 constexpr gsize max_tensor_bytes = gsize{1} << 30;
