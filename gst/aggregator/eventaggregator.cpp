@@ -95,7 +95,6 @@ static void answer_caps_of_passed(EventAggregator& self, GstAggregator* aggregat
   gst_query_set_caps_result(query, result.get());
 }
 
-/// Virtual functions of GstAggregator.
 struct EventAggregatorFunctions {
   static EventAggregator& of(GstAggregator* element) {
     return gst_event_aggregator_impl(GST_EVENT_AGGREGATOR(element));
@@ -146,7 +145,6 @@ struct EventAggregatorFunctions {
     return TRUE;
   }
 
-  /// Sends the events that wait for the segment.
   static void send_waiting(EventAggregator& self) {
     for (auto& event : std::exchange(self.waiting_, {}))
       gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self.element_), event.release());

@@ -39,7 +39,6 @@ class EventAggregator {
 
   /// False, after reporting why, if the element cannot start.
   virtual bool start() { return true; }
-  /// Drops all state.
   virtual void stop() = 0;
   /// Drops all pending events, because the next input is discontinuous.
   virtual void flush() = 0;
@@ -66,7 +65,6 @@ class EventAggregator {
 
  protected:
   GstAggregator* element() const { return element_; }
-  /// Returns a sink pad by name.
   GstAggregatorPad* pad(const char* name) const;
   /// The main pad; null if pads are requested.
   GstAggregatorPad* main_pad() const { return main_pad_; }
@@ -79,12 +77,10 @@ class EventAggregator {
   /// True once the segment of the output was sent. Without it, a gap has no meaning.
   bool is_segment_sent() const { return segment_sent_; }
 
-  /// Pushes a buffer of the output.
   GstFlowReturn push(OwnedBuffer buffer);
   /// Pushes a GAP event; before the segment, an empty buffer of events.
   GstFlowReturn push_gap(GstClockTime start, GstClockTime duration);
 
-  /// Warns about skipped events.
   template <class Fault>
   void warn(const Fault& fault, GstBuffer* buffer) {
     faults_.warn(element_, fault, buffer);
@@ -137,7 +133,6 @@ void gst_event_aggregator_make(GstEventAggregator* self) {
   gst_event_aggregator_set_impl(self, std::make_unique<Impl>(GST_AGGREGATOR(self)));
 }
 
-/// Returns the EventAggregator of an element, of class `Impl`.
 template <class Impl>
 Impl& aggregator_impl(gpointer element) {
   return static_cast<Impl&>(gst_event_aggregator_impl(GST_EVENT_AGGREGATOR(element)));

@@ -12,7 +12,6 @@
 #include <type_traits>
 #include <utility>
 
-/// Author of all elements.
 #define EVENTSIM_AUTHORS "The gst-eventsim authors"
 
 /// For class_init: sets the metadata of an element's class. `kind` is, for example, "Filter".
@@ -150,7 +149,6 @@ inline GType enum_type(const char* name, const GEnumValue* values) {
   return type;
 }
 
-/// A value of an enum property.
 template <class Enum>
 struct Choice {
   Enum value;
@@ -214,7 +212,6 @@ inline constexpr auto controllable_flags =
   X(BOOLEAN, boolean)             \
   X(ENUM, enum) X(UINT, uint) X(INT64, int64) X(UINT64, uint64) X(DOUBLE, double)
 
-/// Copies a property's value into a field.
 template <class Field>
 void read_value(const GValue* value, Field& field) {
 #define READ(TYPE, type)                                   \
@@ -234,7 +231,6 @@ void read_value(const GValue* value, Field& field) {
 #undef READ
 }
 
-/// Copies a field into a property's value.
 template <class Field>
 void write_value(const Field& field, GValue* value) {
 #define WRITE(TYPE, type)                                                               \
@@ -371,7 +367,6 @@ class Properties {
     add_with_flags(mutable_ready_flags, field, name, blurb, limits...);
   }
 
-  /// Adds a property with a custom setter and getter.
   template <class Set, class Get>
   void add(Set set, Get get, GParamSpec* spec) {
     install_property(

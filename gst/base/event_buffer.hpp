@@ -140,7 +140,6 @@ class EventFaults {
   void warn(gpointer element, EventFault fault, GstBuffer* buffer);
   void warn(gpointer element, const eventcamera::InvalidEvents& invalid, GstBuffer* buffer);
 
-  /// For a new stream: warnings are posted again.
   void reset() {
     for (auto& warning : warnings_) warning.reset();
   }

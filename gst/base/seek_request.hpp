@@ -6,7 +6,6 @@
 
 #include "gst/base/owned.hpp"
 
-/// Parsed seek event.
 class SeekRequest {
  public:
   explicit SeekRequest(GstEvent* event);

@@ -42,7 +42,6 @@ class VideoFrame {
   /// called if false.
   explicit operator bool() const { return fault_.empty(); }
 
-  /// Description of the fault, for a message.
   const std::string& fault() const { return fault_; }
 
   const GstVideoFrame* get() const { return &frame_; }

@@ -26,7 +26,6 @@ struct Counters {
 struct State {
   SensorSize sensor{};
   SensorSize output{};
-  /// Time of the last event.
   Microseconds passed = std::numeric_limits<Microseconds>::min() / 2;
   Microseconds delay = 0;  ///< added to the times that the filter sees
 };
@@ -80,7 +79,6 @@ static auto reported(gpointer self, const Work& work) {
       work);
 }
 
-/// Skips a buffer that cannot be filtered.
 static GstFlowReturn reject(gpointer self, GstBuffer* buffer) {
   auto& priv = priv_of(self);
   priv.stream->faults.warn(self, event_fault(buffer), buffer);

@@ -23,7 +23,6 @@ class EventFilter {
   /// Starts a stream of a sensor of size `in`. All kept events must fit into `out`, the size in the
   /// output caps, which differs from `in` only if the subclass overrides transform_caps.
   virtual void start(eventcamera::SensorSize in, eventcamera::SensorSize out) = 0;
-  /// Drops all state.
   virtual void stop() {}
   /// Like the member function of eventcamera::Filter. May change x and y, too.
   virtual eventcamera::LabelledEvents filter(eventcamera::LabelledEvents events,
@@ -78,7 +77,6 @@ struct _GstEventFilterClass {
 void gst_event_filter_set_impl(GstEventFilter* self, std::unique_ptr<EventFilter> impl);
 EventFilter& gst_event_filter_impl(GstEventFilter* self);
 
-/// Returns the EventFilter of an element, of class `Impl`.
 template <class Impl>
 Impl& filter_impl(gpointer element) {
   return static_cast<Impl&>(gst_event_filter_impl(GST_EVENT_FILTER(element)));

@@ -46,7 +46,6 @@ static gboolean propose_allocation(GstBaseTransform* self, GstQuery* decide, Gst
   return PARENT_TRANSFORM_CLASS->propose_allocation(self, decide, query);
 }
 
-/// Puts a pool of textures first: downstream's, if the context can draw in its textures.
 static void choose_texture_pool(GstQuery* query, GstCaps* caps, GstGLContext* context) {
   GstBufferPool* pool = nullptr;
   guint size = 0;

@@ -90,7 +90,6 @@ bool run_in(GstGLContext* context, const Work& work) {
   return call.has_run;
 }
 
-/// Describes the channels of the first texture of `video`.
 void describe_channels(const GstVideoInfo& video, eventcamera::gl::TextureFrame& frame) {
   const auto channel = [&](guint component) -> int& {
     return frame.weights[GST_VIDEO_INFO_COMP_POFFSET(&video, component)];
@@ -209,7 +208,6 @@ class TextureVideoSimulator final : public VideoSimulator {
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
 
  private:
-  /// A frame that the GPU may still read.
   struct Queued {
     Interval interval;
     bool is_drawn;

@@ -123,7 +123,6 @@ class PadBytes final : public ByteSource {
   /// Reason for a failed read; GST_FLOW_EOS if upstream was stopped before the end of the file.
   GstFlowReturn flow() const { return flow_; }
 
-  /// Clears a failed read.
   void retry() { flow_ = GST_FLOW_OK; }
 
  private:
@@ -325,7 +324,6 @@ class EventReader {
     is_consuming_ = false;
   }
 
-  /// Reads and pushes one item.
   GstFlowReturn step() {
     const auto output = recording_->next();
     if (bytes_ && bytes_->failed()) return bytes_->flow();
@@ -346,7 +344,6 @@ class EventReader {
     return std::visit([this](const auto& item) { return output_.push(item); }, *output);
   }
 
-  /// Pushes all available output.
   GstFlowReturn push_pending() {
     GstFlowReturn result = GST_FLOW_OK;
     while (result == GST_FLOW_OK) result = step();
@@ -446,7 +443,6 @@ class EventReader {
     return result;
   }
 
-  /// Pushes the output of the decompressor.
   GstFlowReturn push_decompressed() {
     GstFlowReturn result = GST_FLOW_OK;
     while (result == GST_FLOW_OK) {

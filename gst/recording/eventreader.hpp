@@ -18,7 +18,6 @@ struct FormatSettings {
   std::string events_path;         ///< in an HDF5 file; empty: the first events
 };
 
-/// Settings of a reader element.
 Guarded<FormatSettings>& format_settings_of(GObject* reader);
 
 using FormatProperties = Properties<format_settings_of>;

@@ -29,7 +29,6 @@ constexpr std::size_t word_bytes = 8;
 /// Maximum bytes per event, including time words.
 constexpr std::size_t max_event_bytes = 32;
 
-/// Maximum bytes per buffer.
 std::size_t capacity(guint mtu) {
   return mtu / word_bytes * word_bytes;
 }
@@ -113,7 +112,6 @@ class WrittenFile {
     return push_bytes(start, GST_CLOCK_TIME_NONE);
   }
 
-  /// Completes the file.
   GstFlowReturn end(guint mtu) {
     mtu_ = mtu;
     ensure_segment(src_);
@@ -172,7 +170,6 @@ class WrittenFile {
     return result;
   }
 
-  /// Overwrites part of the header.
   GstFlowReturn push_patch(FilePatch patch) {
     GST_DEBUG_OBJECT(element(),
                      "completing the header: %" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT,
@@ -245,7 +242,6 @@ class WrittenFile {
     }
   }
 
-  /// Encodes all queued triggers.
   void encode_triggers() { encode(triggers_.pop_before(after_all_items)); }
 
   /// Warns of the first pause that is removed, and at the end of the file of the total, if there
@@ -334,7 +330,6 @@ static GstFlowReturn reported(GstEventWriter* self, const Work& work) {
       work);
 }
 
-/// Begins a file.
 static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, OwnedCaps caps) {
   auto& priv = priv_of(self);
   auto encoder =

@@ -34,7 +34,6 @@ static PixelFormat pixel_format(GstVideoFormat format) {
 
 static const char* const frame_meta = "GstEventCameraFrame";
 
-/// Its times, as fields of the meta.
 struct TimeField {
   const char* name;
   Microseconds Frame::*time;

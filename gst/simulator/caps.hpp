@@ -29,7 +29,6 @@ struct SimulatorVideo {
   /// Input caps for this output, events or accumulated-event video.
   GstCaps* input_caps(const GstCaps* output) const;
 
-  /// For class_init: adds the pad templates.
   void install_pads(GstElementClass* klass) const;
 
  private:

@@ -207,7 +207,6 @@ struct Overrides {
   }
 };
 
-/// A setting in a camera profile that is not valid.
 std::runtime_error error_in(const std::string& profile, const std::string& setting,
                             const std::string& fault) {
   return std::runtime_error("The camera profile \"" + profile + "\" sets " + setting + fault);

@@ -282,7 +282,6 @@ const char* const denoise_blurb =
     "-1 = automatic: four standard deviations of the noise, found where successive frames differ "
     "least)";
 
-/// Installs the properties that not all methods have.
 static void install_method_properties(GObjectClass* klass, const EventSimulatorMethod& method) {
   Properties<settings_of> properties(klass, defaults_of(method));
   if (method.threshold) {

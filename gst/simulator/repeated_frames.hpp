@@ -28,7 +28,6 @@ class RepeatedFrames {
   /// Adds the next frame. With `compare`, the one after it will be compared by its pixels.
   void add(GstBuffer* frame, Nanoseconds time, bool compare, Kind kind);
 
-  /// Time of the last frame, if any.
   std::optional<Nanoseconds> last_time() const;
 
   /// Forgets the last frame; the next one shows another picture.

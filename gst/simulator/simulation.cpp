@@ -368,7 +368,6 @@ void Simulation::skip_frame(GstClockTime pts) {
 
 /* settings */
 
-/// Updates controlled properties to their values at `time`, a timestamp of the segment.
 void Simulation::sync_controlled_properties(GstClockTime time) {
   const GstSegment& segment = element_->segment;
   if (segment.format != GST_FORMAT_TIME) return;  // before the first segment
@@ -430,7 +429,6 @@ void Simulation::keep_flow(GstBuffer* frame) {
   stream_.motion.reset(g_bytes_ref(gst_event_camera_flow_meta_get_flow(meta)));
 }
 
-/// Adds the flow of an interval to the buffer of its events.
 static void add_flow(GstBuffer* buffer, const eventcamera::ImageView<Flow>& flow) {
   const auto width = static_cast<std::size_t>(flow.width);
   std::vector<Flow> rows(width * static_cast<std::size_t>(flow.height));
@@ -683,7 +681,6 @@ GstFlowReturn Simulation::write_events(const EventBuckets& events, GstBuffer* fr
   return GST_FLOW_OK;
 }
 
-/// Pushes a GAP for an interval without events.
 GstFlowReturn Simulation::push_gap(Nanoseconds start, Nanoseconds end, guint32 seqnum) {
   GstEvent* gap =
       gst_event_new_gap(static_cast<GstClockTime>(start), static_cast<GstClockTime>(end - start));
@@ -691,7 +688,6 @@ GstFlowReturn Simulation::push_gap(Nanoseconds start, Nanoseconds end, guint32 s
   return push_event(GST_BASE_TRANSFORM_SRC_PAD(element_), gap);
 }
 
-/// Sets the timestamps and flags of an output buffer, and pushes it.
 GstFlowReturn Simulation::push_buffer(OwnedBuffer out, GstClockTime pts, GstClockTime duration) {
   GST_BUFFER_PTS(out.get()) = pts;
   GST_BUFFER_DTS(out.get()) = GST_CLOCK_TIME_NONE;

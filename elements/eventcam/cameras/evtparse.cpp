@@ -145,7 +145,6 @@ class CameraBuffers {
 
 constexpr int max_words_side = 2048;
 
-/// Value of `format`: as in the caps.
 constexpr int format_of_caps = -1;
 
 struct Settings {
@@ -155,7 +154,6 @@ struct Settings {
   GstClockTime latency = 10 * GST_MSECOND;
 };
 
-/// Fields of the input's caps.
 struct Input {
   std::optional<EvtFormat> format;
   SensorSize sensor;
@@ -297,7 +295,6 @@ static void begin_segment(Private& self, const EventInterval& interval) {
   state.segment.extend_to(interval.end);
 }
 
-/// Pushes the pieces of a transfer.
 static GstFlowReturn push_pieces(Private& self) {
   auto& state = *self.stream->state;
   GstFlowReturn result = GST_FLOW_OK;

@@ -142,7 +142,6 @@ GstClockTime EventPictures::next_time() {
   return waiting_since_ ? *waiting_since_ + max_wait : GST_CLOCK_TIME_NONE;
 }
 
-/// Skips a picture that sinks would drop anyway.
 void EventPictures::skip(const EventInterval& picture, GstClockTime running_time,
                          GstClockTimeDiff lateness) {
   discontinuous_ = true;
@@ -208,7 +207,6 @@ GstFlowReturn EventPictures::push_picture(const EventInterval& events,
   return push(std::move(buffer));
 }
 
-/// Draws the next picture and pushes it.
 GstFlowReturn EventPictures::push_next_picture() {
   const EventInterval events = times_->events();
   const EventInterval picture = times_->picture();

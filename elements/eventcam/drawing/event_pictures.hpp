@@ -82,7 +82,6 @@ class EventPictures : public EventAggregator {
   PictureQos qos;
 
  protected:
-  /// Settings of the next picture.
   virtual eventcamera::RenderSettings render_settings() const = 0;
   /// Start of the window for the picture of an interval.
   virtual eventcamera::Microseconds window_start(const EventInterval& interval) const {

@@ -124,7 +124,6 @@ class EventFuse final : public FramesWithEvents {
       times_.emplace(start, output_, segment_of(main_pad()).rate);
   }
 
-  /// The settings in running time.
   ComplementaryFilter::Settings running_settings() const {
     auto current = settings.copy();
     current.cutoff *= segment_of(main_pad()).rate;

@@ -176,7 +176,6 @@ class EventOverlay final : public FramesWithEvents {
     return GST_FLOW_OK;
   }
 
-  /// Draws on the first queued frame and pushes it.
   GstFlowReturn handle_frame(const std::optional<EventInterval>& interval, bool timed_out) {
     if (interval) {
       if (sensor_ && !overlay_) {

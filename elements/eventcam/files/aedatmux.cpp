@@ -77,7 +77,6 @@ class AedatFile {
   }
 
   void set_video(const GstVideoInfo& video) { video_ = video; }
-  /// Sets the name of the camera.
   void set_source(const gchar* name) { source_ = name; }
   /// Queues the triggers or IMU samples of an event for the next buffer. False for other events.
   bool handle_items(GstEvent* event) {
@@ -114,7 +113,6 @@ class AedatFile {
     return header;
   }
 
-  /// Encodes the items that wait.
   Bytes write_items() {
     Bytes out;
     const auto triggers = encode(triggers_, "triggers", out);
@@ -144,7 +142,6 @@ class AedatFile {
     return out;
   }
 
-  /// Returns the end of the file.
   Bytes finish() {
     writable.end_file();
     Bytes bytes = write_items();
@@ -155,7 +152,6 @@ class AedatFile {
   /// Bytes of the header to overwrite after finish().
   std::optional<FilePatch> patch() { return encoder_->patch(); }
 
-  /// Warns about skipped input.
   void warn_skipped(const char* what, const std::string& cause) {
     warn_(element_, {GST_STREAM_ERROR_MUX, std::string("Dropped ") + what + "."}, cause);
   }
@@ -344,7 +340,6 @@ static GstFlowReturn push_bytes(Private& self, AedatFile::Bytes bytes, bool head
   return gst_aggregator_finish_buffer(GST_AGGREGATOR(self.element), buffer);
 }
 
-/// Sends the caps, with the header as streamheader for late joiners.
 static void send_caps(Private& self, const AedatFile::Bytes& header) {
   const OwnedBuffer buffer(copied_buffer(std::as_bytes(std::span(header))));
   const OwnedCaps caps = with_stream_header(
@@ -361,7 +356,6 @@ static void send_segment(Private& self, guint64 position) {
   gst_aggregator_update_segment(GST_AGGREGATOR(self.element), &segment);
 }
 
-/// Writes the header.
 static GstFlowReturn begin_file(Private& self) {
   self.has_header = true;
   Aedat4Settings settings;
@@ -375,7 +369,6 @@ static GstFlowReturn begin_file(Private& self) {
   return push_bytes(self, std::move(header), true);
 }
 
-/// Writes the end of the file, and patches the header.
 static GstFlowReturn end_file(Private& self) {
   auto& file = self.file;
   const GstFlowReturn result = push_bytes(self, file.finish());
@@ -405,7 +398,6 @@ static Microseconds frame_time(Private& self, GstBuffer* frame, GstClockTime run
   return self.file.writable.time_of(time);
 }
 
-/// Writes the earliest buffer.
 static GstFlowReturn write_next(Private& self) {
   auto& file = self.file;
   GstClockTime time = 0;

@@ -102,7 +102,6 @@ static bool reported(Private& self, const Work& work) {
       work);
 }
 
-/// Writes pending events and closes the file.
 static bool end_file(Private& self) {
   State& state = self.state;
   state.ended = true;
@@ -159,7 +158,6 @@ static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
   return written ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
-/// Writes triggers, if the format supports them.
 static bool write_triggers(Private& self, std::span<const Trigger> triggers) {
   const State& state = self.state;
   if (!state.writer) return true;

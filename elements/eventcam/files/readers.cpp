@@ -61,7 +61,6 @@ void add_sensor_size(FormatProperties& properties) {
                        0, GST_EVENT_CAMERA_MAX_SIDE);
 }
 
-/// For tables.
 void add_table_properties(FormatProperties& properties) {
   add_sensor_size(properties);
   properties.add_fixed(
@@ -79,7 +78,6 @@ void add_table_properties(FormatProperties& properties) {
                        "xytp; empty = as stated in the file, or detected from its first rows");
 }
 
-/// Creates a decoder of a table.
 template <class TableDecoder>
 std::unique_ptr<Decoder> make_table_decoder(const GstCaps* /*caps*/,
                                             const FormatSettings& settings) {

@@ -72,7 +72,6 @@ struct Settings {
   }
 };
 
-/// Counters since the start.
 struct Counters {
   guint64 events = 0;
   guint64 dropped = 0;
@@ -137,7 +136,6 @@ static void lengthen_latency(Private& self, GstClockTime duration) {
   post_latency(self.element);
 }
 
-/// Pushes the window, which holds these events and ends at `end`.
 static GstFlowReturn push_window(Private& self, std::span<const AbsoluteEvent> events,
                                  Microseconds end) {
   const auto stream = self.stream.lock();
@@ -205,7 +203,6 @@ static void start_over_if_earlier(Private& self, const EventInterval& interval) 
   start_over(self);
 }
 
-/// Adds the events of a buffer.
 static void add(Private& self, const MappedEvents& mapped, GstBuffer* buffer) {
   const auto stream = self.stream.lock();
   const auto labels = labels_of(buffer);
@@ -260,7 +257,6 @@ static GstFlowReturn submit_input_buffer(GstBaseTransform* transform, gboolean, 
   });
 }
 
-/// Passes a GAP as an interval without events.
 static bool handle_gap(Private& self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;

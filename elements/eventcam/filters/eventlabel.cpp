@@ -129,7 +129,6 @@ class EventLabeller final : public EventAggregator {
   GstClockTime next_time() override { return next_main_time(); }
 
  private:
-  /// An image of classes.
   struct ClassImage {
     OwnedBuffer buffer;
     GstVideoInfo format;

@@ -63,7 +63,6 @@ struct Settings {
   guint min_streams = 2;
 };
 
-/// Property `stats`.
 struct Counts {
   guint64 events = 0;    ///< merged
   guint64 late = 0;      ///< dropped, because earlier than those already sent
@@ -338,7 +337,6 @@ class EventMerge final : public EventAggregator {
                         std::to_string(interval.start) + " us, up to which events were sent");
   }
 
-  /// Sets the segment of the output, once.
   void choose_segment(std::span<const OwnedAggregatorPad> pads) {
     if (pads.empty() || std::exchange(segment_chosen_, true)) return;
     const auto& first = *std::ranges::min_element(
@@ -350,7 +348,6 @@ class EventMerge final : public EventAggregator {
     set_segment(timeline.segment(first, pads));
   }
 
-  /// Pushes the events of an interval.
   GstFlowReturn push_interval(const MergedInterval& interval, EventMerger::Inputs inputs) {
     if (!gst_pad_has_current_caps(GST_AGGREGATOR_SRC_PAD(element()))) return GST_FLOW_OK;
     const auto start = nanoseconds(interval.start);

@@ -28,7 +28,6 @@ G_DECLARE_FINAL_TYPE(GstEventMergePad, gst_event_merge_pad, GST, EVENT_MERGE_PAD
 struct GstEventMergePadPrivate {
   GstEventMergePadPrivate() { stop(); }
 
-  /// Drops the loaded interval.
   void unload();
   void flush();
   void stop();
@@ -64,7 +63,6 @@ class MergedTimeline {
   /// Translates the seek that GstAggregator forwards next to the stream time of each input. Called
   /// from any thread.
   void seek(const SeekRequest& request);
-  /// Forgets the last seek.
   void reset() { sought_.lock()->reset(); }
 
   /// Segment of a pad, up to the latest end of all segments.

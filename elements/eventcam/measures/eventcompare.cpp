@@ -73,7 +73,6 @@ const char* name_of(StreamRole role) {
   return role == StreamRole::reference ? "reference" : "candidate";
 }
 
-/// Moves a structure into a field of another one.
 void put_structure(GstStructure* structure, const char* field, GstStructure* value) {
   gst_structure_set(structure, field, GST_TYPE_STRUCTURE, value, nullptr);
   gst_structure_free(value);
@@ -244,7 +243,6 @@ class EventCompare final : public EventAggregator {
     return true;
   }
 
-  /// Adds a buffer to the comparison.
   void compare(StreamRole role, GstBuffer* buffer) {
     const MappedEvents mapped(buffer);
     if (!mapped) return warn(event_fault(buffer), buffer);
@@ -262,7 +260,6 @@ class EventCompare final : public EventAggregator {
     warn(skipped, buffer);
   }
 
-  /// Processes the next buffer of either stream.
   GstFlowReturn aggregate_next() {
     begin();
     const auto behind = comparison_ ? comparison_->behind() : StreamRole::candidate;

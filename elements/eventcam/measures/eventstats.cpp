@@ -131,7 +131,6 @@ static GstStructure* figures_of(const Part& part, Nanoseconds end, bool cumulati
   return structure;
 }
 
-/// Posts a message. Takes ownership of `structure`.
 static void post(Private& self, GstStructure* structure) {
   gst_element_post_message(GST_ELEMENT(self.element),
                            gst_message_new_element(GST_OBJECT(self.element), structure));
@@ -153,7 +152,6 @@ static bool has_news(Private& self) {
   return self.stream->measurement && !self.stream->measurement->concluded;
 }
 
-/// Starts measuring a sensor of this size.
 static void measure(Private& self, SensorSize sensor) {
   GST_DEBUG_OBJECT(self.element, "counting the events of %dx%d pixels", sensor.width,
                    sensor.height);

@@ -58,10 +58,8 @@ void add_report_properties(Properties& properties, const char* map_blurb) {
   properties.add_fixed(&ReportFiles::map, "map", map_blurb);
 }
 
-/// Converts a timestamp of a segment to stream time.
 eventcamera::Nanoseconds stream_time(const GstSegment& segment, GstClockTime time);
 
-/// Sets the fields for the statistics of one stream.
 void put_figures(GstStructure* structure, const eventcamera::StreamFigures& figures);
 
 /// Sets the fields of labelled events by cause; none if no event has a label.

@@ -151,7 +151,6 @@ static bool push_caps(Private& self) {
   return state.has_caps;
 }
 
-/// Pushes the events of a datagram.
 static GstFlowReturn push(Private& self, const Reception& reception, GstClockTime arrival) {
   auto& state = *self.stream->state;
   const auto first = state.events.front().t;

@@ -141,7 +141,6 @@ static GstFlowReturn flush(Private& self) {
   return pack(self, [](DatagramPacker& packer, const auto& send) { packer.flush(send); });
 }
 
-/// Drops the events that wait.
 static void drop(Private& self) noexcept {
   if (self.stream->packer) self.stream->packer->drop();
   self.stream->timed.reset();
@@ -163,7 +162,6 @@ static bool is_flush_due(Private& self, const EventInterval& interval) {
   return next >= nanoseconds(*since) + self.settings.copy().max_latency;
 }
 
-/// Collects the events of a buffer.
 static void collect(Private& self, GstBuffer* buffer, const MappedEvents& mapped) {
   GST_LOG_OBJECT(self.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                  mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));

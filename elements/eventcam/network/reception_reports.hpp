@@ -28,7 +28,6 @@ class ReceptionReports {
     }
   }
 
-  /// Call for each packet.
   void packet_arrived() {
     if (!is_heard_.exchange(true)) timer_.cancel();
   }

@@ -116,7 +116,6 @@ struct Settings : PayloaderSettings {
   RtpEventFormat format = RtpEventFormat::evt3;
 };
 
-/// Stream of one sensor.
 struct State {
   State(SensorSize size, RtpEventFormat events_format, std::uint32_t first_event)
       : sensor(size), format(events_format), packer(size, format, first_event), pending(size) {}
@@ -167,7 +166,6 @@ static gsize max_header_size(Private& self) {
          (caps ? self.stream->extensions.max_size(caps) : 0);
 }
 
-/// Maximum size of a payload.
 static gsize max_payload_size(Private& self) {
   const gsize header = max_header_size(self);
   return std::max<gsize>(GST_RTP_BASE_PAYLOAD_MTU(self.element), header) - header;
@@ -186,7 +184,6 @@ static GstBuffer* make_packet(Private& self, std::span<const std::uint8_t> paylo
   return packet;
 }
 
-/// Sends the pending interval.
 static void send(Private& self) {
   if (!self.stream->state || self.stream->state->pending.empty()) return;
   auto& pending = self.stream->state->pending;

@@ -89,7 +89,6 @@ constexpr GstClockTime max_tensor_gap = GstClockTime{G_MAXUINT32} * GST_USECOND;
 /// Times beyond this are not used: the ends of windows would not fit into 64 bits.
 constexpr GstClockTime max_tensor_time = GstClockTime{1} << 62;
 
-/// User-settable values of eventtensor.
 struct TensorProperties {
   Representation representation = Representation::voxel_grid;
   guint bins = 5;
@@ -128,7 +127,6 @@ GType tensor_data_type() {
                                  {ElementType::uint8, "Unsigned bytes", "uint8"}});
 }
 
-/// Format of the tensors of a sensor's events.
 struct TensorFormat {
   TensorFormat(const GstEventCameraInfo& input, const TensorProperties& properties)
       : sensor(input), tensors(properties.of_tensors()), windows(properties.of_windows()) {}
@@ -258,7 +256,6 @@ struct State {
         tensor(of.sensor.width, of.sensor.height, of.tensors),
         windows(of.sensor.width, of.sensor.height, of.windows) {}
 
-  /// Forgets all events.
   void start_over() {
     windows.reset();
     tensor.reset();
@@ -437,7 +434,6 @@ static bool post_unless_accepted(Private& self, GstCaps* caps) {
   return false;
 }
 
-/// Starts over for a sensor.
 static bool make_state(Private& self, const GstEventCameraInfo& info) {
   self.stream->state.reset();
   const TensorFormat format(info, self.settings.copy());

@@ -389,7 +389,6 @@ void ReaderOutput::start_streams() {
   if (!std::exchange(has_no_more_pads_, true)) gst_element_no_more_pads(element_);
 }
 
-/// Announces the streams to applications and downstream.
 void ReaderOutput::post_collection() {
   GstStreamCollection* const collection = gst_stream_collection_new(nullptr);
   for (auto& pad : pads_)
@@ -483,7 +482,6 @@ void ReaderOutput::send_segment(ReaderPad& pad) {
   gst_pad_push_event(pad.pad.get(), with_seqnum(gst_event_new_segment(&segment), seqnum_));
 }
 
-/// Posts a message with the seqnum of the current seek.
 void ReaderOutput::post_with_seqnum(GstMessage* message) {
   if (seqnum_ != GST_SEQNUM_INVALID) gst_message_set_seqnum(message, seqnum_);
   gst_element_post_message(element_, message);

@@ -36,7 +36,6 @@ class ReaderReports {
     corrupt_places_ = 0;
   }
 
-  /// Updates the counts, and reports new corruption and dropped events.
   void update(const eventcamera::RecordingReader& recording) {
     const auto counts = recording.counts();
     auto before = counts;
