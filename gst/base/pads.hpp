@@ -80,14 +80,6 @@ inline GstFlowReturn push_event(GstPad* src, GstEvent* event) {
   return gst_pad_push_event(src, event) ? GST_FLOW_OK : gst_pad_get_last_flow_return(src);
 }
 
-/// True once a segment was sent from a source pad.
-inline bool has_segment(GstPad* src) {
-  GstEvent* const segment = gst_pad_get_sticky_event(src, GST_EVENT_SEGMENT, 0);
-  if (segment == nullptr) return false;
-  gst_event_unref(segment);
-  return true;
-}
-
 /// Answers a latency query on a source pad: upstream's latency plus the element's own.
 inline gboolean answer_latency(GstPad* sink, GstQuery* query, GstClockTime own) {
   if (!gst_pad_peer_query(sink, query)) return FALSE;
