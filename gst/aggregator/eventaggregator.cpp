@@ -41,6 +41,8 @@ void EventAggregator::set_segment(const GstSegment& segment) {
 }
 
 GstFlowReturn EventAggregator::push(OwnedBuffer buffer) {
+  if (is_gap(buffer.get()))
+    return push_gap(GST_BUFFER_PTS(buffer.get()), GST_BUFFER_DURATION(buffer.get()));
   segment_sent_ = true;
   return gst_aggregator_finish_buffer(element_, buffer.release());
 }
@@ -48,13 +50,15 @@ GstFlowReturn EventAggregator::push(OwnedBuffer buffer) {
 GstFlowReturn EventAggregator::push_gap(GstClockTime start, GstClockTime duration) {
   GstPad* const src = GST_AGGREGATOR_SRC_PAD(element_);
   if (segment_sent_) return push_event(src, gst_event_new_gap(start, duration));
-  if (!gst_pad_has_current_caps(src)) return GST_FLOW_OK;
+  const OwnedCaps caps(gst_pad_get_current_caps(src));
+  if (!caps || !sensor_of(caps.get())) return GST_FLOW_OK;
   // gst_aggregator_push_mandatory_events() sends the segment only before a buffer or EOS.
   OwnedBuffer empty(gst_buffer_new());
   GST_BUFFER_PTS(empty.get()) = start;
   GST_BUFFER_DURATION(empty.get()) = duration;
   GST_BUFFER_FLAG_SET(empty.get(), GST_BUFFER_FLAG_GAP | GST_BUFFER_FLAG_DISCONT);
-  return push(std::move(empty));
+  segment_sent_ = true;
+  return gst_aggregator_finish_buffer(element_, empty.release());
 }
 
 std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime time) {
@@ -64,7 +68,7 @@ std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime tim
   return running;
 }
 
-GstClockTime EventAggregator::next_main_time() const {
+GstClockTime EventAggregator::next_time() {
   const auto buffer = next_buffer(main_pad_);
   if (!buffer) return has_ended(main_pad_) ? 0 : GST_CLOCK_TIME_NONE;
   if (!GST_BUFFER_PTS_IS_VALID(buffer.get())) return 0;

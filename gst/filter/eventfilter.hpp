@@ -83,13 +83,14 @@ Impl& filter_impl(gpointer element) {
 }
 
 /// Defines and registers the type of an element with an EventFilter of class `Impl`, which must
-/// have a member `settings`, which type_settings() returns. The type's class_init must follow.
-#define DEFINE_EVENT_FILTER(Type, type, OBJECT, Impl, element)                     \
+/// have a member `settings`, which type_settings() returns; `...` is code for the type, such as
+/// interfaces. The type's class_init must follow.
+#define DEFINE_EVENT_FILTER(Type, type, OBJECT, Impl, element, ...)                \
   G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventFilter)                    \
   struct _##Type {                                                                 \
     GstEventFilter parent;                                                         \
   };                                                                               \
-  G_DEFINE_TYPE(Type, type, GST_TYPE_EVENT_FILTER)                                 \
+  G_DEFINE_TYPE_WITH_CODE(Type, type, GST_TYPE_EVENT_FILTER, __VA_ARGS__)          \
   GST_ELEMENT_REGISTER_DEFINE(element, #element, GST_RANK_NONE, type##_get_type()) \
   /* A type takes no parentheses: NOLINTNEXTLINE(bugprone-macro-parentheses) */    \
   static void type##_init(Type* self) {                                            \

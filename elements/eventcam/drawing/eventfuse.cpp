@@ -97,7 +97,8 @@ class EventFuse final : public FramesWithEvents {
 
   /// Time at which the next picture of a live source is pushed without waiting for input.
   GstClockTime next_time() override {
-    return times_ && !has_ended(main_pad()) ? running(times_->picture().start) : next_main_time();
+    return times_ && !has_ended(main_pad()) ? running(times_->picture().start)
+                                            : FramesWithEvents::next_time();
   }
 
   Guarded<ComplementaryFilter::Settings> settings;
@@ -168,8 +169,7 @@ class EventFuse final : public FramesWithEvents {
       if (times_ && times_->picture().start < interval.start) return push_next_picture(timed_out);
       if (is_gap(frame) && !filter_) {
         drop_frame();
-        return is_segment_sent() ? push_gap(interval.start, interval.end - interval.start)
-                                 : GST_FLOW_OK;
+        return push_gap(interval.start, interval.end - interval.start);
       }
       if (!add_events_until(running(interval.start)) && !timed_out)
         return GST_AGGREGATOR_FLOW_NEED_DATA;

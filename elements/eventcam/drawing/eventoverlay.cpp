@@ -107,10 +107,6 @@ class EventOverlay final : public FramesWithEvents {
     return video_ ? handle_frame(interval, timed_out) : GST_FLOW_NOT_NEGOTIATED;
   }
 
-  /// Time at which a live frame is pushed without waiting for events: at once if it has no time,
-  /// and at the end of the video.
-  GstClockTime next_time() override { return next_main_time(); }
-
   Guarded<Settings> settings;
 
  private:
@@ -188,9 +184,7 @@ class EventOverlay final : public FramesWithEvents {
     }
     OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
     if (interval) shown_ = interval->end;
-    if (is_gap(out.get()))
-      return is_segment_sent() ? push_gap(GST_BUFFER_PTS(out.get()), GST_BUFFER_DURATION(out.get()))
-                               : GST_FLOW_OK;
+    if (is_gap(out.get())) return push(std::move(out));
     GST_LOG_OBJECT(main_pad(),
                    "frame at %" GST_TIME_FORMAT "; events are known until %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(GST_BUFFER_PTS(out.get())), GST_TIME_ARGS(known_));

@@ -17,7 +17,6 @@ class FramesWithEvents : public EventAggregator {
 
   void stop() override;
   void flush() noexcept override;
-  void release_memory() noexcept override { flush(); }
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
 
  protected:

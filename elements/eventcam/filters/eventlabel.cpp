@@ -83,8 +83,6 @@ class EventLabeller final : public EventAggregator {
     image_time_ = never;
   }
 
-  void release_memory() noexcept override { flush(); }
-
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
     if (pad == main_pad()) {
       const auto sensor = sensor_of(caps);
@@ -123,10 +121,6 @@ class EventLabeller final : public EventAggregator {
     return is_known || (result == GST_AGGREGATOR_FLOW_NEED_DATA && timed_out) ? push_head()
                                                                               : result;
   }
-
-  /// Time at which live events are pushed without waiting for images: at once if they have no time,
-  /// and at the end of the events.
-  GstClockTime next_time() override { return next_main_time(); }
 
  private:
   struct ClassImage {
@@ -279,8 +273,6 @@ class EventLabeller final : public EventAggregator {
     const auto labels = std::move(head_->labels);
     head_.reset();  // otherwise the buffer would not be writable in place
     OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
-    if (is_gap(out.get()))
-      return push_gap(GST_BUFFER_PTS(out.get()), GST_BUFFER_DURATION(out.get()));
     auto target = labels_of(out.get());
     if (target.size() != labels.size()) {
       if (auto* invalid = gst_buffer_get_meta(out.get(), GST_EVENT_CAMERA_LABEL_META_API_TYPE))

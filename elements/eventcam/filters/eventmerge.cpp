@@ -110,8 +110,6 @@ class EventMerge final : public EventAggregator {
     waiting_since_ = 0;
   }
 
-  void release_memory() noexcept override { flush(); }
-
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
     const auto sensor = sensor_of(caps);
     if (!sensor) return false;
@@ -390,12 +388,6 @@ class EventMerge final : public EventAggregator {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventMerge, gst_event_merge, GST, EVENT_MERGE, GstEventAggregator)
-
-struct _GstEventMerge {
-  GstEventAggregator parent;
-};
-
 static const auto failure = events_report("merge");
 
 static guint children_count(GstChildProxy* self) {
@@ -417,11 +409,9 @@ static void child_proxy_init(gpointer interface, gpointer) {
   child_proxy->get_child_by_index = child_by_index;
 }
 
-G_DEFINE_TYPE_WITH_CODE(GstEventMerge, gst_event_merge, GST_TYPE_EVENT_AGGREGATOR,
-                        GST_DEBUG_CATEGORY_INIT(event_merge_debug, "eventmerge", 0,
-                                                "merged event streams");
+DEFINE_EVENT_AGGREGATOR(GstEventMerge, gst_event_merge, EVENT_MERGE, EventMerge, eventmerge,
+                        GST_RANK_NONE, "merged event streams",
                         G_IMPLEMENT_INTERFACE(GST_TYPE_CHILD_PROXY, child_proxy_init))
-GST_ELEMENT_REGISTER_DEFINE(eventmerge, "eventmerge", GST_RANK_NONE, gst_event_merge_get_type())
 #define PARENT_ELEMENT_CLASS GST_ELEMENT_CLASS(gst_event_merge_parent_class)
 #define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_event_merge_parent_class)
 
@@ -465,10 +455,6 @@ static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
   if (!PARENT_AGGREGATOR_CLASS->src_query(aggregator, query)) return FALSE;
   if (GST_QUERY_TYPE(query) == GST_QUERY_SEEKING) timeline.extend_seeking(query);
   return TRUE;
-}
-
-static void gst_event_merge_init(GstEventMerge* self) {
-  gst_event_aggregator_make<EventMerge>(GST_EVENT_AGGREGATOR(self));
 }
 
 static void gst_event_merge_class_init(GstEventMergeClass* klass) {

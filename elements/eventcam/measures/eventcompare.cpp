@@ -164,7 +164,7 @@ class EventCompare final : public EventAggregator {
   }
 
   void flush() noexcept override { comparison_.reset(); }
-  void release_memory() noexcept override { flush(); }
+  GstClockTime next_time() override { return GST_CLOCK_TIME_NONE; }
 
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
     const auto next = sensor_of(caps);
@@ -285,10 +285,7 @@ class EventCompare final : public EventAggregator {
       if (comparison_ && behind == StreamRole::candidate)
         compare(StreamRole::candidate, buffer.get());
     }
-    OwnedBuffer passed(gst_aggregator_pad_pop_buffer(main_pad()));
-    return is_gap(passed.get())
-               ? push_gap(GST_BUFFER_PTS(passed.get()), GST_BUFFER_DURATION(passed.get()))
-               : push(std::move(passed));
+    return push(OwnedBuffer(gst_aggregator_pad_pop_buffer(main_pad())));
   }
 
   /// Posts and writes the statistics, of empty streams if there is no comparison yet.

@@ -63,7 +63,6 @@ class FlowJoin final : public EventAggregator {
   }
 
   void flush() noexcept override {}
-  void release_memory() noexcept override {}
 
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
     const GstStructure* const structure = gst_caps_get_structure(caps, 0);
@@ -102,9 +101,7 @@ class FlowJoin final : public EventAggregator {
     }
     frame.reset();  // otherwise it would not be writable in place
     OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
-    if (is_gap(out.get()))
-      return is_segment_sent() ? push_gap(GST_BUFFER_PTS(out.get()), GST_BUFFER_DURATION(out.get()))
-                               : GST_FLOW_OK;
+    if (is_gap(out.get())) return push(std::move(out));
     if (flow && !add_flow(out.get(), flow.get())) return GST_FLOW_ERROR;
     if (!flow && !has_ended(flow_pad_))
       warn_of_no_flow_(element(),
@@ -114,10 +111,6 @@ class FlowJoin final : public EventAggregator {
                        "no matching buffer on flow_sink");
     return push(std::move(out));
   }
-
-  /// Time at which a live frame is pushed without waiting for flow: at once if it has no time, and
-  /// at the end of the video.
-  GstClockTime next_time() override { return next_main_time(); }
 
  private:
   struct Size {
