@@ -151,7 +151,7 @@ inline void add_aggregator_pad_template(GstEventAggregatorClass* klass, const ch
 }
 
 /// Defines and registers the type of an element with an EventAggregator of class `Impl`; `...` is
-/// code for the type, such as interfaces. The type's class_init must follow.
+/// code for the type, such as implement(). The type's class_init must follow.
 #define DEFINE_EVENT_AGGREGATOR(Type, type, OBJECT, Impl, element, rank, description, ...)    \
   G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventAggregator)                           \
   struct _##Type {                                                                            \

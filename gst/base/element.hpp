@@ -21,6 +21,13 @@ inline void set_metadata(gpointer klass, const char* name, const char* kind,
                                         EVENTSIM_AUTHORS);
 }
 
+/// For code of G_DEFINE_TYPE_WITH_CODE in a macro, where G_IMPLEMENT_INTERFACE would be expanded too
+/// early.
+inline void implement(GType type, GType interface, GInterfaceInitFunc init = nullptr) {
+  const GInterfaceInfo info = {init, nullptr, nullptr};
+  g_type_add_interface_static(type, interface, &info);
+}
+
 /// Defines and registers the type of an element whose data is a `Private`: priv_of() returns it,
 /// field_of() one of its fields, for Properties. The functions type_init(), which makes it, and
 /// type_class_init() must follow; `finalize` deletes it.

@@ -84,7 +84,7 @@ Impl& filter_impl(gpointer element) {
 
 /// Defines and registers the type of an element with an EventFilter of class `Impl`, which must
 /// have a member `settings`, which type_settings() returns; `...` is code for the type, such as
-/// interfaces. The type's class_init must follow.
+/// implement(). The type's class_init must follow.
 #define DEFINE_EVENT_FILTER(Type, type, OBJECT, Impl, element, ...)                \
   G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventFilter)                    \
   struct _##Type {                                                                 \

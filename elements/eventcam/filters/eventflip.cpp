@@ -78,7 +78,7 @@ class Flip final : public EventFilter {
 }  // namespace
 
 DEFINE_EVENT_FILTER(GstEventFlip, gst_event_flip, EVENT_FLIP, Flip, eventflip,
-                    G_IMPLEMENT_INTERFACE(GST_TYPE_VIDEO_DIRECTION, nullptr))
+                    implement(g_define_type_id, GST_TYPE_VIDEO_DIRECTION))
 
 static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection, GstCaps* caps,
                                GstCaps* filter) {

@@ -411,7 +411,7 @@ static void child_proxy_init(gpointer interface, gpointer) {
 
 DEFINE_EVENT_AGGREGATOR(GstEventMerge, gst_event_merge, EVENT_MERGE, EventMerge, eventmerge,
                         GST_RANK_NONE, "merged event streams",
-                        G_IMPLEMENT_INTERFACE(GST_TYPE_CHILD_PROXY, child_proxy_init))
+                        implement(g_define_type_id, GST_TYPE_CHILD_PROXY, child_proxy_init))
 #define PARENT_ELEMENT_CLASS GST_ELEMENT_CLASS(gst_event_merge_parent_class)
 #define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_event_merge_parent_class)
 
