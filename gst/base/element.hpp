@@ -21,8 +21,8 @@ inline void set_metadata(gpointer klass, const char* name, const char* kind,
                                         EVENTSIM_AUTHORS);
 }
 
-/// For code of G_DEFINE_TYPE_WITH_CODE in a macro, where G_IMPLEMENT_INTERFACE would be expanded too
-/// early.
+/// For code of G_DEFINE_TYPE_WITH_CODE in a macro, where G_IMPLEMENT_INTERFACE would be expanded
+/// too early.
 inline void implement(GType type, GType interface, GInterfaceInitFunc init = nullptr) {
   const GInterfaceInfo info = {init, nullptr, nullptr};
   g_type_add_interface_static(type, interface, &info);

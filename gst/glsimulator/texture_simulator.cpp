@@ -154,7 +154,7 @@ class TextureVideoSimulator final : public VideoSimulator {
     {
       const OwnedBuffer uploaded = in_texture(interval.frame.get());
       const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
-      if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
+      if (!texture.fault().empty()) refuse(cannot_read(texture.fault()), texture.fault());
       frame_.texture = texture.name();
       simulator_->set_flow(flow);
       run([&] { simulator_->queue(frame_, interval.end, settings); });
@@ -168,9 +168,9 @@ class TextureVideoSimulator final : public VideoSimulator {
     {
       const OwnedBuffer uploaded = in_texture(frame.get());
       const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
-      if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
+      if (!texture.fault().empty()) refuse(cannot_read(texture.fault()), texture.fault());
       const MappedTexture drawn(drawn_, picture, context_, GST_MAP_WRITE);
-      if (!drawn.fault().empty()) refuse(cannot_draw(drawn.fault()));
+      if (!drawn.fault().empty()) refuse(cannot_draw(drawn.fault()), drawn.fault());
       frame_.texture = texture.name();
       const eventcamera::gl::Picture out{
           drawn.name(), eventcamera::pixels_by_kind(palette, pixel_layout_of(drawn_))};
@@ -224,7 +224,7 @@ class TextureVideoSimulator final : public VideoSimulator {
   /// passes textures on unchanged.
   OwnedBuffer in_system_memory(GstBuffer* buffer) const {
     const VideoFrame mapped(video_, buffer, GST_MAP_READ);
-    if (!mapped) throw cannot_read(mapped.fault());
+    if (!mapped) throw VideoSimulatorError(cannot_read(mapped.fault()), mapped.fault());
     if (!gst_is_gl_memory(gst_buffer_peek_memory(buffer, 0)))
       return OwnedBuffer(gst_buffer_ref(buffer));
     OwnedBuffer copy(gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(&video_), nullptr));
@@ -255,15 +255,15 @@ class TextureVideoSimulator final : public VideoSimulator {
     auto result = gst_gl_upload_perform_with_buffer(upload_, in_memory.get(), &uploaded);
     if (result == GST_GL_UPLOAD_RECONFIGURE)  // it has selected an upload method
       result = gst_gl_upload_perform_with_buffer(upload_, in_memory.get(), &uploaded);
-    if (result != GST_GL_UPLOAD_DONE)
-      refuse(cannot_read("it cannot be uploaded to an OpenGL texture"));
+    const std::string fault = "it cannot be uploaded to an OpenGL texture";
+    if (result != GST_GL_UPLOAD_DONE) refuse(cannot_read(fault), fault);
     return OwnedBuffer(uploaded);
   }
 
   /// Throws the fault of a frame or a picture, or ContextLost if the context is the cause.
-  [[noreturn]] void refuse(const VideoSimulatorError& fault) {
+  [[noreturn]] void refuse(const Report& report, const std::string& cause) {
     run([] {});
-    throw fault;
+    throw VideoSimulatorError(report, cause);
   }
 
   /// Runs `work` in the context, which other elements share; turns OpenGL errors into messages.

@@ -69,15 +69,3 @@ class VideoSimulatorError : public std::runtime_error {
  private:
   Report report_;
 };
-
-inline VideoSimulatorError cannot_read(const std::string& fault) {
-  return {{GST_RESOURCE_ERROR_FAILED,
-           "Cannot read a video frame: " + fault + ". Check the element upstream."},
-          fault};
-}
-
-inline VideoSimulatorError cannot_draw(const std::string& fault) {
-  return {{GST_RESOURCE_ERROR_FAILED,
-           "Cannot draw into an output buffer: " + fault + ". Check the element downstream."},
-          fault};
-}

@@ -158,10 +158,7 @@ GstFlowReturn EventPictures::draw(const EventInterval& events, GstBuffer* buffer
   state_->renderer.configure(render_settings());
   const VideoFrame frame(*state_->video, buffer, GST_MAP_WRITE);
   if (!frame) {
-    GST_ELEMENT_ERROR(element(), RESOURCE, FAILED,
-                      ("Cannot draw into an output buffer: %s. Check the element downstream.",
-                       frame.fault().c_str()),
-                      ("%" GST_PTR_FORMAT, buffer));
+    post_message(element(), GST_MESSAGE_ERROR, cannot_draw(frame.fault()), frame.fault());
     return GST_FLOW_ERROR;
   }
   state_->renderer.draw(window_start(events), microseconds(events.end),

@@ -194,10 +194,7 @@ class EventFuse final : public FramesWithEvents {
   bool show(GstBuffer* buffer, GstClockTime start) {
     const VideoFrame frame(*video_, buffer, GST_MAP_READ);
     if (!frame) {
-      GST_ELEMENT_ERROR(
-          element(), RESOURCE, FAILED,
-          ("Cannot read a video frame: %s. Check the element upstream.", frame.fault().c_str()),
-          ("%" GST_PTR_FORMAT, buffer));
+      post_message(element(), GST_MESSAGE_ERROR, cannot_read(frame.fault()), frame.fault());
       return false;
     }
     const ImageView<std::uint8_t> view{reinterpret_cast<const std::uint8_t*>(frame.data()),
