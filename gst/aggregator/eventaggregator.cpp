@@ -4,9 +4,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_aggregator_debug);
 #define GST_CAT_DEFAULT event_aggregator_debug
 
-struct GstEventAggregatorPrivate {
-  std::unique_ptr<EventAggregator> impl;
-};
+using GstEventAggregatorPrivate = std::unique_ptr<EventAggregator>;
 
 G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventAggregator, gst_event_aggregator, GST_TYPE_AGGREGATOR,
                                  G_ADD_PRIVATE(GstEventAggregator)
@@ -100,9 +98,7 @@ static void answer_caps_of_passed(EventAggregator& self, GstAggregator* aggregat
 }
 
 struct EventAggregatorFunctions {
-  static EventAggregator& of(GstAggregator* element) {
-    return gst_event_aggregator_impl(GST_EVENT_AGGREGATOR(element));
-  }
+  static EventAggregator& of(GstAggregator* element) { return *gst_event_aggregator_impl(element); }
 
   /// True if the buffers of a pad pass through.
   static bool is_passed(const EventAggregator& self, GstAggregatorPad* pad) {
@@ -382,18 +378,9 @@ struct EventAggregatorFunctions {
   }
 };
 
-static GstEventAggregatorPrivate& priv_of(gpointer self) {
+std::unique_ptr<EventAggregator>& gst_event_aggregator_impl(gpointer element) {
   return *static_cast<GstEventAggregatorPrivate*>(
-      gst_event_aggregator_get_instance_private(GST_EVENT_AGGREGATOR(self)));
-}
-
-void gst_event_aggregator_set_impl(GstEventAggregator* self,
-                                   std::unique_ptr<EventAggregator> impl) {
-  priv_of(self).impl = std::move(impl);
-}
-
-EventAggregator& gst_event_aggregator_impl(GstEventAggregator* self) {
-  return *priv_of(self).impl;
+      gst_event_aggregator_get_instance_private(GST_EVENT_AGGREGATOR(element)));
 }
 
 void gst_event_aggregator_add_pads(GstEventAggregator* self) {
@@ -412,12 +399,12 @@ void gst_event_aggregator_add_pads(GstEventAggregator* self) {
 }
 
 static void finalize(GObject* object) {
-  std::destroy_at(&priv_of(object));
+  std::destroy_at(&gst_event_aggregator_impl(object));
   G_OBJECT_CLASS(gst_event_aggregator_parent_class)->finalize(object);
 }
 
 static void gst_event_aggregator_init(GstEventAggregator* self) {
-  new (&priv_of(self)) GstEventAggregatorPrivate;
+  std::construct_at(&gst_event_aggregator_impl(self));
   GstPad* const src = GST_AGGREGATOR_SRC_PAD(self);
   gst_pad_add_probe(
       src,

@@ -122,19 +122,18 @@ struct _GstEventAggregatorClass {
 /// Adds a sink pad per template of an always pad.
 void gst_event_aggregator_add_pads(GstEventAggregator* self);
 
-void gst_event_aggregator_set_impl(GstEventAggregator* self, std::unique_ptr<EventAggregator> impl);
-EventAggregator& gst_event_aggregator_impl(GstEventAggregator* self);
+std::unique_ptr<EventAggregator>& gst_event_aggregator_impl(gpointer element);
 
 /// For the init function of a subclass: creates its pads, then its EventAggregator.
 template <class Impl>
 void gst_event_aggregator_make(GstEventAggregator* self) {
   gst_event_aggregator_add_pads(self);
-  gst_event_aggregator_set_impl(self, std::make_unique<Impl>(GST_AGGREGATOR(self)));
+  gst_event_aggregator_impl(self) = std::make_unique<Impl>(GST_AGGREGATOR(self));
 }
 
 template <class Impl>
 Impl& aggregator_impl(gpointer element) {
-  return static_cast<Impl&>(gst_event_aggregator_impl(GST_EVENT_AGGREGATOR(element)));
+  return static_cast<Impl&>(*gst_event_aggregator_impl(element));
 }
 
 /// The member `settings` of an element's EventAggregator, for Properties.

@@ -58,12 +58,8 @@ static GstEventFilterPrivate& priv_of(gpointer self) {
       gst_event_filter_get_instance_private(GST_EVENT_FILTER(self)));
 }
 
-void gst_event_filter_set_impl(GstEventFilter* self, std::unique_ptr<EventFilter> impl) {
-  priv_of(self).impl = std::move(impl);
-}
-
-EventFilter& gst_event_filter_impl(GstEventFilter* self) {
-  return *priv_of(self).impl;
+std::unique_ptr<EventFilter>& gst_event_filter_impl(gpointer element) {
+  return priv_of(element).impl;
 }
 
 template <class Work>

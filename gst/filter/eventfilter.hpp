@@ -74,12 +74,11 @@ struct _GstEventFilterClass {
   GstBaseTransformClass parent_class;
 };
 
-void gst_event_filter_set_impl(GstEventFilter* self, std::unique_ptr<EventFilter> impl);
-EventFilter& gst_event_filter_impl(GstEventFilter* self);
+std::unique_ptr<EventFilter>& gst_event_filter_impl(gpointer element);
 
 template <class Impl>
 Impl& filter_impl(gpointer element) {
-  return static_cast<Impl&>(gst_event_filter_impl(GST_EVENT_FILTER(element)));
+  return static_cast<Impl&>(*gst_event_filter_impl(element));
 }
 
 /// Defines and registers the type of an element with an EventFilter of class `Impl`, which must
@@ -94,7 +93,7 @@ Impl& filter_impl(gpointer element) {
   GST_ELEMENT_REGISTER_DEFINE(element, #element, GST_RANK_NONE, type##_get_type()) \
   /* A type takes no parentheses: NOLINTNEXTLINE(bugprone-macro-parentheses) */    \
   static void type##_init(Type* self) {                                            \
-    gst_event_filter_set_impl(GST_EVENT_FILTER(self), std::make_unique<Impl>());   \
+    gst_event_filter_impl(self) = std::make_unique<Impl>();                        \
   }                                                                                \
   static auto& type##_settings(GObject* object) {                                  \
     return filter_impl<Impl>(object).settings;                                     \

@@ -41,9 +41,5 @@ inline constexpr SimulatorVideo system_memory_video = {
     .drawn_formats = DRAWN_VIDEO_FORMATS,
 };
 
-/// Fixates the output to events if `caps` (not empty) include them, else to video. Takes ownership
-/// of `caps`.
-GstCaps* event_simulator_fixate_output(GstCaps* caps);
-
 /// True if output caps are accumulated-event video, false for events.
 bool event_simulator_draws(const GstCaps* output);

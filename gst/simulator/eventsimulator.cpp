@@ -48,10 +48,17 @@ static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection dire
   return filtered;
 }
 
+/// Fixates the output to events if the caps include them, else to video.
 static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection direction, GstCaps*,
                             GstCaps* other) {
   if (direction == GST_PAD_SRC || gst_caps_is_empty(other)) return gst_caps_fixate(other);
-  return event_simulator_fixate_output(other);
+  guint chosen = 0;
+  for (guint i = gst_caps_get_size(other); i-- > 0;)
+    if (gst_structure_has_name(gst_caps_get_structure(other, i), GST_EVENT_CAMERA_MEDIA_TYPE))
+      chosen = i;
+  GstCaps* const fixed = gst_caps_copy_nth(other, chosen);
+  gst_caps_unref(other);
+  return gst_caps_fixate(fixed);
 }
 
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
@@ -105,17 +112,6 @@ static gboolean transform_size(GstBaseTransform*, GstPadDirection direction, Gst
     return FALSE;
   *other_size = GST_VIDEO_INFO_SIZE(&drawn);
   return TRUE;
-}
-
-/// Copies nothing: intervals inherit no metadata from the frame that ends them.
-static gboolean copy_no_metadata(GstBaseTransform*, GstBuffer*, GstBuffer*) {
-  return TRUE;
-}
-
-/// Never called, because generate_output() is overridden. GstBaseTransform allocates output buffers
-/// only for classes that have a transform().
-static GstFlowReturn transform_not_in_place(GstBaseTransform*, GstBuffer*, GstBuffer*) {
-  return GST_FLOW_NOT_SUPPORTED;
 }
 
 GstFlowReturn event_simulator_prepare_buffer(GstBaseTransform* element, GstBuffer* in,
@@ -399,8 +395,13 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   transform_class->propose_allocation = propose_allocation;
   transform_class->decide_allocation = decide_allocation;
   transform_class->transform_size = transform_size;
-  transform_class->copy_metadata = copy_no_metadata;
-  transform_class->transform = transform_not_in_place;
+  // Intervals inherit no metadata from the frame that ends them.
+  transform_class->copy_metadata = [](GstBaseTransform*, GstBuffer*, GstBuffer*) { return TRUE; };
+  // Never called, because generate_output() is overridden. GstBaseTransform allocates output
+  // buffers only for classes that have a transform().
+  transform_class->transform = [](GstBaseTransform*, GstBuffer*, GstBuffer*) {
+    return GST_FLOW_NOT_SUPPORTED;
+  };
   transform_class->submit_input_buffer = submit_input_buffer;
   transform_class->generate_output = generate_output;
   transform_class->sink_event = sink_event;

@@ -584,12 +584,8 @@ void Simulation::hold_until(Nanoseconds end, guint32 seqnum) {
     has_noise |= events != nullptr && events->size() > 0;
     if (events != nullptr && events->size() > 0) {
       if (sent < start) flow = push_gap(sent, start, seqnum);
-      const OwnedBuffer in(gst_buffer_new());
-      OwnedBuffer out;
-      if (flow == GST_FLOW_OK) flow = write_events(*events, in.get(), out);
       if (flow == GST_FLOW_OK)
-        flow = push_buffer(std::move(out), static_cast<GstClockTime>(start),
-                           static_cast<GstClockTime>(part_end - start));
+        push_interval(Interval{OwnedBuffer(gst_buffer_new()), start, part_end, events});
       sent = part_end;
     }
     start = part_end;
