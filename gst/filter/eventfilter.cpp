@@ -75,16 +75,6 @@ static auto reported(gpointer self, const Work& work) {
       work);
 }
 
-static GstFlowReturn reject(gpointer self, GstBuffer* buffer) {
-  auto& priv = priv_of(self);
-  priv.stream->faults.warn(self, event_fault(buffer), buffer);
-  const auto events = gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent);
-  const auto counters = priv.counters.lock();
-  counters->received += events;
-  counters->rejected += events;
-  return GST_BASE_TRANSFORM_FLOW_DROPPED;
-}
-
 /// Returns the start of a buffer on the time axis of the stream, after forgetting the past if time
 /// goes back. Rounded timestamps may overlap by a microsecond; the buffer then counts as later, for
 /// a filter that must not see time go back.
@@ -123,9 +113,14 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
   auto& priv = priv_of(transform);
   if (!priv.stream->state) return GST_FLOW_NOT_NEGOTIATED;
   const auto interval = interval_of(buffer);
-  if (!interval || gst_buffer_get_size(buffer) % sizeof(GstEventCameraEvent) != 0)
-    return reject(transform, buffer);
-
+  if (!interval || gst_buffer_get_size(buffer) % sizeof(Event) != 0) {
+    priv.stream->faults.warn(transform, event_fault(buffer), buffer);
+    const auto events = gst_buffer_get_size(buffer) / sizeof(Event);
+    const auto counters = priv.counters.lock();
+    counters->received += events;
+    counters->rejected += events;
+    return GST_BASE_TRANSFORM_FLOW_DROPPED;
+  }
   return reported(transform, [&] {
     align_events(buffer);
     std::optional<WritableBytes> mapped(std::in_place, buffer, GST_MAP_READWRITE);

@@ -151,9 +151,7 @@ static GstFlowReturn push_window(Private& self, std::span<const AbsoluteEvent> e
   lengthen_latency(self, duration);
   if (events.empty()) return push_event(src, gst_event_new_gap(pts, duration));
 
-  OwnedBuffer buffer;
-  const GstFlowReturn result = stream->buffers.acquire(events.size() * sizeof(Event), buffer);
-  if (result != GST_FLOW_OK) return result;
+  OwnedBuffer buffer = stream->buffers.acquire(events.size() * sizeof(Event));
   std::ranges::transform(events, WritableBytes(buffer.get()).events().begin(),
                          [start](const AbsoluteEvent& event) {
                            return Event{static_cast<guint32>(event.t - start), event.x, event.y_p};

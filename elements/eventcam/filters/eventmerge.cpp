@@ -542,10 +542,7 @@ class EventMerge final : public EventAggregator {
     const auto start = nanoseconds(interval.start);
     const auto duration = nanoseconds(interval.end - interval.start);
     if (interval.events == 0) return push_empty_interval(start, duration);
-    const gsize size = interval.events * sizeof(Event);
-    OwnedBuffer buffer;
-    const GstFlowReturn result = buffers_.acquire(size, buffer);
-    if (result != GST_FLOW_OK) return result;
+    OwnedBuffer buffer = buffers_.acquire(interval.events * sizeof(Event));
     {
       const WritableBytes mapped(buffer.get());
       LabelledEvents events{.events = mapped.events(), .labels = {}};

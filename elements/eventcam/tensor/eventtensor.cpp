@@ -307,9 +307,7 @@ static GstClockTime max_pause_of(const State& state) {
 
 static GstFlowReturn push_tensor(Private& self, const WindowQueue::Window& window) {
   auto& tensor = self.stream->state->tensor;
-  OwnedBuffer buffer;
-  const GstFlowReturn result = self.stream->buffers.acquire(tensor.bytes(), buffer);
-  if (result != GST_FLOW_OK) return result;
+  OwnedBuffer buffer = self.stream->buffers.acquire(tensor.bytes());
   GstBuffer* const acquired = buffer.get();
   tensor.write(window.events, window.end / static_cast<Nanoseconds>(GST_USECOND),
                WritableBytes(acquired).get().data());
