@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/event_pool.hpp"
 
-#include <algorithm>
 #include <atomic>
 #include <bit>
 #include <new>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/filter/eventfilter.hpp"
 
-#include <cstdint>
 #include <limits>
 
 #include "gst/base/buffer_bytes.hpp"

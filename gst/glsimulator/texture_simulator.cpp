@@ -3,14 +3,7 @@
 #include <gst/gl/gstglfuncs.h>
 #include <gst/video/video.h>
 
-#include <algorithm>
-#include <exception>
 #include <iterator>
-#include <memory>
-#include <new>
-#include <optional>
-#include <string>
-#include <utility>
 
 #include "gst/glsimulator/gleventsimulator.hpp"
 #include "gst/glsimulator/shared_context.hpp"

@@ -1,11 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 
-#include <array>
-#include <exception>
-#include <new>
-#include <optional>
-#include <span>
-
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/frame_buffer.hpp"

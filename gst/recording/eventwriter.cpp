@@ -1,13 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/eventwriter.hpp"
 
-#include <algorithm>
-#include <cstdint>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/recording/file_extensions.hpp"

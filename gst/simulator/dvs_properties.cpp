@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/simulator/dvs_properties.hpp"
 
-#include <algorithm>
 #include <bitset>
 #include <cstdint>
 #include <iterator>
-#include <stdexcept>
-#include <type_traits>
 #include <variant>
 
 #include "gst/simulator/camera_profile.hpp"

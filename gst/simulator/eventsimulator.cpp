@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 
-#include <atomic>
-
 #include "gst/base/event_pool.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/seek_request.hpp"

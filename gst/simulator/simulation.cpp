@@ -2,9 +2,6 @@
 #include "gst/simulator/simulation.hpp"
 
 #include <cmath>
-#include <cstring>
-#include <span>
-#include <vector>
 
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/event_buffer.hpp"

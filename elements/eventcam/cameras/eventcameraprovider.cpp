@@ -12,8 +12,6 @@
 #include <cctype>
 #include <cstdint>
 #include <cstring>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "elements/eventcam/cameras/event_camera.hpp"

@@ -43,14 +43,6 @@
  */
 #include <gst/video/video.h>
 
-#include <algorithm>
-#include <memory>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "elements/eventcam/cameras/event_camera.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/buffer_bytes.hpp"

@@ -26,14 +26,6 @@
  *
  * Since: 0.1
  */
-#include <algorithm>
-#include <cstdint>
-#include <new>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
-
 #include "elements/eventcam/drawing/frame_times.hpp"
 #include "elements/eventcam/drawing/frames_with_events.hpp"
 #include "gst/base/video_frame.hpp"

@@ -23,13 +23,7 @@
  */
 #include <gst/video/video.h>
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <new>
-#include <optional>
-#include <span>
 
 #include "elements/eventcam/drawing/frames_with_events.hpp"
 #include "gst/base/video_frame.hpp"

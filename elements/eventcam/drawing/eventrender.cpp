@@ -34,7 +34,6 @@
  *
  * Since: 0.1
  */
-#include <algorithm>
 #include <limits>
 
 #include "elements/eventcam/drawing/event_pictures.hpp"

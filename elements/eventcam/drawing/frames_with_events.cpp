@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "elements/eventcam/drawing/frames_with_events.hpp"
 
-#include <cstdint>
 #include <limits>
 
 #include "gst/base/video_frame.hpp"

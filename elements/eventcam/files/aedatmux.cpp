@@ -32,16 +32,9 @@
 #include <gst/base/gstaggregator.h>
 #include <gst/video/video.h>
 
-#include <algorithm>
 #include <atomic>
-#include <memory>
-#include <optional>
-#include <span>
 #include <stdexcept>
-#include <string>
 #include <string_view>
-#include <utility>
-#include <vector>
 
 #include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/buffer_bytes.hpp"

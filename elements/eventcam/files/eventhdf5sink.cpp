@@ -25,11 +25,7 @@
 
 #include <cerrno>
 #include <chrono>
-#include <memory>
-#include <span>
-#include <string>
 #include <system_error>
-#include <utility>
 
 #include "gst/base/pads.hpp"
 #include "gst/recording/file_extensions.hpp"

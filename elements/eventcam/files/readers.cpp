@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// The elements that read event files: a table of formats for GstEventReader.
-#include <memory>
-#include <utility>
 
 #include "elements/eventcam/files/es_origin.hpp"
 #include "features.hpp"

@@ -30,11 +30,7 @@
  */
 #include <gst/base/gstbasetransform.h>
 
-#include <algorithm>
 #include <limits>
-#include <optional>
-#include <utility>
-#include <vector>
 
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/element.hpp"

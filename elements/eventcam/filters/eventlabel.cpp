@@ -27,13 +27,7 @@
  */
 #include <gst/video/video.h>
 
-#include <algorithm>
 #include <limits>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/video_frame.hpp"

@@ -36,14 +36,8 @@
  *
  * Since: 0.1
  */
-#include <algorithm>
 #include <atomic>
 #include <map>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/buffer_bytes.hpp"

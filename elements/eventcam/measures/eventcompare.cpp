@@ -55,8 +55,6 @@
  *
  * Since: 0.1
  */
-#include <optional>
-
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
 #include "src/measure/stream_comparison.hpp"

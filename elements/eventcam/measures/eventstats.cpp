@@ -41,9 +41,7 @@
  */
 #include <gst/base/gstbasetransform.h>
 
-#include <algorithm>
 #include <limits>
-#include <optional>
 
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/base/pads.hpp"

@@ -37,13 +37,6 @@
  */
 #include <gst/net/gstnetaddressmeta.h>
 
-#include <memory>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "elements/eventcam/network/reception_reports.hpp"
 #include "gst/base/arrival_segment.hpp"

@@ -24,13 +24,7 @@
  *
  * Since: 0.1
  */
-
 #include <limits>
-#include <memory>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "elements/eventcam/network/flush_timer.hpp"

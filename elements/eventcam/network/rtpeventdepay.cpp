@@ -45,11 +45,7 @@
 #include <gst/rtp/gstrtpbuffer.h>
 
 #include <charconv>
-#include <exception>
-#include <optional>
-#include <string>
 #include <string_view>
-#include <utility>
 
 #include "elements/eventcam/network/reception_reports.hpp"
 #include "elements/eventcam/network/rtp_events.hpp"

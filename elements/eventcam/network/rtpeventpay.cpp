@@ -30,10 +30,6 @@
 #include <gst/rtp/gstrtpbuffer.h>
 #include <gst/rtp/gstrtphdrext.h>
 
-#include <algorithm>
-#include <memory>
-#include <optional>
-#include <string>
 #include <string_view>
 
 #include "elements/eventcam/network/flush_timer.hpp"

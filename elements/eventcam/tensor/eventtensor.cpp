@@ -56,12 +56,6 @@
  *
  * Since: 0.1
  */
-
-#include <algorithm>
-#include <optional>
-#include <string>
-#include <utility>
-
 #include "features.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/element.hpp"
@@ -73,7 +67,6 @@
 #ifdef HAVE_TENSOR_META
 #include <gst/analytics/analytics.h>
 
-#include <array>
 #endif
 
 GST_DEBUG_CATEGORY_STATIC(event_tensor_debug);

@@ -29,10 +29,7 @@
  */
 #include <gst/video/video.h>
 
-#include <optional>
-#include <string>
 #include <string_view>
-#include <utility>
 
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/video_frame.hpp"
