@@ -76,7 +76,7 @@ class AedatFile {
     return queue(triggers_of(event), triggers_) || queue(imu_samples_of(event), imu_samples_);
   }
 
-  /// True if too many items wait to wait any longer.
+  /// True if too many items are queued to wait for a buffer.
   bool is_full() const {
     const auto is_full = [](const auto& waiting) { return waiting && waiting->is_full(); };
     return is_full(triggers_) || is_full(imu_samples_);
@@ -289,7 +289,7 @@ static Kind kind_of(GstAggregatorPad* pad) {
   return kind_of(caps.get());
 }
 
-/// Segment of a pad, if it is one of times.
+/// Segment of a pad, if it is in time format.
 static std::optional<GstSegment> segment_of(GstAggregatorPad* pad) {
   GST_OBJECT_LOCK(pad);
   const GstSegment segment = pad->segment;
@@ -372,7 +372,7 @@ static GstFlowReturn end_file(Private& self) {
   return push_bytes(self, std::move(patch->bytes));
 }
 
-/// Segment of the events before the next frame, or of those that come first; none without events.
+/// Segment of the events written last, else of the first ones; none without events.
 static std::optional<GstSegment> segment_of_events(Private& self) {
   if (const auto& segment = self.segment) return segment;
   for (const Pad& pad : sink_pads(self.element))

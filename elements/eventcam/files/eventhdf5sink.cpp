@@ -193,7 +193,7 @@ static gboolean event(GstBaseSink* sink, GstEvent* event) {
   return GST_BASE_SINK_CLASS(gst_event_hdf5_sink_parent_class)->event(sink, event);
 }
 
-/// GstBaseSink's start and stop are of READY, in which the properties may still be set.
+/// GstBaseSink calls start() and stop() in READY, where properties may still change.
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
   auto& self = priv_of(element);
   if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && self.settings.copy().location.empty()) {

@@ -20,8 +20,8 @@ GstEvent* with_seqnum(GstEvent* event, guint32 seqnum) {
 
 namespace {
 
-/// Memory of event buffers that were freed, in any thread, for further buffers. It is kept while
-/// buffers need as much, and up to a limit.
+/// Recycles the memory of freed event buffers, from any thread: up to a limit, and only as long as
+/// buffers need as much.
 class SpareMemory {
  public:
   std::vector<Event> pop() {

@@ -36,25 +36,25 @@ class ReaderOutput {
   /// Forgets the file; pads of demuxers are removed.
   void reset();
 
-  /// The next output is that recording's; null: there is none until the next call.
+  /// Sets the recording that output comes from; null: no output until the next call.
   void set_recording(std::shared_ptr<eventcamera::RecordingReader> recording);
 
   /// Upstream begins a new stream. Takes ownership of the event.
   void start_stream(GstEvent* stream_start);
 
-  /// The next output follows a segment of its own.
+  /// Starts the next output with a new segment.
   void interrupt();
 
-  /// The next output is discontinuous, in the same segment.
+  /// Flags the next output as discontinuous, in the same segment.
   void interrupt_data();
 
-  /// Drops events that wait, and flow returns.
+  /// Drops waiting events and flow returns.
   void flush();
 
-  /// Upstream sends the segment.
+  /// Leaves the next segment to upstream.
   void expect_segment();
 
-  /// Segments and messages have this seqnum from now on.
+  /// Sets the seqnum of further segments and messages.
   void set_seqnum(guint32 seqnum) { seqnum_ = seqnum; }
 
   /// True once all pads of the first streams were added.

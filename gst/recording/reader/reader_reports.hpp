@@ -12,8 +12,7 @@
 
 GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
 
-/// What a reader tells users about a recording: statistics, and messages about corrupt, dropped and
-/// unread content.
+/// Statistics of a recording, and messages about its corrupt, dropped and unread content.
 class ReaderReports {
  public:
   ReaderReports(GstElement* element, bool has_many_streams)

@@ -27,8 +27,8 @@ inline std::optional<eventcamera::Microseconds> stop_of(const GstSegment& segmen
   return microseconds(segment.stop + GST_USECOND - 1);
 }
 
-/// Where a reader is: the segment that it plays, its position and duration, and a seek that
-/// upstream was asked for. Answers queries. May be used from any thread.
+/// Playback state of a reader: segment, position, duration, and a pending seek upstream. Answers
+/// queries. May be used from any thread.
 class ReaderTimeline {
  public:
   using Recording = std::shared_ptr<const eventcamera::RecordingReader>;
@@ -185,7 +185,7 @@ class ReaderTimeline {
   guint32 last_seek() { return state_.lock()->last_seek; }
   void set_last_seek(guint32 seqnum) { state_.lock()->last_seek = seqnum; }
 
-  /// Push mode: a seek to `segment` waits for upstream from now on.
+  /// Push mode: begins a seek to `segment`, which upstream completes with a BYTES segment.
   Restart begin_restart(const SeekRequest& request, const GstSegment& segment) {
     Restart restart{.segment = segment, .seek_point = {}, .seqnum = request.seqnum()};
     Recording recording;
