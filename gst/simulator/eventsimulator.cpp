@@ -3,6 +3,7 @@
 #include "gst/base/event_pool.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/seek_request.hpp"
+#include "gst/eventcamera/eventcamera.h"
 #include "gst/simulator/simulation.hpp"
 
 GST_DEBUG_CATEGORY(event_simulator_debug);
@@ -394,7 +395,9 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   transform_class->decide_allocation = decide_allocation;
   transform_class->transform_size = transform_size;
   // Intervals inherit no metadata from the frame that ends them.
-  transform_class->copy_metadata = [](GstBaseTransform*, GstBuffer*, GstBuffer*) { return TRUE; };
+  transform_class->copy_metadata = [](GstBaseTransform*, GstBuffer*, GstBuffer*) -> gboolean {
+    return TRUE;
+  };
   // Never called, because generate_output() is overridden. GstBaseTransform allocates output
   // buffers only for classes that have a transform().
   transform_class->transform = [](GstBaseTransform*, GstBuffer*, GstBuffer*) {

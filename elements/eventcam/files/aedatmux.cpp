@@ -611,7 +611,7 @@ static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplat
 }
 
 static gboolean start(GstAggregator* aggregator) {
-  send_segment(GST_AEDAT_MUX(aggregator), 0);
+  send_segment(priv_of(aggregator), 0);
   return TRUE;
 }
 
@@ -622,7 +622,7 @@ static gboolean stop(GstAggregator* aggregator) {
   self.events_pad = nullptr;
   self.video_pad = nullptr;
   self.has_header = false;
-  pop_segment_ends(GST_AEDAT_MUX(aggregator));
+  pop_segment_ends(self);
   return TRUE;
 }
 
