@@ -28,7 +28,6 @@
  */
 #include "features.hpp"
 #include "gst/simulator/dense_properties.hpp"
-#include "gst/simulator/eventsimulator.hpp"
 #include "gst/simulator/luma_video_simulator.hpp"
 #include "src/simulate/simulators.hpp"
 
