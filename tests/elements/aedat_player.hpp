@@ -19,7 +19,6 @@ struct Track {
   std::string caps;
   std::vector<eventcamera::AbsoluteEvent> events;
   std::vector<Picture> pictures;
-  std::size_t buffers = 0;
   std::size_t gaps = 0;
   GstClockTime end = 0;
   GstSegment segment{};
@@ -71,9 +70,7 @@ class AedatPlayer : public Pipeline {
                       static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER |
                                                    GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
                       seen, self, nullptr);
-    GstPad* const in = gst_element_get_static_pad(queue, "sink");
-    gst_pad_link(pad, in);
-    gst_object_unref(in);
+    gst_pad_link(pad, harness::static_pad(queue, "sink").get());
     gst_element_sync_state_with_parent(sink);
     gst_element_sync_state_with_parent(queue);
   }
@@ -90,7 +87,6 @@ class AedatPlayer : public Pipeline {
   }
 
   static void see(Track& track, GstBuffer* buffer, bool of_events) {
-    ++track.buffers;
     EXPECT_GE(GST_BUFFER_PTS(buffer), track.end) << "intervals overlap";
     if (!of_events) {
       track.end = GST_BUFFER_PTS(buffer);
@@ -109,9 +105,7 @@ class AedatPlayer : public Pipeline {
       case GST_EVENT_CAPS: {
         GstCaps* caps = nullptr;
         gst_event_parse_caps(event, &caps);
-        gchar* const text = gst_caps_to_string(caps);
-        track.caps = text;
-        g_free(text);
+        track.caps = harness::text_of(harness::Owned<GstCaps>(gst_caps_ref(caps)));
         break;
       }
       case GST_EVENT_SEGMENT: {
@@ -122,9 +116,7 @@ class AedatPlayer : public Pipeline {
         break;
       }
       case GST_EVENT_GAP: {
-        GstClockTime start = 0;
-        GstClockTime duration = 0;
-        gst_event_parse_gap(event, &start, &duration);
+        const auto [start, duration] = harness::gap_of(event);
         EXPECT_GE(start, track.end);
         EXPECT_GT(duration, 0U);
         track.end = start + duration;

@@ -11,30 +11,19 @@ namespace {
 using namespace harness;
 using namespace aedat_recordings;
 
-/// What the buffers hold that were not pulled before.
-Content rest_of(GstHarness* h) {
+/// Waits for the end of the file, and returns what was not pulled before.
+Content rest_of_file(GstHarness* h) {
   Bytes bytes;
-  while (const Buffer buffer{gst_harness_try_pull(h)}) {
+  for (const auto& buffer : pull_until_eos(h)) {
     const auto piece = bytes_of(buffer.get());
     bytes.insert(bytes.end(), piece.begin(), piece.end());
   }
   return Content(bytes);
 }
 
-/// Waits for the end of the file, and returns what was not pulled before.
-Content rest_of_file(GstHarness* h) {
-  EXPECT_TRUE(next_event(h, GST_EVENT_EOS));
-  return rest_of(h);
-}
-
 /// Pushes a segment in which this timestamp has this running time.
 void push_segment(GstHarness* h, GstClockTime pts, GstClockTime running_time, double rate = 1) {
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  segment.start = segment.time = pts;
-  segment.base = running_time;
-  segment.rate = rate;
-  EXPECT_TRUE(gst_harness_push_event(h, gst_event_new_segment(&segment)));
+  harness::push_segment(h, {.start = pts, .time = pts, .base = running_time, .rate = rate});
 }
 
 /// The muxer with one sink pad.
@@ -52,7 +41,7 @@ struct Mux : Harness {
 
   /// Ends the file, and returns what is not pulled yet.
   Content end() {
-    EXPECT_TRUE(gst_harness_push_event(get(), gst_event_new_eos()));
+    push_eos(get());
     return rest_of_file(get());
   }
 };
@@ -98,16 +87,13 @@ struct EventsAndVideo : TwoInputs {
               GST_FLOW_OK);
   }
 
-  Content end() const {
-    for (const auto& h : {first.get(), second.get()})
-      gst_harness_push_event(h, gst_event_new_eos());
+  Content content() const {
+    end();
     return rest_of_file(first.get());
   }
 
   void push_frame(GstClockTime pts) const {
-    GstBuffer* const frame = gst_buffer_new_memdup("0123456789abcdef", 16);
-    GST_BUFFER_PTS(frame) = pts;
-    EXPECT_EQ(gst_harness_push(second.get(), frame), GST_FLOW_OK);
+    EXPECT_EQ(gst_harness_push(second.get(), filled(16, 7, pts, GST_CLOCK_TIME_NONE)), GST_FLOW_OK);
   }
 };
 
@@ -122,7 +108,7 @@ TEST(AedatMux, WritesFramesWithTheEventsOfTheirRunningTime) {
   push_segment(events, 5 * GST_SECOND + 10 * GST_MSECOND, 5 * GST_MSECOND);
   mux.push_events(5 * GST_SECOND + 10 * GST_MSECOND);
   mux.push_frame(GST_SECOND + 7 * GST_MSECOND);
-  const auto content = mux.end();
+  const auto content = mux.content();
   ASSERT_EQ(content.pictures.size(), 2U);
   EXPECT_EQ(content.pictures[0].times[0], 5'008'000);
   EXPECT_EQ(content.pictures[1].times[0], 5'012'000);
@@ -135,11 +121,11 @@ TEST(AedatMux, WritesEventsAfterAGapBeforeLaterFrames) {
   const EventsAndVideo mux;
   auto* const events = mux.first.get();
   push_segment(events, 0, 0, 2);
-  gst_harness_push_event(events, gst_event_new_gap(0, 40 * GST_MSECOND));
+  push_gap(events, 0, 40 * GST_MSECOND);
   mux.push_frame(30 * GST_MSECOND);
   push_segment(events, 40 * GST_MSECOND, 20 * GST_MSECOND);
   mux.push_events(40 * GST_MSECOND);
-  const auto content = mux.end();
+  const auto content = mux.content();
   ASSERT_EQ(content.pictures.size(), 1U);
   EXPECT_EQ(content.pictures[0].times[0], 50'000) << "the segment of the events after the gap";
 }

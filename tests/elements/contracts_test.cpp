@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Contracts of every element that takes events or frames: segments, flushes, DISCONT, GAP, custom
-// events and EOS.
+// events, EOS, errors and states.
 #include <gst/base/gstbasesink.h>
 
 #include <cstring>
@@ -23,7 +23,7 @@ class Output {
     std::string name;            ///< of an event; or "buffer"
     GstClockTime base;           ///< of the segment that it belongs to; none before the first
     GstClockTime discontinuity;  ///< PTS of a buffer that is flagged DISCONT; else none
-    std::vector<guint8> bytes;   ///< of a buffer
+    std::string bytes;           ///< of a buffer
   };
 
   explicit Output(GstPad* pad) {
@@ -54,8 +54,8 @@ class Output {
     const std::lock_guard lock(mutex_);
     return items_;
   }
-  std::vector<std::vector<guint8>> buffers_after_flushes() const {
-    std::vector<std::vector<guint8>> buffers;
+  std::vector<std::string> buffers_after_flushes() const {
+    std::vector<std::string> buffers;
     for (const auto& item : all()) {
       if (item.name == "buffer") buffers.push_back(item.bytes);
       if (item.name == "flush-stop") buffers.clear();
@@ -71,20 +71,16 @@ class Output {
       base_ = segment->base;
     }
     if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP) base_ = GST_CLOCK_TIME_NONE;
-    const GstStructure* structure = gst_event_get_structure(event);
-    const bool is_custom = GST_EVENT_TYPE(event) == GST_EVENT_CUSTOM_DOWNSTREAM;
-    add(is_custom ? gst_structure_get_name(structure) : GST_EVENT_TYPE_NAME(event));
+    add(event_name(event));
   }
   void add(GstBuffer* buffer) {
-    std::vector<guint8> bytes(gst_buffer_get_size(buffer));
-    if (!bytes.empty()) gst_buffer_extract(buffer, 0, bytes.data(), bytes.size());
     add("buffer", GST_BUFFER_IS_DISCONT(buffer) ? GST_BUFFER_PTS(buffer) : GST_CLOCK_TIME_NONE,
-        std::move(bytes));
+        bytes_of(buffer));
   }
   void add(const std::string& name, GstClockTime discontinuity = GST_CLOCK_TIME_NONE,
-           std::vector<guint8> bytes = {}) {
+           const std::string& bytes = {}) {
     const std::lock_guard lock(mutex_);
-    items_.push_back({name, base_, discontinuity, std::move(bytes)});
+    items_.push_back({name, base_, discontinuity, bytes});
   }
 
   mutable std::mutex mutex_;
@@ -167,7 +163,7 @@ class Consumer {
       if (!events.empty()) std::memcpy(bytes.data(), events.data(), bytes.size() - extra_bytes);
       GstBuffer* const buffer =
           input.takes_frames ? frame(1) : gst_buffer_new_memdup(bytes.data(), bytes.size());
-      GST_BUFFER_PTS(buffer) = input.takes_frames ? 10 * GST_MSECOND : pts;
+      if (!input.takes_frames) GST_BUFFER_PTS(buffer) = pts;
       GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;
       gst_pad_push(input.pad.get(), buffer);
     });
@@ -244,10 +240,8 @@ class Consumer {
   };
 
   static GstBuffer* frame(guint index) {
-    constexpr gsize size = gsize{64} * 48;
-    GstBuffer* const buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
-    gst_buffer_memset(buffer, 0, index % 2 == 1 ? 0xff : 0, size);
-    return buffer;
+    return filled(gsize{64} * 48, index % 2 == 1 ? 0xff : 0, index * 10 * GST_MSECOND,
+                  10 * GST_MSECOND);
   }
   /// Events of neighbouring pixels, so that a denoiser keeps the last one.
   static GstBuffer* neighbours(guint index) {
@@ -288,14 +282,6 @@ TEST_P(EveryConsumer, EndsEachSegmentOnceAfterItsStart) {
   }
 }
 
-TEST_P(EveryConsumer, ForwardsCustomEventsAndTagsWithoutData) {
-  Consumer it(GetParam());
-  it.push_segment();
-  it.push_custom_event_and_tag();
-  it.end();
-  it.expect_custom_events_and_tags();
-}
-
 TEST_P(EveryConsumer, EndsAfterGaps) {
   Consumer it(GetParam());
   it.push_segment();
@@ -306,12 +292,14 @@ TEST_P(EveryConsumer, EndsAfterGaps) {
 }
 
 TEST_P(EveryConsumer, ForwardsCustomEventsAndTags) {
-  Consumer it(GetParam());
-  it.push_segment();
-  for (guint i = 0; i < 3; ++i) it.push_interval(i);
-  it.push_custom_event_and_tag();
-  it.end();
-  it.expect_custom_events_and_tags();
+  for (const guint intervals : {0, 3}) {
+    Consumer it(GetParam());
+    it.push_segment();
+    for (guint i = 0; i < intervals; ++i) it.push_interval(i);
+    it.push_custom_event_and_tag();
+    it.end();
+    it.expect_custom_events_and_tags();
+  }
 }
 
 /// The output after a flush is that of an element which receives nothing before, also if a segment
@@ -465,6 +453,116 @@ TEST_P(EveryJoiner, AsksOnceForTheStreamThatIsMissing) {
   h.wait_for_events();
   EXPECT_NE(h.warning().find("link a s"), std::string::npos);
   EXPECT_EQ(h.warning(), "");
+}
+
+/* errors, where GStreamer tries again what was refused */
+
+constexpr auto small = "application/x-event-camera, format=XYTP, width=32, height=24";
+constexpr auto large = "application/x-event-camera, format=XYTP, width=16384, height=16384";
+
+struct Refusal {
+  const char* launch;
+  const char* caps;
+  const char* error;
+  double rate = 1;
+};
+
+void PrintTo(const Refusal& refusal, std::ostream* out) {
+  *out << refusal.launch << ": " << refusal.error;
+}
+
+constexpr Refusal refusals[] = {
+    {"eventcrop left=40", small, "Cannot filter the events: cropping 40 columns"},
+    {"eventmask location=/nowhere", small, "Cannot filter the events: cannot read the mask"},
+    {"eventtensor bins=256", large, "Cannot make tensors that take more than 1 GiB"},
+    {"evtenc", large, "This file format cannot hold the stream"},
+    {"evtparse", "application/x-event-camera, format=EVT3, framerate=0/1",
+     "Cannot read this camera"},
+    {"eventdatagrampay format=jaer", large, "jAER's addresses support sensors of up to 1024x512"},
+    {"rtpeventpay", large, "EVT3 words support sensors of 1x1 to 2048x2048 pixels"},
+    {"eventdatagramdepay width=32 height=24", "application/x-event-datagram",
+     "Cannot receive events backwards", -1},
+    {"evtdec", "application/x-event-camera, format=EVT3, width=32, height=24",
+     "Cannot read events backwards", -1},
+    {"evtparse", "application/x-event-camera, format=EVT3, width=32, height=24, framerate=0/1",
+     "Cannot parse events backwards", -1},
+    {"rtpeventdepay",
+     "application/x-rtp, media=application, clock-rate=1000000, "
+     "encoding-name=X-EVENT-CAMERA, width=32, height=24",
+     "Cannot receive events backwards", -1},
+    {"rtpeventpay", small, "Cannot send events backwards", -1},
+};
+
+class EveryRefusal : public testing::TestWithParam<Refusal> {};
+INSTANTIATE_TEST_SUITE_P(, EveryRefusal, testing::ValuesIn(refusals));
+
+/// Sticky events that are refused come again before each buffer and event that follows.
+TEST_P(EveryRefusal, IsToldOncePerStart) {
+  const auto& refusal = GetParam();
+  Harness h(refusal.launch);
+  for (int start = 0; start < 2; ++start) {
+    gst_harness_set_src_caps_str(h.get(), refusal.caps);
+    push_segment(h.get(), {.stop = GST_SECOND, .rate = refusal.rate});
+    for (const GstClockTime time : {0, 10})
+      EXPECT_NE(h.push(buffer_of(time * GST_MSECOND, {{0, 1, 1}}, GST_MSECOND)), GST_FLOW_OK);
+    push_eos(h.get());
+    EXPECT_EQ(h.error().find(refusal.error), 0U);
+    EXPECT_EQ(h.error(), "");
+    gst_element_set_state(h->element, GST_STATE_READY);
+    gst_element_set_state(h->element, GST_STATE_PLAYING);
+    gst_harness_push_event(h.get(), gst_event_new_stream_start("again"));
+  }
+}
+
+/* states */
+
+INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
+
+class AllStates : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(, AllStates, testing::ValuesIn(element_names()), element_lines::test_name);
+
+/// As GStreamer's generic tests of all elements do.
+TEST_P(AllStates, AreReachedFromEachOther) {
+  const auto element = Kind(GetParam()).make();
+  const auto states = {GST_STATE_NULL, GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_PLAYING};
+  for (const auto from : states)
+    for (const auto to : states)
+      for (const auto state : {from, to, from})
+        EXPECT_NE(gst_element_set_state(element.get(), state), GST_STATE_CHANGE_FAILURE)
+            << gst_element_state_get_name(from) << " and " << gst_element_state_get_name(to);
+  EXPECT_EQ(gst_element_set_state(element.get(), GST_STATE_NULL), GST_STATE_CHANGE_SUCCESS);
+  EXPECT_EQ(GST_OBJECT_REFCOUNT_VALUE(element.get()), 1);
+}
+
+TEST_P(EverySimulator, PlaysAgainAfterAStop) {
+  Pipeline pipeline(
+      "videotestsrc name=source pattern=ball num-buffers=6 ! video/x-raw,width=80,height=60 ! " +
+      with_upload(GetParam()) + " ! fakesink name=sink signal-handoffs=true");
+  int buffers = 0;
+  g_signal_connect(pipeline["sink"], "handoff",
+                   G_CALLBACK(+[](GstElement*, GstBuffer*, GstPad*, int* count) { ++*count; }),
+                   &buffers);
+  for (int times = 1; times <= 3; ++times) {
+    ASSERT_TRUE(pipeline.play()) << pipeline.error;
+    pipeline.set(GST_STATE_NULL);
+    EXPECT_EQ(buffers, 5 * times);
+  }
+}
+
+TEST_P(AllStates, AreLeftByAnElementThatIsFreed) {
+  bool freed = false;
+  {
+    const auto pipeline = launched(Kind(GetParam()).launch_with_sources(1'000'000));
+    const Owned<GstElement> element(gst_bin_get_by_name(GST_BIN(pipeline.get()), "it"));
+    tell_when_freed(element.get(), freed);
+    gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+    EXPECT_EQ(gst_element_get_state(pipeline.get(), nullptr, nullptr, 60 * GST_SECOND),
+              GST_STATE_CHANGE_SUCCESS);
+    gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+  }
+  // A thread of the pipeline may still hold it.
+  for (int i = 0; i < 500 && !freed; ++i) g_usleep(10'000);
+  EXPECT_TRUE(freed);
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ TEST_P(EveryWord, KeepsTheTimesOfItsBuffers) {
     // Nothing is delayed by more than an interval.
     EXPECT_GE(read.size() + 4, expected.size());
   }
-  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  push_eos(reader.get());
   while (const auto buffer = reader.pull()) append_events(buffer.get(), read);
   EXPECT_EQ(read, expected);
   EXPECT_EQ(gst_harness_query_latency(reader.get()), 10 * GST_MSECOND);
@@ -48,12 +48,12 @@ TEST_P(EveryWord, KeepsTheTimesOfItsBuffers) {
 TEST_P(EveryWord, FollowsGapsAndFlushes) {
   Writer writer("evtenc", caps);
   Reader reader("evtdec", caps);
-  gst_harness_push_event(reader.get(), gst_event_new_gap(0, 10 * GST_MSECOND));
+  push_gap(reader.get(), 0, 10 * GST_MSECOND);
   EXPECT_TRUE(reader.pull_event(GST_EVENT_GAP));
   const auto event = AbsoluteEvent::at(3, 4, 12'000, Polarity::on);
   writer.write(event, 10'000);
   reader.push(writer.pull().release());
-  gst_harness_push_event(reader.get(), gst_event_new_gap(20 * GST_MSECOND, 30 * GST_MSECOND));
+  push_gap(reader.get(), 20 * GST_MSECOND, 30 * GST_MSECOND);
   EXPECT_EQ(pull_events(reader), std::vector{event});
   EXPECT_TRUE(reader.pull_event(GST_EVENT_GAP));
 
@@ -64,7 +64,7 @@ TEST_P(EveryWord, FollowsGapsAndFlushes) {
   GstBuffer* words = writer.pull().release();
   GST_BUFFER_PTS(words) = 5 * GST_MSECOND;
   reader.push(words);
-  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  push_eos(reader.get());
   const auto moved = AbsoluteEvent::at(3, 4, 5'000, Polarity::on);
   EXPECT_EQ(pull_events(reader), std::vector{moved});
 }
@@ -85,7 +85,7 @@ TEST_P(EveryWord, FollowsACameraThatStartsAgain) {
         gst_harness_push_event(reader.get(), gst_event_new_stream_start(how.c_str()));
       if (how != "DISCONT") push_segment(reader.get());
       reader.push(words);
-      gst_harness_push_event(reader.get(), gst_event_new_gap(20 * GST_MSECOND, GST_MSECOND));
+      push_gap(reader.get(), 20 * GST_MSECOND, GST_MSECOND);
       append_events(reader.pull().get(), read);
     }
     EXPECT_EQ(read, Events(2, AbsoluteEvent::at(3, 4, 10'000, Polarity::on))) << how;
@@ -121,7 +121,7 @@ TEST_P(EveryWord, FollowsADiscontinuityAfterAnError) {
   EXPECT_EQ(push(after, 2'000'000, 30 * GST_MSECOND, true),
             GST_FLOW_ERROR);  // the error of the last buffer
   EXPECT_EQ(push(after, 2'010'000, 40 * GST_MSECOND, false), GST_FLOW_OK);
-  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  push_eos(reader.get());
   EXPECT_EQ(pull_events(reader), (Events{AbsoluteEvent::at(3, 4, 10'000, Polarity::on),
                                          AbsoluteEvent::at(3, 5, 40'000, Polarity::on)}));
   EXPECT_EQ(reader.warning(), "");
@@ -138,7 +138,7 @@ TEST_P(EveryWord, ContinuesInANewSegment) {
     writer.write(event, event.t);
     reader.push(writer.pull().release());
   }
-  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  push_eos(reader.get());
   EXPECT_EQ(pull_events(reader), events);
 }
 
@@ -159,7 +159,7 @@ TEST_P(EveryWord, FollowsASizeThatChanges) {
       writer.get(), "application/x-event-camera, format=XYTP, width=64, height=48, framerate=30/1");
   pass(second);
   EXPECT_EQ(writer.error(), "");
-  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  push_eos(reader.get());
   EXPECT_EQ(pull_events(reader), (std::vector{first, second}));
   EXPECT_NE(reader.out_caps().find("width=(int)64"), std::string::npos);
 }
@@ -193,7 +193,7 @@ TEST_P(EveryWord, FillBuffersOfALimitedSize) {
     }
     EXPECT_EQ(end, static_cast<GstClockTime>(start + length) * GST_USECOND);
   }
-  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  push_eos(reader.get());
   EXPECT_EQ(pull_events(reader), expected);
 }
 

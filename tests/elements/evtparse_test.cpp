@@ -286,7 +286,7 @@ TEST(EvtParse, PassesOnTheLastWordsBeforeOtherCapsAndTheEnd) {
                                "application/x-event-camera,format=EVT3,width=320,height=320");
   push(EvtFormat::evt3);
   EXPECT_LT(stat_of(parse.element(), "events"), 2 * sent.size());
-  gst_harness_push_event(parse.get(), gst_event_new_eos());
+  push_eos(parse.get());
   EXPECT_EQ(stat_of(parse.element(), "events"), 2 * sent.size());
   EXPECT_EQ(stat_of(parse.element(), "lost-bytes"), 0U);
 }
@@ -312,7 +312,7 @@ TEST(EvtParse, SaysAtTheEndThatThereWereNoEvents) {
     const std::vector<guint8> bytes(4096, byte);
     parse.push(gst_buffer_new_memdup(bytes.data(), bytes.size()));
     EXPECT_EQ(parse.warning(), "");
-    gst_harness_push_event(parse.get(), gst_event_new_eos());
+    push_eos(parse.get());
     EXPECT_NE(parse.warning().find("No events were found"), std::string::npos);
     EXPECT_EQ(parse.warning(), "");
   }
@@ -320,7 +320,7 @@ TEST(EvtParse, SaysAtTheEndThatThereWereNoEvents) {
   gst_harness_set_src_caps_str(parse.get(), "application/octet-stream");
   const auto words = words_of(some_events(100), EvtFormat::evt3);
   parse.push(gst_buffer_new_memdup(words.data(), words.size()));
-  gst_harness_push_event(parse.get(), gst_event_new_eos());
+  push_eos(parse.get());
   EXPECT_EQ(parse.warning(), "");
 }
 

@@ -9,8 +9,6 @@ namespace {
 using namespace harness;
 using namespace event_files;
 
-INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats), name_of);
-
 /// A format that is read up to where a file is truncated.
 class EveryStream : public EveryFormat {};
 
@@ -77,7 +75,7 @@ TEST(EventNpzDec, SaysWhenAnArchiveIsTruncated) {
 /// Text and cause of the error that ends a file.
 std::string error_of(std::string_view file, const std::string& reader, const std::string& caps) {
   Reader h(reader, caps);
-  push_segment(h.get(), GST_FORMAT_BYTES);
+  push_segment(h.get(), {.format = GST_FORMAT_BYTES});
   h.read(file);
   const auto message = h.message(GST_MESSAGE_ERROR);
   if (!message) return "";

@@ -137,7 +137,7 @@ TEST_P(EveryFormat, BeginsAnewAfterAFlush) {
   h.push_bytes(file.substr(0, file.size() / 2));
   pull_events(h);
   flush({h.get()});
-  push_segment(h.get(), GST_FORMAT_BYTES);
+  push_segment(h.get(), {.format = GST_FORMAT_BYTES});
   h.read(file, 10'000);
   EXPECT_EQ(pull_events(h), events);
   EXPECT_EQ(h.warning(), "");

@@ -15,12 +15,9 @@ TEST(EvtDec, AssumesASensorWhereTheFileTellsNone) {
   for (const std::string way : {"", "queue ! "}) {
     Player player(temporary.source() + way + "evtdec ! capsfilter name=filter");
     ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-    GstPad* pad = gst_element_get_static_pad(player["filter"], "src");
-    const Owned<GstCaps> caps(gst_pad_get_current_caps(pad));
-    gst_object_unref(pad);
-    int found = 0;
-    gst_structure_get_int(gst_caps_get_structure(caps.get(), 0), "height", &found);
-    EXPECT_EQ(found, 320);
+    const auto pad = static_pad(player["filter"], "src");
+    EXPECT_NE(text_of(Owned<GstCaps>(gst_pad_get_current_caps(pad.get()))).find("height=(int)320"),
+              std::string::npos);
     Player told(temporary.source() + way +
                 "evtdec ! application/x-event-camera,width=640,height=480");
     EXPECT_TRUE(told.play()) << told.error;

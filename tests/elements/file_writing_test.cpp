@@ -9,8 +9,6 @@ namespace {
 using namespace harness;
 using namespace event_files;
 
-INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats), name_of);
-
 TEST_P(EveryFormat, IsWrittenWithoutWhatLiesOutsideTheSensor) {
   Writer h(format());
   const std::vector events = {AbsoluteEvent::at(5, 5, 1000, Polarity::on),
@@ -18,7 +16,7 @@ TEST_P(EveryFormat, IsWrittenWithoutWhatLiesOutsideTheSensor) {
                               AbsoluteEvent::at(5, height, 1002, Polarity::on),
                               AbsoluteEvent::at(6, 6, 1003, Polarity::off)};
   h.write(events, 0);
-  gst_harness_push_event(h.get(), gst_event_new_gap(10 * GST_MSECOND, 10 * GST_MSECOND));
+  push_gap(h.get(), 10 * GST_MSECOND, 10 * GST_MSECOND);
   EXPECT_TRUE(h.pull_event(GST_EVENT_GAP));
   EXPECT_TRUE(
       h.warning().starts_with("Dropped 2 events outside the sensor. Correct the size in the "
@@ -93,13 +91,11 @@ TEST(Writers, CountSimulatedEventsInStreamTime) {
   for (const std::string passed : {"", "! eventpolarity "}) {
     Harness h("eventsim-frame " + passed + "! eventcsvenc");
     h.caps("video/x-raw, format=GRAY8, width=8, height=4, framerate=25/1", "ANY");
-    GstSegment segment;
-    gst_segment_init(&segment, GST_FORMAT_TIME);
-    segment.start = 66'666'667;
-    gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
-    h.push(h.flat(segment.start, 50));
-    h.push(h.flat(segment.start + 40 * GST_MSECOND, 200));
-    gst_harness_push_event(h.get(), gst_event_new_eos());
+    constexpr GstClockTime start = 66'666'667;
+    push_segment(h.get(), {.start = start});
+    h.push(h.flat(start, 50));
+    h.push(h.flat(start + 40 * GST_MSECOND, 200));
+    push_eos(h.get());
     std::string text;
     h.wait_for_events();
     while (const auto buffer = h.pull()) text += bytes_of(buffer.get());
@@ -125,7 +121,7 @@ TEST_P(EveryFormat, IsWrittenAnewAfterAFlush) {
   const auto early = AbsoluteEvent::at(6, 6, 1000, Polarity::off);
   for (const bool ended : {false, true}) {
     h.write(AbsoluteEvent::at(5, 5, 1'000'000, Polarity::on), 1'000'000);
-    if (ended) gst_harness_push_event(h.get(), gst_event_new_eos());
+    if (ended) push_eos(h.get());
     h.pull_bytes();
     flush({h.get()});
     push_segment(h.get());
@@ -142,12 +138,7 @@ TEST_P(EveryFormat, IsOfOneSize) {
   gst_harness_set_src_caps_str(
       h.get(), "application/x-event-camera, format=XYTP, width=320, height=240, framerate=30/1");
   EXPECT_EQ(h.error(), "");
-  gst_harness_push_event(
-      h.get(),
-      gst_event_new_caps(
-          Owned<GstCaps>(gst_caps_from_string("application/x-event-camera, format=XYTP, width=64, "
-                                              "height=48, framerate=30/1"))
-              .get()));
+  push_caps(h.get(), "application/x-event-camera, format=XYTP, width=64, height=48, framerate=0/1");
   EXPECT_NE(h.error(), "");
 }
 
@@ -192,9 +183,7 @@ TEST_P(EveryFormat, HasItsHeaderInTheCaps) {
   while (const auto buffer = writer.pull())
     EXPECT_FALSE(GST_BUFFER_FLAG_IS_SET(buffer.get(), GST_BUFFER_FLAG_HEADER));
 
-  GstPad* const pad = gst_element_get_static_pad(writer.element(), "src");
-  const Owned<GstCaps> caps(gst_pad_get_current_caps(pad));
-  gst_object_unref(pad);
+  const Owned<GstCaps> caps(gst_pad_get_current_caps(writer->sinkpad));
   const GValue* const headers =
       gst_structure_get_value(gst_caps_get_structure(caps.get(), 0), "streamheader");
   ASSERT_TRUE(headers != nullptr && GST_VALUE_HOLDS_ARRAY(headers));

@@ -41,28 +41,18 @@ class Fusion : public TwoInputs {
   }
 
   void push_frame(GstClockTime pts, int grey, GstClockTime duration = 40 * ms) {
-    GstBuffer* buffer = gst_buffer_new_allocate(nullptr, 32, nullptr);
-    gst_buffer_memset(buffer, 0, static_cast<guint8>(grey), 32);
-    GST_BUFFER_PTS(buffer) = pts;
-    GST_BUFFER_DURATION(buffer) = duration;
-    gst_harness_push(video.get(), buffer);
+    gst_harness_push(video.get(), filled(32, grey, pts, duration));
   }
 
   void push_events(GstClockTime pts, const std::vector<Event>& list, GstClockTime duration) {
     gst_harness_push(events.get(), buffer_of(pts, list, duration));
   }
 
-  void end() {
-    for (auto* h : {video.get(), events.get()}) gst_harness_push_event(h, gst_event_new_eos());
-  }
-
   std::vector<Picture> pictures() {
     std::vector<Picture> all;
-    GstBuffer* next = nullptr;
-    while (gst_harness_pull_until_eos(video.get(), &next) && next != nullptr) {
-      const Buffer picture(next);
-      const auto bytes = bytes_of(next);
-      all.push_back({GST_BUFFER_PTS(next) / ms, static_cast<guint8>(bytes.front()),
+    for (const auto& picture : pull_until_eos(video.get())) {
+      const auto bytes = bytes_of(picture.get());
+      all.push_back({GST_BUFFER_PTS(picture.get()) / ms, static_cast<guint8>(bytes.front()),
                      static_cast<guint8>(bytes.back())});
     }
     return all;
@@ -124,12 +114,7 @@ TEST(Fuse, ApproachesTheLastFrame) {
   Fusion fuse("10/1", "framerate=10/1");
   g_object_set(fuse.element.get(), "cutoff", 1., nullptr);
   for (const double rate : {1., 2.}) {
-    for (auto* h : {fuse.video.get(), fuse.events.get()}) {
-      GstSegment segment;
-      gst_segment_init(&segment, GST_FORMAT_TIME);
-      segment.rate = rate;
-      gst_harness_push_event(h, gst_event_new_segment(&segment));
-    }
+    fuse.start_over({.rate = rate});
     fuse.push_frame(0, 100, 100 * ms);
     fuse.push_events(0, {Event::at(0, 0, 0, Polarity::on)}, 100 * ms);
     fuse.push_frame(100 * ms, 100, 100 * ms);
@@ -139,7 +124,6 @@ TEST(Fuse, ApproachesTheLastFrame) {
       ASSERT_TRUE(picture);
       EXPECT_EQ(static_cast<guint8>(bytes_of(picture.get()).front()), grey) << rate;
     }
-    flush({fuse.video.get(), fuse.events.get()});
   }
 }
 
@@ -170,10 +154,10 @@ TEST(Fuse, WarnsOfAnotherSensorSize) {
 /// No picture of the pause.
 TEST(Fuse, StartsOverAfterALeap) {
   Fusion fuse("25/1", "framerate=25/1");
-  gst_harness_push_event(fuse.events.get(), gst_event_new_eos());
+  push_eos(fuse.events.get());
   fuse.push_frame(0, 100);
   fuse.push_frame(3600 * GST_SECOND, 50);
-  gst_harness_push_event(fuse.video.get(), gst_event_new_eos());
+  push_eos(fuse.video.get());
   EXPECT_EQ(fuse.pictures(), (std::vector<Picture>{{0, 100, 100}, {3'600'000, 50, 50}}));
 }
 

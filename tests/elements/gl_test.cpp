@@ -22,9 +22,7 @@ constexpr const char* video = "video/x-raw, format=GRAY8, width=32, height=24, f
 std::vector<std::string> formats() {
   gst_init(nullptr, nullptr);
   const Owned<GstElement> element(gst_element_factory_make("gleventsim-frame", nullptr));
-  GstPad* pad = gst_element_get_static_pad(element.get(), "sink");
-  const Owned<GstCaps> caps(gst_pad_get_pad_template_caps(pad));
-  gst_object_unref(pad);
+  const Owned<GstCaps> caps(gst_pad_get_pad_template_caps(static_pad(element.get(), "sink").get()));
   const GValue* list = gst_structure_get_value(gst_caps_get_structure(caps.get(), 0), "format");
   std::vector<std::string> names;
   for (guint i = 0; i < gst_value_list_get_size(list); ++i)
@@ -56,7 +54,7 @@ class Flashes {
 /// The buffers that come before the stream has ended; a GPU may still work on the last one until
 /// then.
 std::vector<std::string> outputs_until_eos(Harness& h) {
-  gst_harness_push_event(h.get(), gst_event_new_eos());
+  push_eos(h.get());
   std::vector<std::string> outputs;
   while (const auto output = h.pull()) outputs.push_back(bytes_of(output.get()));
   return outputs;
@@ -395,7 +393,7 @@ TEST_P(Busy, IntervalsAreReadWhenTheNextFrameHasBeenQueued) {
     EXPECT_EQ(GST_BUFFER_FLAG_IS_SET(output.get(), GST_BUFFER_FLAG_DISCONT), i == 2);
     EXPECT_FALSE(h.pull());
   }
-  gst_harness_push_event(h.get(), gst_event_new_eos());
+  push_eos(h.get());
   expect_interval(4, h.pull());
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
 }
@@ -411,7 +409,7 @@ TEST_P(Busy, IntervalsOfALiveStreamNeedNoFurtherFrame) {
 }
 
 TEST_P(Busy, IntervalsComeBeforeWhatFollowsThem) {
-  gst_harness_push_event(h.get(), gst_event_new_gap(time_of(1), 80 * GST_MSECOND));
+  push_gap(h.get(), time_of(1), 80 * GST_MSECOND);
   expect_interval(0, h.pull());
   GstBuffer* discontinuous = frame(h, 4);
   GST_BUFFER_FLAG_SET(discontinuous, GST_BUFFER_FLAG_DISCONT);
@@ -537,7 +535,7 @@ TEST(OpenGl, IsAnErrorWhereItsThreadHasEnded) {
   h.push(h.flat(40 * GST_MSECOND, 100));
   {
     const EndOfThreads end;
-    gst_harness_push_event(h.get(), gst_event_new_eos());
+    push_eos(h.get());
   }
   is_busy = false;
   EXPECT_EQ(h.error(), thread_has_ended);
@@ -624,44 +622,6 @@ TEST(OpenGl, UploadsTexturesThatItCannotUse) {
     EXPECT_EQ(h.push(gst_buffer_ref(frame.get())), GST_FLOW_OK);
   }
   EXPECT_EQ(h.error(), "");
-}
-
-/// Whether the last context that was used is of a driver that heeds MESA_GLES_VERSION_OVERRIDE.
-bool is_mesa() {
-  bool is_mesa = false;
-  gst_gl_context_thread_add(
-      current,
-      [](GstGLContext* context, gpointer out) {
-        const auto* version = context->gl_vtable->GetString(GL_VERSION);
-        *static_cast<bool*>(out) =
-            std::string_view(reinterpret_cast<const char*>(version)).find("Mesa") !=
-            std::string::npos;
-      },
-      &is_mesa);
-  return is_mesa;
-}
-
-TEST(OpenGl, IsRefusedWhereItIsTooOld) {
-  const auto run = [] {
-    g_setenv("MESA_GLES_VERSION_OVERRIDE", "3.0", TRUE);
-    g_setenv("GST_GL_API", "gles2", TRUE);
-    take_over_contexts();
-    Harness h("gleventsim-frame");
-    h.caps(video);
-    h.push(h.flat(0, 100));
-    const auto error = h.message(GST_MESSAGE_ERROR);
-    const bool could_not = !error && !is_mesa();
-    g_printerr("%s\n", error ? text_of(error.get()).c_str() : could_not ? "not Mesa" : "no error");
-    std::_Exit(could_not ? 77 : 0);
-  };
-  static bool could_not;
-  could_not = false;
-  GTEST_FLAG_SET(death_test_style, "threadsafe");
-  EXPECT_EXIT(
-      run(), [](int status) { return status == 0 || (could_not = WEXITSTATUS(status) == 77); },
-      "OpenGL cannot simulate: compute shaders need OpenGL ES 3.1 or OpenGL 4.3, and this "
-      "is OpenGL ES 3.0 .* Use eventsim-frame, which runs on the CPU\\.|not Mesa");
-  if (could_not) GTEST_SKIP() << "only Mesa can pretend to be older";
 }
 
 }  // namespace

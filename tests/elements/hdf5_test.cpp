@@ -5,9 +5,6 @@
 
 #include <algorithm>
 #include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <random>
 
 #include "src/formats/byte_source.hpp"
 #include "src/formats/hdf5/hdf5_reader.hpp"
@@ -42,26 +39,9 @@ Events some_events() {
   return events;
 }
 
-class Folder {
- public:
-  Folder()
-      : path_(std::filesystem::temp_directory_path() /
-              ("hdf5-test-" + std::to_string(std::random_device()()))) {
-    std::filesystem::create_directories(path_);
-  }
-  ~Folder() { std::filesystem::remove_all(path_); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  std::string operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
-
 std::vector<std::uint8_t> contents(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
+  const auto text = text_in(path);
+  return {text.begin(), text.end()};
 }
 
 class Hdf5 : public testing::TestWithParam<const char*> {
@@ -78,7 +58,7 @@ class Hdf5 : public testing::TestWithParam<const char*> {
     return path;
   }
 
-  Folder folder_;
+  TemporaryFolder folder_;
 };
 INSTANTIATE_TEST_SUITE_P(, Hdf5, testing::Values("dsec", "metavision"),
                          [](const auto& test) { return test.param; });
@@ -118,7 +98,7 @@ TEST(Hdf5Elements, KeepTriggers) {
   const std::vector<Trigger> triggers{{events.front().t - 1'500, 1, true},
                                       {events[777].t, 7, false},
                                       {events.back().t + 7'000, 0, false}};
-  const Folder folder;
+  const TemporaryFolder folder;
   const auto in = folder / "in.hdf5";
   const auto out = folder / "out.hdf5";
   Hdf5Writer writer(in, {Hdf5Format::metavision, Hdf5Writer::Compression::none, {width, height}});
@@ -147,7 +127,7 @@ struct Sink : Harness {
   GstFlowReturn push(const Events& events, Microseconds start) {
     return Harness::push(buffer_of(events, start));
   }
-  void end() { gst_harness_push_event(get(), gst_event_new_eos()); }
+  void end() { push_eos(get()); }
 };
 
 TEST_P(Hdf5, IsWrittenToAnotherFileAfterAStop) {
@@ -219,17 +199,13 @@ TEST_P(Hdf5, IsOfOneSize) {
   EXPECT_EQ(sink.push({AbsoluteEvent::at(200, 5, 0, Polarity::on)}, 0), GST_FLOW_OK);
   sink.caps("application/x-event-camera, format=XYTP, width=320, height=240, framerate=30/1");
   EXPECT_EQ(sink.error(), "");
-  gst_harness_push_event(
-      sink.get(),
-      gst_event_new_caps(
-          Owned<GstCaps>(gst_caps_from_string("application/x-event-camera, format=XYTP, width=64, "
-                                              "height=48, framerate=30/1"))
-              .get()));
+  push_caps(sink.get(),
+            "application/x-event-camera, format=XYTP, width=64, height=48, framerate=0/1");
   EXPECT_NE(sink.error().find("The sensor size changes"), std::string::npos);
 }
 
 TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
-  const Folder folder;
+  const TemporaryFolder folder;
   gst_init(nullptr, nullptr);
   {
     Sink sink("eventhdf5sink location=/no/such/folder/out.h5");
@@ -270,7 +246,7 @@ TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
 }
 
 TEST(Hdf5Dec, HasAPathAndAUnit) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const auto path = folder / "events.h5";
   {
     Hdf5Writer writer(path, {Hdf5Format::dsec, Hdf5Writer::Compression::gzip, {width, height}});
@@ -291,7 +267,7 @@ TEST(Hdf5Dec, HasAPathAndAUnit) {
 }
 
 TEST(Hdf5Dec, SaysWhatCannotBeRead) {
-  const Folder folder;
+  const TemporaryFolder folder;
   EXPECT_FALSE(
       Player("filesrc location=" + in_quotes(folder / "none.h5") + " ! eventhdf5dec").play());
   std::ofstream(folder / "text.h5") << "t,x,y,p\n";

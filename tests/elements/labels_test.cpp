@@ -79,7 +79,7 @@ TEST(Labels, AreCountedByEventstats) {
     Harness h("eventstats interval=0");
     h.caps("application/x-event-camera, format=XYTP, width=64, height=48");
     for (const auto& buffer : buffers) h.push(gst_buffer_ref(buffer.get()));
-    gst_harness_push_event(h.get(), gst_event_new_eos());
+    push_eos(h.get());
     const auto message = h.message(GST_MESSAGE_ELEMENT);
     ASSERT_TRUE(message);
     const auto* figures = gst_message_get_structure(message.get());

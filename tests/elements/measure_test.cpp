@@ -5,9 +5,7 @@
 #include <unistd.h>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <optional>
-#include <sstream>
 #include <string>
 
 #include "src/core/event.hpp"
@@ -21,12 +19,6 @@ using eventcamera::Polarity;
 
 constexpr GstClockTime ms = GST_MSECOND;
 const std::string small_sensor = "application/x-event-camera, format=XYTP, width=8, height=4";
-
-std::string text_in(const std::filesystem::path& path) {
-  std::stringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
-}
 
 const GstStructure* structure_of(const Owned<GstMessage>& message) {
   return message ? gst_message_get_structure(message.get()) : nullptr;
@@ -58,18 +50,9 @@ const GstStructure* within(const GstStructure* structure, const char* field) {
 
 class MeasureTest : public testing::Test {
  protected:
-  MeasureTest() {
-    std::filesystem::remove_all(folder);
-    std::filesystem::create_directories(folder);
-  }
-  ~MeasureTest() override { std::filesystem::remove_all(folder); }
+  std::string path(const std::string& name) const { return folder / name; }
 
-  /// Path as text for a launch line.
-  std::string path(const std::string& name) const { return (folder / name).string(); }
-
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() /
-      (std::string("measure_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  const TemporaryFolder folder;
 };
 
 /// Events of 10 ms: one at this place.
@@ -91,14 +74,7 @@ GstBuffer* hundred_events(GstClockTime pts) {
   return buffer;
 }
 
-/// Pushes a segment from 50 to 80 ms.
-void push_short_segment(GstHarness* h) {
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  segment.start = segment.time = 50 * ms;
-  segment.stop = 80 * ms;
-  gst_harness_push_event(h, gst_event_new_segment(&segment));
-}
+constexpr SegmentFields from_50_to_80{.start = 50 * ms, .time = 50 * ms, .stop = 80 * ms};
 
 /* eventstats */
 
@@ -113,7 +89,7 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   h.push(buffer_of(1000 * ms, first, 40 * ms));
   EXPECT_EQ(bytes_of(h.pull().get()).size(), 24U);
   EXPECT_FALSE(h.message(GST_MESSAGE_ELEMENT));
-  gst_harness_push_event(h.get(), gst_event_new_gap(1040 * ms, 20 * ms));
+  push_gap(h.get(), 1040 * ms, 20 * ms);
   auto message = h.message(GST_MESSAGE_ELEMENT);
   const auto* recent = structure_of(message);
   ASSERT_TRUE(recent);
@@ -127,7 +103,7 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   EXPECT_EQ(count_in(recent, "interval-p50"), 30 * GST_USECOND);
 
   h.push(buffer_of(1060 * ms, {Event::at(2, 3, 40, Polarity::on)}, 40 * ms));
-  gst_harness_push_event(h.get(), gst_event_new_eos());
+  push_eos(h.get());
   message = h.message(GST_MESSAGE_ELEMENT);
   const auto* cumulative = structure_of(message);
   ASSERT_TRUE(cumulative);
@@ -179,7 +155,7 @@ const Stream streams[] = {
     {"segments that end",
      [](Harness& h) {
        for (const GstClockTime base : {0, 10}) {
-         play_on(h.get(), base * ms);
+         push_segment(h.get(), {.base = base * ms});
          h.push(one_event(base * ms));
          end_segment(h.get());
        }
@@ -187,10 +163,10 @@ const Stream streams[] = {
      {{1, 100, 0, 10 * ms}, {1, 100, 10 * ms, 20 * ms}}},
     {"events outside a segment",
      [](Harness& h) {
-       push_short_segment(h.get());
+       push_segment(h.get(), from_50_to_80);
        h.push(hundred_events(0));
        h.push(hundred_events(100 * ms));
-       gst_harness_push_event(h.get(), gst_event_new_gap(200 * ms, 100 * ms));
+       push_gap(h.get(), 200 * ms, 100 * ms);
      },
      {{30, 1000, 50 * ms, 80 * ms}}},
     {"two sensors",
@@ -216,7 +192,7 @@ TEST_F(StatsTest, PostsTheFiguresOfEachPartOfAStream) {
     Harness h("eventstats interval=0");
     h.caps(small_sensor);
     stream.push(h);
-    gst_harness_push_event(h.get(), gst_event_new_eos());
+    push_eos(h.get());
     for (const auto& expected : stream.figures) {
       const auto message = h.message(GST_MESSAGE_ELEMENT);
       const auto* found = structure_of(message);
@@ -240,7 +216,7 @@ TEST_F(StatsTest, WritesAtAStopWhatHasComeSinceTheEnd) {
     h.caps(small_sensor);
     h.push(one_event(0));
     if (has_ended) {
-      gst_harness_push_event(h.get(), gst_event_new_eos());
+      push_eos(h.get());
       EXPECT_TRUE(std::filesystem::remove(path("f.json")));
     }
     gst_element_set_state(h.element(), GST_STATE_READY);
@@ -255,7 +231,7 @@ TEST_F(StatsTest, WritesToALinkAPipeAndADevice) {
     Harness h("eventstats location=" + in_quotes(location));
     h.caps(small_sensor);
     h.push(one_event(0));
-    gst_harness_push_event(h.get(), gst_event_new_eos());
+    push_eos(h.get());
     return h.error();
   };
   const auto file = path("f.json");
@@ -284,7 +260,7 @@ TEST_F(StatsTest, SaysBeforehandThatAFolderIsMissing) {
     for (const auto& [setting, error] :
          {std::pair{"location=" + in_quotes(path("nowhere/file")), "No such folder"},
           {"map=" + in_quotes(path("nowhere/file")), "No such folder"},
-          {"location=" + in_quotes(folder.string()), "is a folder"}}) {
+          {"location=" + in_quotes(path("")), "is a folder"}}) {
       Pipeline pipeline(element + " " + setting + "  fakesink");
       EXPECT_FALSE(pipeline.play());
       EXPECT_NE(pipeline.error.find(error), std::string::npos) << pipeline.error;
@@ -313,19 +289,10 @@ class CompareTest : public MeasureTest {
       for (auto* h : {reference, candidate}) gst_harness_push(h, one_event(start));
   }
 
-  void end(GstHarness* h) { gst_harness_push_event(h, gst_event_new_eos()); }
-
   /// Ends both streams, collects the buffers that pass, and returns the statistics.
   const GstStructure* conclude() {
-    for (auto* h : {reference, candidate}) end(h);
-    GstBuffer* last = nullptr;
-    while (gst_harness_buffers_in_queue(candidate) > 0)
-      passed.emplace_back(gst_harness_pull(candidate));
-    EXPECT_TRUE(gst_harness_pull_until_eos(candidate, &last));
-    while (last != nullptr) {
-      passed.emplace_back(last);
-      EXPECT_TRUE(gst_harness_pull_until_eos(candidate, &last));
-    }
+    compare->end();
+    passed = pull_until_eos(candidate);
     message_ = compare->message(GST_MESSAGE_ELEMENT);
     return structure_of(message_);
   }
@@ -365,7 +332,7 @@ TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
                                          Event::at(6, 1, 8'500, Polarity::on)},
                                         10 * ms));
   gst_harness_push(reference, buffer_of(20 * ms, {Event::at(5, 1, 1'000, Polarity::on)}, 20 * ms));
-  gst_harness_push_event(candidate, gst_event_new_gap(20 * ms, 20 * ms));
+  push_gap(candidate, 20 * ms, 20 * ms);
   gst_harness_push(reference, buffer_of(40 * ms, {Event::at(5, 1, 1'000, Polarity::on)}, 20 * ms));
   const auto* figures = conclude();
   ASSERT_TRUE(figures);
@@ -387,12 +354,7 @@ TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
   ASSERT_EQ(passed.size(), 1U);
   EXPECT_EQ(events_of(passed[0].get()).size(), 2U);
   EXPECT_EQ(GST_BUFFER_PTS(passed[0].get()), 10 * ms);
-  int gaps = 0;
-  while (GstEvent* event = gst_harness_try_pull_event(candidate)) {
-    gaps += GST_EVENT_TYPE(event) == GST_EVENT_GAP ? 1 : 0;
-    gst_event_unref(event);
-  }
-  EXPECT_EQ(gaps, 1);
+  EXPECT_TRUE(next_event(candidate, GST_EVENT_GAP));
   const auto json = text_in(path("f.json"));
   for (const char* field : {"map-correlation", "candidate-matches", "rate-curve", "std-dev"})
     EXPECT_NE(json.find(field), std::string::npos) << field;
@@ -403,7 +365,7 @@ TEST_F(CompareTest, PassesTheCandidateOnWhereTheReferenceHasEnded) {
   make();
   begin();
   gst_harness_push(reference, one_event(0));
-  end(reference);
+  push_eos(reference);
   for (const GstClockTime t : {0 * ms, 10 * ms, 20 * ms}) gst_harness_push(candidate, one_event(t));
   expect_comparisons({{1, 10 * ms}});
   EXPECT_EQ(passed.size(), 3U);
@@ -414,7 +376,7 @@ TEST_F(CompareTest, ComparesEachSegment) {
   begin();
   for (const GstClockTime base : {0 * ms, 10 * ms}) {
     for (auto* h : {reference, candidate}) {
-      play_on(h, base);
+      push_segment(h, {.base = base});
       gst_harness_push(h, one_event(0));
       end_segment(h);
     }
@@ -439,8 +401,7 @@ TEST_F(CompareTest, StartsOverAfterAFlush) {
   make();
   begin();
   push_both({0});
-  flush({reference, candidate});
-  for (auto* h : {reference, candidate}) push_segment(h);
+  compare->start_over();
   push_both({10 * ms});
   expect_comparisons({{1, 20 * ms}});
 }
@@ -449,7 +410,7 @@ TEST_F(CompareTest, ComparesOnlyWhatIsInTheSegments) {
   make();
   begin();
   for (auto* h : {reference, candidate}) {
-    push_short_segment(h);
+    push_segment(h, from_50_to_80);
     gst_harness_push(h, hundred_events(0));
   }
   expect_comparisons({{30, 80 * ms}});
@@ -457,26 +418,18 @@ TEST_F(CompareTest, ComparesOnlyWhatIsInTheSegments) {
   EXPECT_EQ(events_of(passed[0].get()).size(), 100U);
 }
 
-/// A buffer with an event of each of these causes.
-GstBuffer* caused_by(const std::vector<guint8>& causes) {
-  std::vector<Event> events;
-  std::vector<GstEventCameraLabel> labels;
-  for (const auto cause : causes) {
-    events.push_back(Event::at(static_cast<int>(events.size()), 1, 5, Polarity::on));
-    labels.push_back({.object_class = 0, .cause = cause, .reserved = 0});
-  }
-  GstBuffer* const buffer = buffer_of(0, events, 10 * ms);
-  gst_buffer_add_event_camera_label_meta(buffer, labels.data(), labels.size());
-  return buffer;
-}
-
 TEST_F(CompareTest, ClassifiesTheEventsThatAreLeft) {
   make();
   begin();
-  constexpr guint8 light = GST_EVENT_CAMERA_CAUSE_LIGHT;
-  constexpr guint8 leak = GST_EVENT_CAMERA_CAUSE_LEAK;
-  gst_harness_push(reference, caused_by({light, light, light, leak, leak, leak, leak}));
-  gst_harness_push(candidate, caused_by({light, light, leak}));
+  const auto push_caused = [](GstHarness* h, guint lights, guint leaks) {
+    std::vector<GstEventCameraLabel> labels(lights, {0, GST_EVENT_CAMERA_CAUSE_LIGHT, 0});
+    labels.resize(lights + leaks, {0, GST_EVENT_CAMERA_CAUSE_LEAK, 0});
+    GstBuffer* const buffer = buffer_of(0, std::vector<Event>(labels.size()), 10 * ms);
+    gst_buffer_add_event_camera_label_meta(buffer, labels.data(), labels.size());
+    gst_harness_push(h, buffer);
+  };
+  push_caused(reference, 3, 4);
+  push_caused(candidate, 2, 1);
   const auto* figures = conclude();
   ASSERT_TRUE(figures);
   const auto* classification = within(figures, "classification");
@@ -488,7 +441,6 @@ TEST_F(CompareTest, ClassifiesTheEventsThatAreLeft) {
     EXPECT_EQ(count_in(classification, name), count) << name;
   EXPECT_DOUBLE_EQ(number_in(classification, "true-positive-rate"), 2 / 3.0);
   EXPECT_DOUBLE_EQ(number_in(classification, "false-positive-rate"), 1 / 4.0);
-  EXPECT_DOUBLE_EQ(number_in(classification, "precision"), 2 / 3.0);
 }
 
 TEST_F(CompareTest, WritesAtAStopWhatHasComeSinceTheEnd) {
@@ -496,7 +448,7 @@ TEST_F(CompareTest, WritesAtAStopWhatHasComeSinceTheEnd) {
     make("location=" + in_quotes(path("f.json")));
     begin();
     push_both({0, 10 * ms});
-    EXPECT_TRUE(Buffer(gst_harness_pull(candidate)));
+    EXPECT_TRUE(Buffer(gst_harness_pull(candidate)));  // both have been compared
     if (has_ended) {
       EXPECT_TRUE(conclude());
       EXPECT_TRUE(std::filesystem::remove(path("f.json")));

@@ -30,11 +30,7 @@ class OverlayTest : public testing::Test {
   }
 
   void push_frame(GstClockTime pts, GstClockTime duration = 40 * ms) {
-    GstBuffer* buffer = gst_buffer_new_allocate(nullptr, 32, nullptr);
-    gst_buffer_memset(buffer, 0, 100, 32);
-    GST_BUFFER_PTS(buffer) = pts;
-    GST_BUFFER_DURATION(buffer) = duration;
-    gst_harness_push(video.get(), buffer);
+    gst_harness_push(video.get(), filled(32, 100, pts, duration));
   }
 
   void push_events(GstClockTime pts, const std::vector<Event>& list,
@@ -94,27 +90,16 @@ TEST_F(OverlayTest, DrawsTheEventsSinceTheLastFrameWhereItsEndIsNotKnown) {
 TEST_F(OverlayTest, DrawsTheEventsOfEachFrameAtEveryRate) {
   begin("width=8, height=4");
   for (const double rate : {0.5, 1., 2.}) {
-    flush({video.get(), events.get()});
-    for (auto* harness : {video.get(), events.get()}) {
-      GstSegment segment;
-      gst_segment_init(&segment, GST_FORMAT_TIME);
-      segment.rate = rate;
-      gst_harness_push_event(harness, gst_event_new_segment(&segment));
-    }
+    overlay.start_over({.rate = rate});
     for (int i = 0; i < 2; ++i) {
       const auto start = static_cast<GstClockTime>(i) * 40 * ms;
       push_frame(start);
-      push_events(
-          start,
-          {Event::at(4 * i, 0, 5'000, Polarity::on), Event::at(4 * i + 1, 0, 15'000, Polarity::on)},
-          20 * ms);
-      push_events(start + 20 * ms,
-                  {Event::at(4 * i + 2, 0, 5'000, Polarity::on),
-                   Event::at(4 * i + 3, 0, 15'000, Polarity::on)},
-                  20 * ms);
-      EXPECT_EQ(drawn(),
-                (Places{{4 * i, 255}, {4 * i + 1, 255}, {4 * i + 2, 255}, {4 * i + 3, 255}}))
-          << rate;
+      for (int half = 0; half < 2; ++half)
+        push_events(start + static_cast<GstClockTime>(half) * 20 * ms,
+                    {Event::at(i, 2 * half, 5'000, Polarity::on),
+                     Event::at(i, 2 * half + 1, 15'000, Polarity::on)},
+                    20 * ms);
+      EXPECT_EQ(drawn(), (Places{{i, 255}, {8 + i, 255}, {16 + i, 255}, {24 + i, 255}})) << rate;
     }
   }
 }
@@ -180,27 +165,25 @@ TEST_F(OverlayTest, ScalesTheSensorToTheVideo) {
 TEST_F(OverlayTest, GoesOnThroughGapsAndPastTheEndOfEvents) {
   begin("width=8, height=4");
   push_frame(0);
-  gst_harness_push_event(events.get(), gst_event_new_gap(0, 40 * ms));
+  push_gap(events.get(), 0, 40 * ms);
   EXPECT_EQ(drawn(), Places{});
   push_frame(40 * ms);
-  gst_harness_push_event(events.get(), gst_event_new_eos());
+  push_eos(events.get());
   EXPECT_EQ(drawn(), Places{});
   push_frame(80 * ms);
   EXPECT_EQ(drawn(), Places{});
-  gst_harness_push_event(video.get(), gst_event_new_eos());
-  GstBuffer* rest = nullptr;
-  EXPECT_TRUE(gst_harness_pull_until_eos(video.get(), &rest));
-  EXPECT_EQ(rest, nullptr);
+  push_eos(video.get());
+  EXPECT_TRUE(pull_until_eos(video.get()).empty());
 }
 
 TEST_F(OverlayTest, PassesGapsInTheVideoOn) {
   begin("width=8, height=4");
-  gst_harness_push_event(video.get(), gst_event_new_gap(0, 40 * ms));  // before any frame
+  push_gap(video.get(), 0, 40 * ms);  // before any frame
   push_events(0, {});
   push_frame(40 * ms);
   push_events(40 * ms, {});
   EXPECT_EQ(drawn(), Places{});
-  gst_harness_push_event(video.get(), gst_event_new_gap(80 * ms, 40 * ms));
+  push_gap(video.get(), 80 * ms, 40 * ms);
   push_events(80 * ms, {Event::at(1, 0, 5, Polarity::on)});
   push_frame(120 * ms);
   push_events(120 * ms, {});
@@ -208,8 +191,7 @@ TEST_F(OverlayTest, PassesGapsInTheVideoOn) {
   EXPECT_EQ(last_pts, 120 * ms);
   GstClockTime start = GST_CLOCK_TIME_NONE;
   while (const Owned<GstEvent> event{gst_harness_try_pull_event(video.get())})
-    if (GST_EVENT_TYPE(event.get()) == GST_EVENT_GAP)
-      gst_event_parse_gap(event.get(), &start, nullptr);
+    if (GST_EVENT_TYPE(event.get()) == GST_EVENT_GAP) start = gap_of(event.get()).start;
   EXPECT_EQ(start, 80 * ms);
 }
 
@@ -227,7 +209,7 @@ TEST_F(OverlayHalf, MixesAndRemembers) {
   push_events(40 * ms, {Event::at(2, 0, 5, Polarity::off)});
   EXPECT_EQ(drawn(), (Places{{1, 50}, {2, 50}}));
   push_frame(80 * ms);
-  gst_harness_push_event(events.get(), gst_event_new_gap(80 * ms, 40 * ms));
+  push_gap(events.get(), 80 * ms, 40 * ms);
   EXPECT_EQ(drawn(), (Places{{2, 50}}));
 }
 

@@ -12,6 +12,31 @@
 #include "tests/elements/event_buffer.hpp"
 #include "tests/elements/harness.hpp"
 
+/// Path of a temporary file or folder that does not exist yet.
+inline std::filesystem::path temporary_path() {
+  return std::filesystem::temp_directory_path() /
+         ("eventsim-test-" + std::to_string(std::random_device()()));
+}
+
+inline std::string text_in(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+/// A folder, deleted with this object.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() { std::filesystem::create_directories(path_); }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  std::string operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_ = temporary_path();
+};
+
 /// A file, deleted with this object.
 class TemporaryFile {
  public:
@@ -31,13 +56,12 @@ class TemporaryFile {
   std::string sink() const { return " ! filesink location=" + in_quotes(path_); }
 
   std::vector<std::uint8_t> bytes() const {
-    std::ifstream file(path_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    const auto text = text_in(path_);
+    return {text.begin(), text.end()};
   }
 
  private:
-  std::filesystem::path path_ = std::filesystem::temp_directory_path() /
-                                ("eventsim-test-" + std::to_string(std::random_device()()));
+  std::filesystem::path path_ = temporary_path();
 };
 
 class Pipeline {

@@ -30,13 +30,13 @@ void push(Harness& h, const Interval& interval) {
   const auto start = static_cast<GstClockTime>(interval.start);
   const auto duration = static_cast<GstClockTime>(interval.duration);
   if (interval.events.empty())
-    gst_harness_push_event(h.get(), gst_event_new_gap(start, duration));
+    push_gap(h.get(), start, duration);
   else
     ASSERT_EQ(h.push(buffer_of(start, interval.events, duration)), GST_FLOW_OK);
 }
 
 void end(Harness& h) {
-  gst_harness_push_event(h.get(), gst_event_new_eos());
+  push_eos(h.get());
 }
 
 /// Output of a depayloader: its buffers and GAP events, in the order of time.
@@ -281,7 +281,7 @@ TEST(RtpEventPay, TellsOfSilenceOfUnknownDuration) {
   h.caps(davis_caps, "application/x-rtp");
   push(h, {0, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});
   for (const GstClockTime start : {ms, 5 * ms}) {
-    gst_harness_push_event(h.get(), gst_event_new_gap(start, GST_CLOCK_TIME_NONE));
+    push_gap(h.get(), start, GST_CLOCK_TIME_NONE);
     const auto packet = h.pull();
     ASSERT_TRUE(packet);
     EXPECT_EQ(Fields(packet.get()).header->event_count, start == ms ? 1 : 0);

@@ -76,7 +76,7 @@ struct Simulator {
   FlowMethod method;
 };
 
-class EverySimulator : public testing::TestWithParam<Simulator> {
+class EveryFlowSimulator : public testing::TestWithParam<Simulator> {
  protected:
   /// The flow that the simulator finds from frame i to the next one.
   Image<Flow> own_flow(int i) {
@@ -114,21 +114,21 @@ class EverySimulator : public testing::TestWithParam<Simulator> {
   eventcamera::RegionOfInterestFlow finder{GetParam().method, width, height};
 };
 INSTANTIATE_TEST_SUITE_P(
-    , EverySimulator,
+    , EveryFlowSimulator,
     testing::Values(Simulator{"eventsim-dense", 2, FlowMethod::dis_lq},
                     Simulator{"eventsim-dense interpolation=blend", 2, FlowMethod::dis_lq},
                     Simulator{"eventsim-dvs preset=ideal upsampling=motion", 0, FlowMethod::dis_mq},
                     Simulator{"gleventsim-dvs preset=ideal upsampling=motion", 0,
                               FlowMethod::dis_mq}));
 
-TEST_P(EverySimulator, UsesTheFlowOfItsFrames) {
+TEST_P(EveryFlowSimulator, UsesTheFlowOfItsFrames) {
   const auto expected = own_events();
   ASSERT_GT(expected.size(), 8000U);
   EXPECT_TRUE(events_with([&](int i) { return own_flow(i); }) == expected);
   EXPECT_FALSE(events_with([](int) { return Image<Flow>(width, height); }) == expected);
 }
 
-TEST_P(EverySimulator, FindsTheFlowOfFramesWithoutIt) {
+TEST_P(EveryFlowSimulator, FindsTheFlowOfFramesWithoutIt) {
   Harness h = without_upload(GetParam().launch);  // glupload drops flow
   h.caps(video);
   for (int i = 0; i < frame_count; ++i) {
@@ -138,7 +138,7 @@ TEST_P(EverySimulator, FindsTheFlowOfFramesWithoutIt) {
   EXPECT_TRUE(events_of(h) == own_events());
 }
 
-TEST_P(EverySimulator, TakesAnyNumbersOfFlow) {
+TEST_P(EveryFlowSimulator, TakesAnyNumbersOfFlow) {
   const float numbers[] = {std::numeric_limits<float>::quiet_NaN(),
                            std::numeric_limits<float>::infinity(),
                            -1e38F,
@@ -165,7 +165,7 @@ TEST_P(EverySimulator, TakesAnyNumbersOfFlow) {
   EXPECT_FALSE(filled(3) == filled(0));
 }
 
-TEST_P(EverySimulator, WritesTheFlowOfEachInterval) {
+TEST_P(EveryFlowSimulator, WritesTheFlowOfEachInterval) {
   Harness h = without_upload(GetParam().launch + std::string(" write-flow=true"));
   h.caps(video);
   for (int i = 0; i < frame_count; ++i) h.push(frame_of(i));

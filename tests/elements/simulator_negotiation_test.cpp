@@ -11,9 +11,6 @@ using namespace harness;
 
 const std::string size = ", width=32, height=24, framerate=25/1";
 
-class EverySimulator : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
-
 TEST_P(EverySimulator, MakesEventsWhereDownstreamTakesThem) {
   for (const char* downstream : {"ANY", "video/x-raw(ANY); application/x-event-camera"}) {
     Harness h(GetParam());

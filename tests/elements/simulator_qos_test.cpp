@@ -14,7 +14,6 @@ constexpr GstClockTime ms = GST_MSECOND;
 const std::string video = "video/x-raw, format=GRAY8, width=32, height=24, framerate=5/1";
 const std::string pictures = "video/x-raw, format=GRAY8";
 
-class EverySimulator : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
 
 constexpr GstClockTime frame_time(int i) {

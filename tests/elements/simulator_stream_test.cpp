@@ -33,7 +33,6 @@ bool is_physical(const std::string& element) {
   return element.ends_with("eventsim-dvs");
 }
 
-class EverySimulator : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
 
 TEST_P(EverySimulator, GivesTheSameBytesForAnyStrideAndNumberOfThreads) {
@@ -238,62 +237,6 @@ TEST(Stream, WarnsOfAFileWithoutTheTimesOfBuffers) {
     h.wait_for_events();
     EXPECT_EQ(h.warning().find("eventnpzenc") != std::string::npos, writer.empty());
   }
-}
-
-TEST(EventCamera, MapsEventsAtAnyAddress) {
-  gst_init(nullptr, nullptr);
-  const guint8 bytes[] = {0, 1, 0, 0, 0, 2, 0, 3, 0x80};
-  GstBuffer* whole = gst_buffer_new_memdup(bytes, sizeof bytes);
-  GstBuffer* odd = gst_buffer_copy_region(whole, GST_BUFFER_COPY_MEMORY, 1, 8);
-  GST_BUFFER_PTS(odd) = 5 * GST_MSECOND + 999;
-  GstEventCameraMap map;
-  ASSERT_TRUE(gst_event_camera_map(&map, odd));
-  ASSERT_EQ(map.n_events, 1U);
-  EXPECT_EQ(map.start, 5000U);
-  EXPECT_EQ(GPOINTER_TO_SIZE(map.events) % alignof(GstEventCameraEvent), 0U);
-  EXPECT_EQ(map.events[0].t, 1U);
-  EXPECT_EQ(map.events[0].x, 2);
-  EXPECT_EQ(gst_event_camera_event_get_y(&map.events[0]), 3U);
-  EXPECT_TRUE(gst_event_camera_event_is_on(&map.events[0]));
-  gst_event_camera_unmap(&map);
-  gst_buffer_set_size(odd, 7);
-  EXPECT_FALSE(gst_event_camera_map(&map, odd));  // partial event
-  gst_buffer_unref(odd);
-  GST_BUFFER_PTS(whole) = GST_CLOCK_TIME_NONE;
-  gst_buffer_set_size(whole, 8);
-  EXPECT_FALSE(gst_event_camera_map(&map, whole));  // no time
-  gst_buffer_unref(whole);
-}
-
-TEST(EventCamera, ReadsAndWritesCaps) {
-  gst_init(nullptr, nullptr);
-  const auto read = [](const char* text, GstEventCameraInfo* info) {
-    Owned<GstCaps> caps(gst_caps_from_string(text));
-    return gst_event_camera_info_from_caps(info, caps.get()) == TRUE;
-  };
-  GstEventCameraInfo info;
-  ASSERT_TRUE(
-      read("application/x-event-camera,format=XYTP,width=640,height=480,framerate=30/1", &info));
-  EXPECT_EQ(info.width, 640);
-  EXPECT_EQ(info.height, 480);
-  EXPECT_EQ(info.fps_n, 30);
-  Owned<GstCaps> caps(gst_event_camera_info_to_caps(&info));
-  GstEventCameraInfo back;
-  ASSERT_TRUE(gst_event_camera_info_from_caps(&back, caps.get()));
-  EXPECT_EQ(back.height, 480);
-  info.fps_d = 0;
-  caps.reset(gst_event_camera_info_to_caps(&info));
-  ASSERT_TRUE(gst_event_camera_info_from_caps(&back, caps.get()));
-  EXPECT_EQ(back.fps_n, 0);
-  EXPECT_EQ(back.fps_d, 1);
-  EXPECT_TRUE(read("application/x-event-camera,format=XYTP,width=1,height=1", &info));
-  EXPECT_EQ(info.fps_n, 0);
-  EXPECT_EQ(info.fps_d, 1);
-  EXPECT_FALSE(read("application/x-event-camera,format=EVT3,width=640,height=480", &info));
-  EXPECT_FALSE(read("application/x-event-camera,format=XYTP,width=640", &info));
-  EXPECT_FALSE(read("application/x-event-camera,format=XYTP,width=0,height=480", &info));
-  EXPECT_FALSE(read("application/x-event-camera,format=XYTP,width=1,height=32769", &info));
-  EXPECT_FALSE(read("video/x-raw,format=GRAY8,width=640,height=480", &info));
 }
 
 }  // namespace

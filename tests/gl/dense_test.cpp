@@ -25,8 +25,6 @@ using gl_test::EveryApi;
 using gl_test::matched;
 using gl_test::Texture;
 
-INSTANTIATE_TEST_SUITE_P(, EveryApi, testing::Bool(), gl_test::name_of_api);
-
 using Picture = Image<std::uint8_t>;
 
 /// Flow of all lengths, some of them past the border, and some that are no numbers.

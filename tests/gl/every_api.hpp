@@ -28,7 +28,7 @@ inline std::vector<std::uint8_t> bytes_of(const eventcamera::Image<std::uint8_t>
   return bytes;
 }
 
-/// With OpenGL ES and OpenGL.
+/// With OpenGL ES and OpenGL. Instantiated once in each executable.
 class EveryApi : public testing::TestWithParam<bool> {
  protected:
   /// Writes a picture to a frame on the GPU.

@@ -115,46 +115,6 @@ TEST_P(EveryApi, ComputesTheLumaOfColoursBitForBit) {
   }
 }
 
-/// Pushes frames of a moving texture to both, and compares the events, which may differ where the
-/// last bits of tracks do.
-void expect_similar_events(gl::Simulator& ours, Simulator& reference) {
-  constexpr int width = 67;
-  constexpr int height = 45;
-  Texture texture(width, height, 1);
-  Settings settings;
-  settings.positive_threshold = 12;
-  settings.negative_threshold = 9;
-  std::size_t interpolated = 0;
-  for (int i = 0; i < 5; ++i) {
-    const auto frame = scene::texture<std::uint8_t>(width, height, 8, 1.7 * i, 0.6 * i);
-    texture.upload(bytes_of(frame));
-    settings.interpolated_frames = i == 3 ? 0 : 10;
-    const auto* made =
-        gl_test::events_until(ours, texture.frame({one, 0, 0, 0}), i * scene::frame_time, settings);
-    const auto* expected = reference.push(scene::luma(frame), i * scene::frame_time, settings);
-    if (i == 0) continue;
-    const auto events = scene::copy(*made);
-    const auto wanted = scene::copy(*expected);
-    EXPECT_TRUE(scene::sorted(events));
-    if (i == 3) {  // no tracks
-      ASSERT_EQ(events, wanted);
-      continue;
-    }
-    if (wanted.front().t != wanted.back().t) interpolated += wanted.size();
-    const auto step = static_cast<std::uint32_t>(scene::frame_time / 11 / 1000 + 1);
-    EXPECT_GE(matched(events, wanted, step), 0.995);
-    EXPECT_GE(matched(wanted, events, step), 0.995);
-    EXPECT_NEAR(static_cast<double>(events.size()), static_cast<double>(wanted.size()),
-                0.005 * static_cast<double>(wanted.size()));
-  }
-  EXPECT_GT(interpolated, 5'000U);
-}
-
-TEST_P(EveryApi, FollowsDifferencesAsTheCpuDoes) {
-  const LumaFormat format{67, 45, 8};
-  expect_similar_events(*gl::make_diff_simulator(context, format), *make_diff_simulator(format));
-}
-
 /// A patch of a texture that moves over a flat background.
 Image<std::uint8_t> patch(int side, int i) {
   auto frame = scene::flat<std::uint8_t>(side, side, 90);
@@ -189,12 +149,6 @@ TEST_P(EveryApi, InterpolatesMoreStepsThanItProcessesAtOnce) {
       EXPECT_GE(matched(wanted, events, 0), 0.99) << is_sparse;
     }
   }
-}
-
-TEST_P(EveryApi, FollowsChangedPixelsAsTheCpuDoes) {
-  const LumaFormat format{67, 45, 8};
-  expect_similar_events(*gl::make_sparse_simulator(context, format),
-                        *make_sparse_simulator(format));
 }
 
 /// The picture that the CPU draws of these events.
