@@ -19,36 +19,21 @@ using namespace harness;
 
 constexpr const char* video = "video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1";
 
-std::vector<std::string> formats() {
-  gst_init(nullptr, nullptr);
-  const Owned<GstElement> element(gst_element_factory_make("gleventsim-frame", nullptr));
-  const Owned<GstCaps> caps(gst_pad_get_pad_template_caps(static_pad(element.get(), "sink").get()));
-  const GValue* list = gst_structure_get_value(gst_caps_get_structure(caps.get(), 0), "format");
-  std::vector<std::string> names;
-  for (guint i = 0; i < gst_value_list_get_size(list); ++i)
-    names.emplace_back(g_value_get_string(gst_value_list_get_value(list, i)));
-  return names;
-}
-
 class EveryFormat : public testing::TestWithParam<std::string> {};
-INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats()),
+INSTANTIATE_TEST_SUITE_P(, EveryFormat,
+                         testing::ValuesIn(video_formats("gleventsim-frame", "sink")),
                          [](const auto& format) { return format.param; });
 
 /// A video whose frames differ, pushed one by one.
-class Flashes {
- public:
-  explicit Flashes(Harness& h) : h_(h) {}
-
-  GstFlowReturn push() { return h_.push(frame()); }
-
+struct Flashes {
+  GstFlowReturn push() { return h.push(frame()); }
   GstBuffer* frame() {
-    ++count_;
-    return h_.flat(static_cast<GstClockTime>(count_) * 40 * GST_MSECOND, count_ % 2 * 100);
+    ++count;
+    return h.flat(static_cast<GstClockTime>(count) * 40 * GST_MSECOND, count % 2 * 100);
   }
 
- private:
-  Harness& h_;
-  int count_ = 0;
+  Harness& h;
+  int count = 0;
 };
 
 /// The buffers that come before the stream has ended; a GPU may still work on the last one until
@@ -123,15 +108,13 @@ std::string events_of_motion(const std::string& element) {
 }
 
 TEST(Dense, InterpolatesAsSet) {
-  const auto forward = events_of_motion("gleventsim-dense");
-  const auto blend = events_of_motion("gleventsim-dense interpolation=blend");
-  EXPECT_NE(forward, blend);
-  for (const auto& [ours, setting] : {std::pair{&forward, "forward"}, {&blend, "blend"}}) {
+  for (const std::string setting : {"forward", "blend"}) {
+    const auto found = events_of_motion("gleventsim-dense interpolation=" + setting).size();
     const auto expected =
-        events_of_motion(std::string("eventsim-dense flow=farneback interpolation=") + setting);
-    EXPECT_GT(expected.size(), 8U * 10'000);
-    EXPECT_NEAR(static_cast<double>(ours->size()), static_cast<double>(expected.size()),
-                0.001 * static_cast<double>(expected.size()))
+        events_of_motion("eventsim-dense flow=farneback interpolation=" + setting).size();
+    EXPECT_GT(expected, 8U * 10'000);
+    EXPECT_NEAR(static_cast<double>(found), static_cast<double>(expected),
+                0.001 * static_cast<double>(expected))
         << setting;
   }
 }
@@ -154,8 +137,7 @@ TEST(OpenGl, KeepsFramesAndPicturesInTextures) {
       "video/x-raw(memory:GLMemory) ! fakesink");
   EXPECT_TRUE(pipeline.reaches(GST_STATE_PAUSED)) << pipeline.error;
   for (const char* name : {"sink", "src"}) {
-    const Owned<GstPad> pad(gst_element_get_static_pad(pipeline["it"], name));
-    const Owned<GstCaps> caps(gst_pad_get_current_caps(pad.get()));
+    const Owned<GstCaps> caps(gst_pad_get_current_caps(static_pad(pipeline["it"], name).get()));
     EXPECT_TRUE(gst_caps_features_contains(gst_caps_get_features(caps.get(), 0),
                                            GST_CAPS_FEATURE_MEMORY_GL_MEMORY))
         << name;
@@ -163,16 +145,14 @@ TEST(OpenGl, KeepsFramesAndPicturesInTextures) {
 }
 
 TEST(OpenGl, SharesWhatItDrawsWithTheApplication) {
-  gst_init(nullptr, nullptr);
-  const Owned<GstElement> pipeline(
-      gst_parse_launch("videotestsrc num-buffers=2 ! gleventsim-frame name=it ! "
-                       "video/x-raw(memory:GLMemory) ! fakesink name=sink",
-                       nullptr));
-  const Owned<GstElement> element(gst_bin_get_by_name(GST_BIN(pipeline.get()), "it"));
-  gst_element_set_state(element.get(), GST_STATE_READY);
-  GstContext* display = gst_element_get_context(element.get(), GST_GL_DISPLAY_CONTEXT_TYPE);
+  Pipeline pipeline(
+      "videotestsrc num-buffers=2 ! gleventsim-frame name=it ! video/x-raw(memory:GLMemory) ! "
+      "fakesink name=sink");
+  GstElement* const element = pipeline["it"];
+  gst_element_set_state(element, GST_STATE_READY);
+  GstContext* display = gst_element_get_context(element, GST_GL_DISPLAY_CONTEXT_TYPE);
   ASSERT_NE(display, nullptr);
-  gst_element_set_state(element.get(), GST_STATE_NULL);
+  gst_element_set_state(element, GST_STATE_NULL);
   GstGLDisplay* of_application = nullptr;
   gst_context_get_gl_display(display, &of_application);
   GstGLContext* application = nullptr;
@@ -195,16 +175,14 @@ TEST(OpenGl, SharesWhatItDrawsWithTheApplication) {
         return GST_BUS_PASS;
       },
       application, nullptr);
-  const Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline.get()), "sink"));
-  gst_element_set_state(pipeline.get(), GST_STATE_PAUSED);
-  gst_element_get_state(pipeline.get(), nullptr, nullptr, 20 * GST_SECOND);
+  EXPECT_TRUE(pipeline.reaches(GST_STATE_PAUSED));
   GstSample* sample = nullptr;
-  g_object_get(sink.get(), "last-sample", &sample, nullptr);
+  g_object_get(pipeline["sink"], "last-sample", &sample, nullptr);
   ASSERT_NE(sample, nullptr);
   GstMemory* picture = gst_buffer_peek_memory(gst_sample_get_buffer(sample), 0);
   EXPECT_TRUE(gst_gl_context_can_share(GST_GL_BASE_MEMORY_CAST(picture)->context, application));
   gst_sample_unref(sample);
-  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+  pipeline.set(GST_STATE_NULL);
   gst_bus_set_sync_handler(bus.get(), nullptr, nullptr, nullptr);
   gst_object_unref(application);
   gst_object_unref(of_application);
@@ -450,8 +428,7 @@ TEST_P(Busy, DownstreamErrorsReachUpstreamAtTheNextFrame) {
         return GST_PAD_PROBE_HANDLED;
       },
       nullptr, nullptr);
-  gst_harness_push_event(
-      h.get(), gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("any")));
+  push_custom(h.get());
   EXPECT_EQ(h.push(frame(h, 2)), GST_FLOW_EOS);
 }
 
@@ -462,16 +439,14 @@ TEST(OpenGl, IsAnErrorWhereItsContextIsLost) {
          {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of(element)}) {
       Harness h(element);
       h.caps(video, out);
-      Flashes flashes(h);
+      Flashes flashes{h};
       EXPECT_EQ(flashes.push(), GST_FLOW_OK);
       EXPECT_EQ(flashes.push(), GST_FLOW_OK);
       is_lost = true;
       EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
       is_lost = false;
-      EXPECT_EQ(h.error(),
-                "OpenGL cannot simulate: the OpenGL context was lost, because the GPU was reset or "
-                "removed. Use " +
-                    element.substr(2) + ", which runs on the CPU.");
+      EXPECT_NE(h.error().find("Use " + element.substr(2) + ", which runs on the CPU."),
+                std::string::npos);
       EXPECT_EQ(flashes.push(), GST_FLOW_OK);  // starts over, if the application goes on
     }
   }
@@ -520,11 +495,6 @@ class EndOfThreads {
   ~EndOfThreads() { has_ended = false; }
 };
 
-constexpr const char* thread_has_ended =
-    "OpenGL cannot simulate: the OpenGL context was destroyed. Use eventsim-frame, which runs on "
-    "the "
-    "CPU.";
-
 TEST(OpenGl, IsAnErrorWhereItsThreadHasEnded) {
   take_over_contexts();
   Harness h("gleventsim-frame");
@@ -538,7 +508,7 @@ TEST(OpenGl, IsAnErrorWhereItsThreadHasEnded) {
     push_eos(h.get());
   }
   is_busy = false;
-  EXPECT_EQ(h.error(), thread_has_ended);
+  EXPECT_NE(h.error().find("the OpenGL context was destroyed"), std::string::npos);
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
 }
 
@@ -548,7 +518,7 @@ TEST_P(EitherOutput, IsNotMistakenForTheFrameWhereItHasEnded) {
     const EndOfThreads end;
     EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
   }
-  EXPECT_EQ(h.error(), thread_has_ended);
+  EXPECT_NE(h.error().find("the OpenGL context was destroyed"), std::string::npos);
   EXPECT_EQ(flashes.push(), GST_FLOW_OK);
 }
 
@@ -563,8 +533,7 @@ TEST_P(EitherOutput, HoldsFramesUntilItHasReadThem) {
     EXPECT_EQ(h.push(frame), GST_FLOW_OK);
     EXPECT_TRUE(is_held) << i;
     is_busy = false;
-    gst_harness_push_event(
-        h.get(), gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("any")));
+    push_custom(h.get());
     EXPECT_FALSE(is_held) << i;
   }
 }

@@ -388,6 +388,20 @@ inline Owned<GstPad> static_pad(GstElement* element, const char* name) {
   return Owned<GstPad>(gst_element_get_static_pad(element, name));
 }
 
+/// Video formats in the template of a pad, in its last structure.
+inline std::vector<std::string> video_formats(const char* factory, const char* pad) {
+  gst_init(nullptr, nullptr);
+  const Owned<GstElement> element(gst_element_factory_make(factory, nullptr));
+  const Owned<GstCaps> caps(
+      gst_pad_get_pad_template_caps(static_pad(element.get(), pad).get()));
+  const GValue* const list = gst_structure_get_value(
+      gst_caps_get_structure(caps.get(), gst_caps_get_size(caps.get()) - 1), "format");
+  std::vector<std::string> names;
+  for (guint i = 0; i < gst_value_list_get_size(list); ++i)
+    names.emplace_back(g_value_get_string(gst_value_list_get_value(list, i)));
+  return names;
+}
+
 /// Width and height in the caps of the output, as "320x240".
 inline std::string size_of(GstHarness* h) {
   const Owned<GstCaps> caps(gst_pad_get_current_caps(h->sinkpad));

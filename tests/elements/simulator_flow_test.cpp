@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "src/core/image.hpp"
@@ -42,19 +43,15 @@ std::string bytes_of(const Image<Pixel>& image) {
   return bytes;
 }
 
-GstBuffer* frame_of(int i) {
+GstBuffer* frame_of(int i, const std::optional<Image<Flow>>& flow = {}) {
   const auto bytes = bytes_of(image_of(i));
   GstBuffer* buffer = gst_buffer_new_memdup(bytes.data(), bytes.size());
   GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(i) * interval;
-  return buffer;
-}
-
-GstBuffer* frame_of(int i, const Image<Flow>& flow) {
-  GstBuffer* buffer = frame_of(i);
-  const auto rows = bytes_of(flow);
-  GBytes* bytes = g_bytes_new(rows.data(), rows.size());
-  gst_buffer_add_event_camera_flow_meta(buffer, width, height, bytes);
-  g_bytes_unref(bytes);
+  if (!flow) return buffer;
+  const auto rows = bytes_of(*flow);
+  GBytes* const flow_bytes = g_bytes_new(rows.data(), rows.size());
+  gst_buffer_add_event_camera_flow_meta(buffer, width, height, flow_bytes);
+  g_bytes_unref(flow_bytes);
   return buffer;
 }
 
@@ -89,14 +86,11 @@ class EveryFlowSimulator : public testing::TestWithParam<Simulator> {
   }
 
   /// Bytes of the events, where each frame has the flow that `flow_from` gives.
-  std::string events_with(const std::function<Image<Flow>(int)>& flow_from) {
+  static std::string events_with(
+      const std::function<std::optional<Image<Flow>>(int)>& flow_from) {
     Harness h = without_upload(GetParam().launch);  // glupload drops flow
     h.caps(video);
     for (int i = 0; i < frame_count; ++i) EXPECT_EQ(h.push(frame_of(i, flow_from(i))), GST_FLOW_OK);
-    return events_of(h);
-  }
-
-  static std::string events_of(Harness& h) {
     std::string bytes;
     while (const auto buffer = h.pull()) bytes += harness::bytes_of(buffer.get());
     return bytes;
@@ -104,10 +98,7 @@ class EveryFlowSimulator : public testing::TestWithParam<Simulator> {
 
   /// Bytes of the events, where no frame has a flow.
   static std::string own_events() {
-    Harness h = without_upload(GetParam().launch);  // glupload drops flow
-    h.caps(video);
-    for (int i = 0; i < frame_count; ++i) h.push(frame_of(i));
-    return events_of(h);
+    return events_with([](int) { return std::nullopt; });
   }
 
   eventcamera::ThreadPool threads;
@@ -129,13 +120,12 @@ TEST_P(EveryFlowSimulator, UsesTheFlowOfItsFrames) {
 }
 
 TEST_P(EveryFlowSimulator, FindsTheFlowOfFramesWithoutIt) {
-  Harness h = without_upload(GetParam().launch);  // glupload drops flow
-  h.caps(video);
-  for (int i = 0; i < frame_count; ++i) {
-    const auto flow = own_flow(i);  // which depends on the one before
-    h.push(i % 2 == 0 ? frame_of(i, flow) : frame_of(i));
-  }
-  EXPECT_TRUE(events_of(h) == own_events());
+  const auto flow_of_every_second = [&](int i) -> std::optional<Image<Flow>> {
+    auto flow = own_flow(i);  // which depends on the one before
+    if (i % 2 == 1) return std::nullopt;
+    return flow;
+  };
+  EXPECT_TRUE(events_with(flow_of_every_second) == own_events());
 }
 
 TEST_P(EveryFlowSimulator, TakesAnyNumbersOfFlow) {
@@ -153,7 +143,7 @@ TEST_P(EveryFlowSimulator, TakesAnyNumbersOfFlow) {
                  return flow;
                }).empty());
   // What is not finite counts as 0.
-  const auto filled = [&](float number) {
+  const auto with_all = [&](float number) {
     return events_with([&](int) {
       Image<Flow> flow(width, height);
       for (int y = 0; y < height; ++y)
@@ -161,8 +151,8 @@ TEST_P(EveryFlowSimulator, TakesAnyNumbersOfFlow) {
       return flow;
     });
   };
-  EXPECT_TRUE(filled(numbers[0]) == filled(0));
-  EXPECT_FALSE(filled(3) == filled(0));
+  EXPECT_TRUE(with_all(numbers[0]) == with_all(0));
+  EXPECT_FALSE(with_all(3) == with_all(0));
 }
 
 TEST_P(EveryFlowSimulator, WritesTheFlowOfEachInterval) {
@@ -199,9 +189,7 @@ TEST(FlowOfFrames, MustHaveTheirSize) {
   Harness h("eventsim-dense");
   h.caps("video/x-raw, format=GRAY8, width=64, height=96, framerate=25/1");
   EXPECT_EQ(h.push(frame_of(0, Image<Flow>(width, height))), GST_FLOW_ERROR);
-  EXPECT_EQ(h.error(),
-            "The optical flow of a frame has 96x64 pixels, and the video has 64x96. Add the flow "
-            "after the video is scaled or cropped.");
+  EXPECT_NE(h.error().find("Add the flow after the video is scaled or cropped"), std::string::npos);
 }
 
 TEST(FlowOfFrames, IsNotWrittenWhereNoneIsNeeded) {

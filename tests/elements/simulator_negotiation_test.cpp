@@ -46,27 +46,16 @@ TEST(Negotiation, RefusesWhatItCannotRead) {
 TEST(Negotiation, AsksUpstreamForTheSizeThatDownstreamWants) {
   Harness h("eventsim-frame");
   gst_harness_set_sink_caps_str(h.get(), "application/x-event-camera, width=640, height=480");
-  GstCaps* caps = gst_pad_peer_query_caps(h->srcpad, nullptr);
-  for (guint i = 0; i < gst_caps_get_size(caps); ++i) {
+  const Owned<GstCaps> caps(gst_pad_peer_query_caps(h->srcpad, nullptr));
+  for (guint i = 0; i < gst_caps_get_size(caps.get()); ++i) {
     int width = 0;
-    EXPECT_TRUE(gst_structure_get_int(gst_caps_get_structure(caps, i), "width", &width));
+    EXPECT_TRUE(gst_structure_get_int(gst_caps_get_structure(caps.get(), i), "width", &width));
     EXPECT_EQ(width, 640);
   }
-  gst_caps_unref(caps);
 }
 
 std::vector<std::string> formats(const char* pad) {
-  gst_init(nullptr, nullptr);
-  Owned<GstElement> element(gst_element_factory_make("eventsim-frame", nullptr));
-  GstCaps* caps = gst_pad_template_get_caps(
-      gst_element_class_get_pad_template(GST_ELEMENT_GET_CLASS(element.get()), pad));
-  const GValue* list =
-      gst_structure_get_value(gst_caps_get_structure(caps, gst_caps_get_size(caps) - 1), "format");
-  std::vector<std::string> names;
-  for (guint i = 0; i < gst_value_list_get_size(list); ++i)
-    names.emplace_back(g_value_get_string(gst_value_list_get_value(list, i)));
-  gst_caps_unref(caps);
-  return names;
+  return video_formats("eventsim-frame", pad);
 }
 
 class EveryInputFormat : public testing::TestWithParam<std::string> {};
@@ -204,10 +193,9 @@ TEST_P(EveryOutputFormat, IsDrawn) {
   h.push(h.frame(40 * GST_MSECOND, [](int x, int) { return x == 0 ? 200 : x == 4 ? 0 : 100; }));
   const auto buffer = h.pull();
   ASSERT_TRUE(buffer);
-  GstCaps* caps = gst_pad_get_current_caps(h->sinkpad);
+  const Owned<GstCaps> caps(gst_pad_get_current_caps(h->sinkpad));
   GstVideoInfo info;
-  ASSERT_TRUE(gst_video_info_from_caps(&info, caps));
-  gst_caps_unref(caps);
+  ASSERT_TRUE(gst_video_info_from_caps(&info, caps.get()));
   EXPECT_EQ(gst_buffer_get_size(buffer.get()), GST_VIDEO_INFO_SIZE(&info));
   GstVideoFrame frame;
   ASSERT_TRUE(gst_video_frame_map(&frame, &info, buffer.get(), GST_MAP_READ));
@@ -228,12 +216,11 @@ TEST_P(EveryOutputFormat, IsDrawn) {
 TEST(Allocation, TellsUpstreamThatAnyStrideIsWelcome) {
   Harness h("eventsim-frame");
   h.caps("video/x-raw, format=GRAY8" + size);
-  GstCaps* caps = gst_pad_get_current_caps(h->srcpad);
-  GstQuery* query = gst_query_new_allocation(caps, TRUE);
+  const Owned<GstCaps> caps(gst_pad_get_current_caps(h->srcpad));
+  GstQuery* query = gst_query_new_allocation(caps.get(), TRUE);
   EXPECT_TRUE(gst_pad_peer_query(h->srcpad, query));
   EXPECT_TRUE(gst_query_find_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr));
   gst_query_unref(query);
-  gst_caps_unref(caps);
 }
 
 }  // namespace

@@ -76,6 +76,18 @@ TEST_P(EveryApi, MakesTheEventsOfFrameDifferencesBitForBit) {
   }
 }
 
+TEST_P(EveryApi, MakesTheEventsOfTheCpuWhereNothingIsInterpolated) {
+  const LumaFormat format{67, 45, 8};
+  const Settings settings{12, 9, 0};
+  std::vector<Image<std::uint8_t>> frames;
+  for (int i = 0; i < 3; ++i)
+    frames.push_back(scene::texture<std::uint8_t>(67, 45, 8, 1.7 * i, 0.6 * i));
+  expect_same_events(*gl::make_diff_simulator(context, format), *make_diff_simulator(format),
+                     settings, frames);
+  expect_same_events(*gl::make_sparse_simulator(context, format), *make_sparse_simulator(format),
+                     settings, frames);
+}
+
 TEST_P(EveryApi, ComputesTheLumaOfColoursBitForBit) {
   constexpr int width = 61;
   constexpr int height = 50;
