@@ -72,22 +72,6 @@ TEST(EventNpzDec, SaysWhenAnArchiveIsTruncated) {
   }
 }
 
-/// Text and cause of the error that ends a file.
-std::string error_of(std::string_view file, const std::string& reader, const std::string& caps) {
-  Reader h(reader, caps);
-  push_segment(h.get(), {.format = GST_FORMAT_BYTES});
-  h.read(file);
-  const auto message = h.message(GST_MESSAGE_ERROR);
-  if (!message) return "";
-  GError* error = nullptr;
-  gchar* cause = nullptr;
-  gst_message_parse_error(message.get(), &error, &cause);
-  const std::string texts = error->message + std::string(cause);
-  g_error_free(error);
-  g_free(cause);
-  return texts;
-}
-
 TEST(FileReaders, QuoteTheBytesOfAFileInUtf8) {
   const std::string raw = "% format EVT\xff;width=2;height=2\n% end\n";
   const std::string order = "% format EVT21;endianness=\xfe;width=2;height=2\n% end\n";
@@ -98,9 +82,52 @@ TEST(FileReaders, QuoteTheBytesOfAFileInUtf8) {
         {order, "evtdec", "application/x-prophesee-raw"},
         {version, "aedatdemux", "application/x-aedat, version=2"},
         {camera, "aedatdemux", "application/x-aedat, version=2"}}) {
-    const auto text = error_of(file, reader, caps);
+    Reader h(reader, caps);
+    push_segment(h.get(), {.format = GST_FORMAT_BYTES});
+    h.read(file);
+    const auto text = h.error();
     EXPECT_NE(text.find("\xEF\xBF\xBD"), std::string::npos) << text;
     EXPECT_TRUE(g_utf8_validate(text.data(), static_cast<gssize>(text.size()), nullptr)) << text;
+  }
+}
+
+/// Lines of a log: their level and text.
+using Log = std::vector<std::pair<GstDebugLevel, std::string>>;
+
+void take_line(GstDebugCategory* category, GstDebugLevel level, const gchar*, const gchar*, gint,
+               GObject*, GstDebugMessage* message, gpointer log) {
+  const std::string text = gst_debug_message_get(message);
+  if (gst_debug_category_get_name(category) == std::string_view("eventreader") &&
+      text.find("Corrupt data at byte") != text.npos)
+    static_cast<Log*>(log)->emplace_back(level, text);
+}
+
+/// The first place is a warning.
+TEST(FileReaders, LogEachPlaceThatIsCorrupt) {
+  gst_init(nullptr, nullptr);
+  std::string table = "t,x,y,p\n";
+  std::vector<std::size_t> corrupt;
+  for (int t = 0; t < 15'000; ++t) {
+    if (t % 5000 == 1) corrupt.push_back(table.size());
+    table += t % 5000 == 1 ? "?\n" : std::to_string(20 * t) + ",1,1,1\n";
+  }
+  const TemporaryFile file(table);
+  Log log;
+  gst_debug_set_threshold_for_name("eventreader", GST_LEVEL_LOG);
+  gst_debug_remove_log_function(gst_debug_log_default);
+  gst_debug_add_log_function(take_line, &log, nullptr);
+  {
+    Pipeline pipeline(file.source() + "queue ! eventcsvdec width=8 height=8 ! fakesink");
+    EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  }
+  gst_debug_remove_log_function_by_data(&log);
+  gst_debug_unset_threshold_for_name("eventreader");
+  ASSERT_EQ(log.size(), corrupt.size());
+  for (std::size_t i = 0; i < log.size(); ++i) {
+    EXPECT_EQ(log[i].first, i == 0 ? GST_LEVEL_WARNING : GST_LEVEL_LOG);
+    EXPECT_NE(log[i].second.find("the last at byte " + std::to_string(corrupt[i])),
+              std::string::npos)
+        << log[i].second;
   }
 }
 
