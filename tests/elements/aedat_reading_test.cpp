@@ -21,7 +21,7 @@ TEST(AedatDemux, Aedat2WithoutACameraHasTheSizeThatIsAskedFor) {
     EXPECT_TRUE(assumed.play()) << assumed.error;
     EXPECT_TRUE(assumed.events == events);
     ASSERT_EQ(assumed.warnings.size(), 1U);
-    EXPECT_NE(assumed.warnings.front().find("assuming 240 x 180 pixels"), std::string::npos);
+    EXPECT_TRUE(contains(assumed.warnings.front(), "assuming 240 x 180 pixels"));
 
     auto moved = events;  // by what a DAVIS346 has more of
     for (auto& e : moved) e = AbsoluteEvent::at(e.x + 106, e.y() + 80, e.t, e.polarity());
@@ -58,8 +58,8 @@ TEST(AedatDemux, PutsFramesInSyncWithEvents) {
     AedatPlayer player(file.source());
     ASSERT_TRUE(player.play()) << player.error;
     const auto video = player.track("video_0");
-    EXPECT_NE(video.caps.find("format=(string)" + std::string(name)), std::string::npos);
-    EXPECT_NE(video.caps.find("width=(int)5, height=(int)3"), std::string::npos) << video.caps;
+    EXPECT_TRUE(contains(video.caps, "format=(string)" + std::string(name)));
+    EXPECT_TRUE(contains(video.caps, "width=(int)5, height=(int)3"));
     ASSERT_EQ(video.pictures.size(), 50U);
     for (std::size_t i = 0; i < 50; ++i) {
       EXPECT_EQ(video.pictures[i].pts, (of_1970 - 3'000) * GST_USECOND + i * 40 * GST_MSECOND);
@@ -164,7 +164,7 @@ TEST(AedatDemux, SaysWhereAFileHasNoEvents) {
   const TemporaryFile empty(aedat_files::aedat4_header(""));
   AedatPlayer player(empty.source());
   EXPECT_FALSE(player.play());
-  EXPECT_NE(player.error.find("neither events nor frames"), std::string::npos) << player.error;
+  EXPECT_TRUE(contains(player.error, "neither events nor frames"));
   // There is a stream of events here, though it is empty.
   const TemporaryFile silent(aedat4_file({}));
   AedatPlayer other(silent.source());

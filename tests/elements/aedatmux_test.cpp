@@ -51,9 +51,8 @@ TEST(AedatMux, WritesTheTimesOfTheStream) {
   EXPECT_EQ(mux.push(5 * GST_SECOND + 999, {{0, 1, 2}, {7, 3, 0x8004}}), GST_FLOW_OK);
   EXPECT_EQ(mux.push(5 * GST_SECOND + 10 * GST_MSECOND, {{9'999, 345, 259}}), GST_FLOW_OK);
   const auto content = mux.end();
-  EXPECT_EQ(content.events, (Events{AbsoluteEvent::at(1, 2, 5'000'000, Polarity::off),
-                                    AbsoluteEvent::at(3, 4, 5'000'007, Polarity::on),
-                                    AbsoluteEvent::at(345, 259, 5'019'999, Polarity::off)}));
+  EXPECT_EQ(content.events,
+            (Events{off_at(1, 2, 5'000'000), on_at(3, 4, 5'000'007), off_at(345, 259, 5'019'999)}));
   EXPECT_FALSE(content.has_table) << "nothing could seek to where the header tells of it";
 }
 
@@ -67,8 +66,8 @@ TEST(AedatMux, WritesTheTimesOfTheStreamInEachSegment) {
   EXPECT_EQ(mux.push(20 * GST_MSECOND, {{0, 1, 2}, {9'999, 3, 4}}), GST_FLOW_OK);
   Events expected;
   for (int start = 0; start < 30'000; start += 10'000) {
-    expected.push_back(AbsoluteEvent::at(1, 2, start, Polarity::off));
-    expected.push_back(AbsoluteEvent::at(3, 4, start + 9'999, Polarity::off));
+    expected.push_back(off_at(1, 2, start));
+    expected.push_back(off_at(3, 4, start + 9'999));
   }
   EXPECT_EQ(mux.end().events, expected);
 }
@@ -112,8 +111,7 @@ TEST(AedatMux, WritesFramesWithTheEventsOfTheirRunningTime) {
   ASSERT_EQ(content.pictures.size(), 2U);
   EXPECT_EQ(content.pictures[0].times[0], 5'008'000);
   EXPECT_EQ(content.pictures[1].times[0], 5'012'000);
-  EXPECT_EQ(content.events, (Events{AbsoluteEvent::at(1, 2, 5'000'000, Polarity::off),
-                                    AbsoluteEvent::at(1, 2, 5'010'000, Polarity::off)}));
+  EXPECT_EQ(content.events, (Events{off_at(1, 2, 5'000'000), off_at(1, 2, 5'010'000)}));
 }
 
 /// At twice the rate, a gap of 40 ms ends before a frame of running time 30 ms.
@@ -137,8 +135,7 @@ TEST(AedatMux, LeavesOutWhatDoesNotFit) {
   EXPECT_EQ(mux.push(0, {{0, 1, 1}}), GST_FLOW_OK);
   EXPECT_EQ(mux.Harness::push(gst_buffer_new_memdup("123", 3)), GST_FLOW_OK);
   EXPECT_EQ(mux.push(2 * GST_SECOND, {{0, 1, 1}}), GST_FLOW_OK);
-  EXPECT_EQ(mux.end().events, (Events{AbsoluteEvent::at(6, 7, 1'000'005, Polarity::off),
-                                      AbsoluteEvent::at(1, 1, 2'000'000, Polarity::off)}));
+  EXPECT_EQ(mux.end().events, (Events{off_at(6, 7, 1'000'005), off_at(1, 1, 2'000'000)}));
   for (const char* dropped :
        {"a buffer without a timestamp", "2 events earlier than", "2 events outside"}) {
     const auto warning = mux.warning();

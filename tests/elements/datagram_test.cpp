@@ -118,9 +118,8 @@ TEST_P(EveryFormat, BringsEveryEvent) {
 GstBuffer* ten_events(int number, GstClockTime duration = 200 * GST_MSECOND) {
   std::vector<Event> events;
   for (guint64 i = 0; i < 10; ++i)
-    events.push_back(Event::at(static_cast<int>(i), 2,
-                               static_cast<std::uint32_t>(duration / GST_USECOND * i / 10),
-                               Polarity::on));
+    events.push_back(
+        on(static_cast<int>(i), 2, static_cast<std::uint32_t>(duration / GST_USECOND * i / 10)));
   return buffer_of(static_cast<GstClockTime>(number) * duration, events, duration);
 }
 
@@ -132,8 +131,7 @@ TEST(Payloader, LetsNoEventWaitIfNoBufferComes) {
   h.caps(events_caps, "application/x-event-datagram");
   for (int i = 0; i < 2; ++i) {
     const auto start = g_get_monotonic_time();
-    h.push(buffer_of(static_cast<GstClockTime>(i) * GST_SECOND, {Event::at(1, 2, 3, Polarity::on)},
-                     GST_MSECOND));
+    h.push(buffer_of(static_cast<GstClockTime>(i) * GST_SECOND, {on(1, 2, 3)}, GST_MSECOND));
     const Buffer buffer(gst_harness_pull(h.get()));
     ASSERT_TRUE(buffer);
     EXPECT_EQ(gst_buffer_get_size(buffer.get()), 8);
@@ -177,7 +175,7 @@ TEST(Depayloader, NeedsTheSensorSize) {
        {"", "width=640", "height=480", "format=jaer width=1280 height=720"}) {
     Pipeline pipeline("eventdatagramdepay " + settings + " ! fakesink");
     EXPECT_FALSE(pipeline.play());
-    EXPECT_NE(pipeline.error.find("width and height"), std::string::npos) << settings;
+    EXPECT_TRUE(contains(pipeline.error, "width and height")) << settings;
   }
 }
 
@@ -219,7 +217,7 @@ TEST(Depayloader, ReceivesOneOfTwoSenders) {
   }
   EXPECT_EQ(gst_harness_buffers_received(h.get()), 10U);
   EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 10U);
-  EXPECT_NE(h.warning().find("second sender"), std::string::npos);
+  EXPECT_TRUE(contains(h.warning(), "second sender"));
   EXPECT_EQ(h.warning(), "");
   send(2000, 9'500'000, 4000 * GST_MSECOND);  // the first one has left
   EXPECT_EQ(gst_harness_buffers_received(h.get()), 11U);
@@ -235,7 +233,7 @@ TEST(Depayloader, IsNotHeldByASenderOfInvalidDatagrams) {
   }
   EXPECT_EQ(gst_harness_buffers_received(h.get()), 10U);
   EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 10U);
-  EXPECT_NE(h.warning().find("Set format, width and height"), std::string::npos);
+  EXPECT_TRUE(contains(h.warning(), "Set format, width and height"));
   EXPECT_EQ(h.warning() + h.error(), "");
 }
 
@@ -289,7 +287,7 @@ TEST(Depayloader, SaysThatItHearsNothing) {
     const Owned<GstMessage> message(
         gst_bus_timed_pop_filtered(bus.get(), 60 * GST_SECOND, GST_MESSAGE_WARNING));
     ASSERT_TRUE(message) << receiver;
-    EXPECT_NE(text_of(message.get()).find("No packets for 3 seconds"), std::string::npos);
+    EXPECT_TRUE(contains(text_of(message.get()), "No packets for 3 seconds"));
   }
 }
 
@@ -297,15 +295,14 @@ TEST(Depayloader, GivesEventsWithoutTimesThatOfTheirArrival) {
   Depay h("format=spif");
   h.push(datagram({1, 0, 2, 0x80, 1, 0, 3, 0x80}, 7 * GST_MSECOND));
   h.push(datagram({1, 0, 4, 0x80}, 9 * GST_MSECOND));
-  EXPECT_EQ(pull_events(h), (std::vector{AbsoluteEvent::at(2, 1, 7000, Polarity::off),
-                                         AbsoluteEvent::at(3, 1, 7000, Polarity::off),
-                                         AbsoluteEvent::at(4, 1, 9000, Polarity::off)}));
+  EXPECT_EQ(pull_events(h),
+            (std::vector{off_at(2, 1, 7000), off_at(3, 1, 7000), off_at(4, 1, 9000)}));
 }
 
 TEST(Depayloader, NeedsArrivalTimesForEventsWithoutTimes) {
   Depay h("format=spif");
   EXPECT_EQ(h.push(datagram({1, 0, 2, 0x80}, GST_CLOCK_TIME_NONE)), GST_FLOW_ERROR);
-  EXPECT_NE(h.error().find("do-timestamp=true"), std::string::npos);
+  EXPECT_TRUE(contains(h.error(), "do-timestamp=true"));
 }
 
 TEST(Depayloader, SegmentsHaveTheSequenceNumberOfUpstream) {

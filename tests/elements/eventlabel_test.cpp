@@ -9,7 +9,6 @@ namespace {
 
 using namespace harness;
 using eventcamera::Event;
-using eventcamera::Polarity;
 
 constexpr GstClockTime ms = GST_MSECOND;
 constexpr int width = 8;
@@ -33,7 +32,7 @@ class EventLabel : public testing::Test {
     std::vector<Event> list;
     for (const auto t : times) {
       const auto pixel = static_cast<int>(list.size());
-      list.push_back(Event::at(pixel % width, pixel / width, t, Polarity::on));
+      list.push_back(on(pixel % width, pixel / width, t));
     }
     return gst_harness_push(events.get(), buffer_of(pts, list, duration));
   }
@@ -185,8 +184,7 @@ TEST_F(EventLabel, NeedsImagesOfTheSizeOfTheSensor) {
   push_image(0, 1);
   push_events(0, {0});
   push_eos(images.get());
-  EXPECT_NE(label.error().find("Scale the images with videoscale method=nearest"),
-            std::string::npos);
+  EXPECT_TRUE(contains(label.error(), "Scale the images with videoscale method=nearest"));
 }
 
 TEST_F(EventLabel, FollowsChangesOfTheSize) {
@@ -199,7 +197,7 @@ TEST_F(EventLabel, FollowsChangesOfTheSize) {
   begin("GRAY8", "16, height=2", "16, height=2");
   push_image(40 * ms, 3);
   EXPECT_EQ(classes(), Classes{2});
-  gst_harness_push(events.get(), buffer_of(40 * ms, {Event::at(15, 1, 0, Polarity::on)}, 20 * ms));
+  gst_harness_push(events.get(), buffer_of(40 * ms, {on(15, 1, 0)}, 20 * ms));
   push_image(80 * ms, 4);
   EXPECT_EQ(classes(), Classes{3 + 31});
 }
@@ -212,7 +210,7 @@ TEST_F(EventLabel, SkipsImagesWithoutATime) {
   push_image(5 * ms, 3);
   push_eos(images.get());
   EXPECT_EQ(classes(), (Classes{-1, 1}));
-  EXPECT_NE(label.text_of_next(GST_MESSAGE_WARNING).find("one has no PTS"), std::string::npos);
+  EXPECT_TRUE(contains(label.text_of_next(GST_MESSAGE_WARNING), "one has no PTS"));
   EXPECT_EQ(label.text_of_next(GST_MESSAGE_WARNING), "");
 }
 

@@ -294,13 +294,13 @@ TEST(EvtParse, PassesOnTheLastWordsBeforeOtherCapsAndTheEnd) {
 TEST(EvtParse, SaysWhatIsMissing) {
   Harness unknown("evtparse format=EVT3");
   gst_harness_set_src_caps_str(unknown.get(), padded_caps);
-  EXPECT_NE(unknown.error().find("Set format, width and height"), std::string::npos);
+  EXPECT_TRUE(contains(unknown.error(), "Set format, width and height"));
 
   Parse wrong("format=EVT2");
   const auto words = words_of(some_events(50'000), EvtFormat::evt3);
   for (std::size_t at = 0; at + buffer_size <= words.size(); at += buffer_size)
     wrong.push(gst_buffer_new_memdup(words.data() + at, buffer_size));
-  EXPECT_NE(wrong.warning().find("not valid in this format"), std::string::npos);
+  EXPECT_TRUE(contains(wrong.warning(), "not valid in this format"));
   EXPECT_EQ(wrong.warning(), "");
 }
 
@@ -313,7 +313,7 @@ TEST(EvtParse, SaysAtTheEndThatThereWereNoEvents) {
     parse.push(gst_buffer_new_memdup(bytes.data(), bytes.size()));
     EXPECT_EQ(parse.warning(), "");
     push_eos(parse.get());
-    EXPECT_NE(parse.warning().find("No events were found"), std::string::npos);
+    EXPECT_TRUE(contains(parse.warning(), "No events were found"));
     EXPECT_EQ(parse.warning(), "");
   }
   Harness parse("evtparse format=EVT3" + std::string(size));

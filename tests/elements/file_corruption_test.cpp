@@ -86,7 +86,7 @@ TEST(FileReaders, QuoteTheBytesOfAFileInUtf8) {
     push_segment(h.get(), {.format = GST_FORMAT_BYTES});
     h.read(file);
     const auto text = h.error();
-    EXPECT_NE(text.find("\xEF\xBF\xBD"), std::string::npos) << text;
+    EXPECT_TRUE(contains(text, "\xEF\xBF\xBD"));
     EXPECT_TRUE(g_utf8_validate(text.data(), static_cast<gssize>(text.size()), nullptr)) << text;
   }
 }
@@ -125,9 +125,7 @@ TEST(FileReaders, LogEachPlaceThatIsCorrupt) {
   ASSERT_EQ(log.size(), corrupt.size());
   for (std::size_t i = 0; i < log.size(); ++i) {
     EXPECT_EQ(log[i].first, i == 0 ? GST_LEVEL_WARNING : GST_LEVEL_LOG);
-    EXPECT_NE(log[i].second.find("the last at byte " + std::to_string(corrupt[i])),
-              std::string::npos)
-        << log[i].second;
+    EXPECT_TRUE(contains(log[i].second, "the last at byte " + std::to_string(corrupt[i])));
   }
 }
 

@@ -99,8 +99,7 @@ TEST_P(EveryFormat, IsEmptyWhereThereAreNoEvents) {
   Reader h(format());
   h.read(file, 5);
   EXPECT_FALSE(h.pull());
-  EXPECT_NE(h.out_caps().find(format().tells_size ? "width=(int)320" : "width=(int)128"),
-            std::string::npos);
+  EXPECT_TRUE(contains(h.out_caps(), format().tells_size ? "width=(int)320" : "width=(int)128"));
   EXPECT_TRUE(h.pull_event(GST_EVENT_SEGMENT));
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
   EXPECT_EQ(h.warning(), "The file has no events.");

@@ -16,8 +16,8 @@ TEST(EvtDec, AssumesASensorWhereTheFileTellsNone) {
     Player player(temporary.source() + way + "evtdec ! capsfilter name=filter");
     ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
     const auto pad = static_pad(player["filter"], "src");
-    EXPECT_NE(text_of(Owned<GstCaps>(gst_pad_get_current_caps(pad.get()))).find("height=(int)320"),
-              std::string::npos);
+    EXPECT_TRUE(
+        contains(text_of(Owned<GstCaps>(gst_pad_get_current_caps(pad.get()))), "height=(int)320"));
     Player told(temporary.source() + way +
                 "evtdec ! application/x-event-camera,width=640,height=480");
     EXPECT_TRUE(told.play()) << told.error;
@@ -40,8 +40,7 @@ TEST(EventEs, CountsRowsFromWhereItIsTold) {
 /// Leaves the sensor that fits its beginning.
 Events growing_events() {
   Events events;
-  for (int i = 0; i < 3000; ++i)
-    events.push_back(AbsoluteEvent::at(i / 10, i / 15, Microseconds{1000} * i, Polarity::on));
+  for (int i = 0; i < 3000; ++i) events.push_back(on_at(i / 10, i / 15, Microseconds{1000} * i));
   return events;
 }
 
@@ -79,7 +78,7 @@ TEST(TableReaders, TakeTheSizeOfTheirProperties) {
     }
     Player grown(file.source() + "queue ! " + format.reader + " ! evtenc ! evtdec");
     EXPECT_FALSE(grown.play());
-    EXPECT_NE(grown.error.find("width and height"), std::string::npos);
+    EXPECT_TRUE(contains(grown.error, "width and height"));
   }
 }
 
@@ -90,7 +89,7 @@ TEST(EvtDec, LeavesOutEventsOutsideTheSensor) {
   Reader h(format_of("evt2"));
   h.read(file);
   EXPECT_EQ(pull_events(h).size(), 10'080U);
-  EXPECT_NE(h.warning().find("9920 events outside the sensor"), std::string::npos);
+  EXPECT_TRUE(contains(h.warning(), "9920 events outside the sensor"));
   EXPECT_EQ(stat_of(h.element(), "outside-events"), 9920U);
   EXPECT_EQ(stat_of(h.element(), "late-items") + stat_of(h.element(), "stray-items"), 0U);
 }
@@ -107,12 +106,10 @@ TEST(EventCsvDec, TakesTimesInTheUnitThatIsFoundOrSet) {
   const TemporaryFile unclear(std::string("1000 2 3 1\n2000 4 5 0\n3000 6 7 1\n"));
   Player refused(unclear.source() + "eventcsvdec");
   EXPECT_FALSE(refused.play());
-  EXPECT_NE(refused.error.find("set time-unit"), std::string::npos);
+  EXPECT_TRUE(contains(refused.error, "set time-unit"));
   Player set(unclear.source() + "eventcsvdec time-unit=nanoseconds");
   EXPECT_TRUE(set.play()) << set.error;
-  EXPECT_EQ(set.events, (Events{AbsoluteEvent::at(2, 3, 1, Polarity::on),
-                                AbsoluteEvent::at(4, 5, 2, Polarity::off),
-                                AbsoluteEvent::at(6, 7, 3, Polarity::on)}));
+  EXPECT_EQ(set.events, (Events{on_at(2, 3, 1), off_at(4, 5, 2), on_at(6, 7, 3)}));
 }
 
 }  // namespace

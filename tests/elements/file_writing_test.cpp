@@ -11,10 +11,8 @@ using namespace event_files;
 
 TEST_P(EveryFormat, IsWrittenWithoutWhatLiesOutsideTheSensor) {
   Writer h(format());
-  const std::vector events = {AbsoluteEvent::at(5, 5, 1000, Polarity::on),
-                              AbsoluteEvent::at(width, 5, 1001, Polarity::on),
-                              AbsoluteEvent::at(5, height, 1002, Polarity::on),
-                              AbsoluteEvent::at(6, 6, 1003, Polarity::off)};
+  const std::vector events = {on_at(5, 5, 1000), on_at(width, 5, 1001), on_at(5, height, 1002),
+                              off_at(6, 6, 1003)};
   h.write(events, 0);
   push_gap(h.get(), 10 * GST_MSECOND, 10 * GST_MSECOND);
   EXPECT_TRUE(h.pull_event(GST_EVENT_GAP));
@@ -55,7 +53,7 @@ TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
   Writer h(format());
   const auto push = [&](const std::vector<Microseconds>& times) {
     Events events;
-    for (const auto t : times) events.push_back(AbsoluteEvent::at(5, 5, t, Polarity::on));
+    for (const auto t : times) events.push_back(on_at(5, 5, t));
     h.write(events, 0);
   };
   push({3000});
@@ -76,14 +74,13 @@ TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
 /// As from concat.
 TEST_P(EveryFormat, RefusesARecordingAfterAnother) {
   Writer h(format());
-  h.write(AbsoluteEvent::at(5, 5, 3000, Polarity::on), 0);
+  h.write(on_at(5, 5, 3000), 0);
   push_segment(h.get());
-  h.write(AbsoluteEvent::at(5, 5, 3000, Polarity::on), 0);  // times go on
+  h.write(on_at(5, 5, 3000), 0);  // times go on
   EXPECT_EQ(h.error(), "");
   push_segment(h.get());
-  EXPECT_EQ(h.push(buffer_of(Events{AbsoluteEvent::at(5, 5, 2000, Polarity::on)}, 0)),
-            GST_FLOW_ERROR);
-  EXPECT_NE(h.error().find("start over at 2000 us"), std::string::npos);
+  EXPECT_EQ(h.push(buffer_of(Events{on_at(5, 5, 2000)}, 0)), GST_FLOW_ERROR);
+  EXPECT_TRUE(contains(h.error(), "start over at 2000 us"));
 }
 
 /// As from MP4 with B-frames or an edit list: timestamps begin at 67 ms, players count from 0.
@@ -99,7 +96,7 @@ TEST(Writers, CountSimulatedEventsInStreamTime) {
     std::string text;
     h.wait_for_events();
     while (const auto buffer = h.pull()) text += bytes_of(buffer.get());
-    EXPECT_NE(text.find("\n40000,"), std::string::npos) << text.substr(0, 200);
+    EXPECT_TRUE(contains(text, "\n40000,")) << text.substr(0, 200);
   }
 }
 
@@ -118,9 +115,9 @@ TEST(EventNpzEnc, TellsOfEventsThatAreLostWithoutTheEnd) {
 
 TEST_P(EveryFormat, IsWrittenAnewAfterAFlush) {
   Writer h(format());
-  const auto early = AbsoluteEvent::at(6, 6, 1000, Polarity::off);
+  const auto early = off_at(6, 6, 1000);
   for (const bool ended : {false, true}) {
-    h.write(AbsoluteEvent::at(5, 5, 1'000'000, Polarity::on), 1'000'000);
+    h.write(on_at(5, 5, 1'000'000), 1'000'000);
     if (ended) push_eos(h.get());
     h.pull_bytes();
     flush({h.get()});
@@ -134,7 +131,7 @@ TEST_P(EveryFormat, IsWrittenAnewAfterAFlush) {
 
 TEST_P(EveryFormat, IsOfOneSize) {
   Writer h(format());
-  h.write(AbsoluteEvent::at(5, 5, 1000, Polarity::on), 0);
+  h.write(on_at(5, 5, 1000), 0);
   gst_harness_set_src_caps_str(
       h.get(), "application/x-event-camera, format=XYTP, width=320, height=240, framerate=30/1");
   EXPECT_EQ(h.error(), "");
@@ -144,9 +141,8 @@ TEST_P(EveryFormat, IsOfOneSize) {
 
 TEST_P(EveryFormat, HoldsALongPauseOrTellsThatItIsLeftOut) {
   // Longer than 32 bits of microseconds.
-  const std::vector events = {AbsoluteEvent::at(5, 5, 1000, Polarity::on),
-                              AbsoluteEvent::at(6, 6, 4'320'000'000, Polarity::off),
-                              AbsoluteEvent::at(7, 7, 4'320'000'001, Polarity::off)};
+  const std::vector events = {on_at(5, 5, 1000), off_at(6, 6, 4'320'000'000),
+                              off_at(7, 7, 4'320'000'001)};
   Writer h(format());
   for (const auto& event : events) h.write(event, event.t / 10'000 * 10'000);
   const auto read = events_in(format(), h.end());
@@ -164,7 +160,7 @@ TEST(EventDatEnc, TellsOfAllPausesThatAreLeftOut) {
   Writer h(format_of("dat"));
   for (const Microseconds hour : {0, 2, 7}) {
     const auto t = hour * 3'600'000'000 + 1000;
-    h.write(AbsoluteEvent::at(5, 5, t, Polarity::on), t);
+    h.write(on_at(5, 5, t), t);
   }
   h.end();
   EXPECT_TRUE(h.warning().starts_with("Removed a pause of 7200 s"));

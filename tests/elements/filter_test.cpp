@@ -6,13 +6,12 @@ namespace {
 
 using namespace harness;
 using eventcamera::Event;
-using eventcamera::Polarity;
 
 constexpr GstClockTime ms = GST_MSECOND;
 const std::string small_sensor = "application/x-event-camera, format=XYTP, width=8, height=4";
 
 Event on(std::uint32_t t, int x = 1) {
-  return Event::at(x, 1, t, Polarity::on);
+  return ::on(x, 1, t);
 }
 
 std::vector<std::uint32_t> times_of(const Buffer& buffer) {
@@ -178,8 +177,8 @@ TEST_F(FilterTest, RejectsEventsThatAreInvalid) {
   h.push(buffer_of(0, {on(0), on(1, 8), on(2, 2), on(1, 3), on(5001, 4)}, 5 * ms));
   EXPECT_EQ(times_of(h.pull()), (Times{0, 2}));
   EXPECT_EQ(stat_of(h.element(), "rejected-events"), 3U);
-  EXPECT_NE(h.warning().find("outside the sensor"), std::string::npos);
-  EXPECT_NE(h.warning().find("earlier than the previous one"), std::string::npos);
+  EXPECT_TRUE(contains(h.warning(), "outside the sensor"));
+  EXPECT_TRUE(contains(h.warning(), "earlier than the previous one"));
 }
 
 TEST_F(FilterTest, TakesNewSettingsWhilePlaying) {
@@ -271,14 +270,14 @@ TEST_F(HotPixelTest, ReportsFilesThatItCannotReadAndLeavesThemAsTheyAre) {
     h.caps(small_sensor);
     EXPECT_NE(h.push(buffer_of(0, {on(0)}, ms)), GST_FLOW_OK);
     gst_element_set_state(h.element(), GST_STATE_READY);
-    EXPECT_NE(h.error().find(file), std::string::npos);
+    EXPECT_TRUE(contains(h.error(), file));
     EXPECT_EQ(text(), "1 1\nfive 5\n");
   }
   std::filesystem::remove(file);
   Harness h(launch(" learn=false"));
   h.caps(small_sensor);
   EXPECT_NE(h.push(buffer_of(0, {on(0)}, ms)), GST_FLOW_OK);
-  EXPECT_NE(h.error().find(file), std::string::npos);
+  EXPECT_TRUE(contains(h.error(), file));
 }
 
 TEST_F(HotPixelTest, LeavesFilesAsTheyAreUnlessItFindsOthers) {
@@ -314,7 +313,7 @@ TEST_F(HotPixelTest, ReportsFilesThatItCannotWrite) {
   h.caps(small_sensor);
   EXPECT_EQ(count_passed(h, 0, hot), 100U);
   gst_element_set_state(h.element(), GST_STATE_READY);
-  EXPECT_NE(h.error().find("/nowhere/at/all.txt"), std::string::npos);
+  EXPECT_TRUE(contains(h.error(), "/nowhere/at/all.txt"));
 }
 
 }  // namespace

@@ -7,7 +7,6 @@ namespace {
 
 using namespace harness;
 using eventcamera::Event;
-using eventcamera::Polarity;
 
 constexpr GstClockTime ms = GST_MSECOND;
 
@@ -65,7 +64,7 @@ class Fusion : public TwoInputs {
 TEST(Fuse, PlacesAFrameWithoutTimeAfterTheLastOne) {
   Fusion fuse("25/1", "framerate=50/1");
   fuse.push_frame(0, 100);
-  fuse.push_events(0, {Event::at(0, 0, 90'000, Polarity::on)}, 100 * ms);
+  fuse.push_events(0, {on(0, 0, 90'000)}, 100 * ms);
   fuse.push_frame(GST_CLOCK_TIME_NONE, 200);
   fuse.end();
   EXPECT_EQ(fuse.pictures(),
@@ -99,11 +98,9 @@ TEST(Fuse, ShowsTheEventsUpToEachPicture) {
   for (const Case& test : cases) {
     Fusion fuse(test.framerate, test.output);
     fuse.push_frame(0, 100, test.duration);
-    fuse.push_events(
-        0, {Event::at(0, 0, 20'000, Polarity::on), Event::at(7, 3, 20'001, Polarity::off)},
-        50 * ms);
+    fuse.push_events(0, {on(0, 0, 20'000), off(7, 3, 20'001)}, 50 * ms);
     fuse.push_frame(40 * ms, 200, test.duration);
-    fuse.push_events(50 * ms, {Event::at(0, 0, 0, Polarity::on)}, 30 * ms);
+    fuse.push_events(50 * ms, {on(0, 0, 0)}, 30 * ms);
     fuse.end();
     EXPECT_EQ(fuse.pictures(), test.pictures) << test.framerate << ' ' << test.output;
   }
@@ -116,7 +113,7 @@ TEST(Fuse, ApproachesTheLastFrame) {
   for (const double rate : {1., 2.}) {
     fuse.start_over({.rate = rate});
     fuse.push_frame(0, 100, 100 * ms);
-    fuse.push_events(0, {Event::at(0, 0, 0, Polarity::on)}, 100 * ms);
+    fuse.push_events(0, {on(0, 0, 0)}, 100 * ms);
     fuse.push_frame(100 * ms, 100, 100 * ms);
     fuse.push_events(100 * ms, {}, 100 * ms);
     for (const int grey : {100, 113}) {  // (100 + o) exp(0.2 e^(-0.2 pi)) - o
@@ -130,9 +127,9 @@ TEST(Fuse, ApproachesTheLastFrame) {
 TEST(Fuse, GoesOnWhereSizesChange) {
   Fusion fuse("25/1", "framerate=50/1");
   fuse.push_frame(0, 100);
-  fuse.push_events(0, {Event::at(0, 0, 0, Polarity::on)}, 40 * ms);
+  fuse.push_events(0, {on(0, 0, 0)}, 40 * ms);
   fuse.begin("25/1", "framerate=50/1", 4, 8);
-  fuse.push_events(40 * ms, {Event::at(3, 7, 5'000, Polarity::on)}, 40 * ms);
+  fuse.push_events(40 * ms, {on(3, 7, 5'000)}, 40 * ms);
   fuse.push_frame(40 * ms, 50);
   fuse.end();
   EXPECT_EQ(fuse.pictures(),
@@ -145,10 +142,10 @@ TEST(Fuse, WarnsOfAnotherSensorSize) {
   gst_harness_set_src_caps_str(fuse.events.get(),
                                "application/x-event-camera, format=XYTP, width=9, height=4");
   fuse.push_frame(0, 100);
-  fuse.push_events(0, {Event::at(0, 0, 0, Polarity::on)}, 40 * ms);
+  fuse.push_events(0, {on(0, 0, 0)}, 40 * ms);
   fuse.end();
   EXPECT_EQ(fuse.pictures(), (std::vector<Picture>{{0, 100, 100}, {20, 100, 100}}));
-  EXPECT_NE(fuse.text_of_next(GST_MESSAGE_WARNING).find("Insert eventscale"), std::string::npos);
+  EXPECT_TRUE(contains(fuse.text_of_next(GST_MESSAGE_WARNING), "Insert eventscale"));
 }
 
 /// No picture of the pause.

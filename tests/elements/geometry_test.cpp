@@ -8,14 +8,9 @@ namespace {
 
 using namespace harness;
 using eventcamera::Event;
-using eventcamera::Polarity;
 
 constexpr GstClockTime ms = GST_MSECOND;
 const std::string sensor = "application/x-event-camera, format=XYTP, width=8, height=4";
-
-Event on(int x, int y, std::uint32_t t = 0) {
-  return Event::at(x, y, t, Polarity::on);
-}
 
 using Pixels = std::vector<std::pair<int, int>>;
 
@@ -52,10 +47,9 @@ TEST(Crop, ChangesTheSize) {
 
 TEST(Crop, AsksUpstreamForTheSizeThatDownstreamWants) {
   const auto caps = wanted("eventcrop left=100 bottom=7", "width=20, height=30");
-  EXPECT_NE(caps.find("width=(int)120, height=(int)37"), std::string::npos) << caps;
+  EXPECT_TRUE(contains(caps, "width=(int)120, height=(int)37"));
   const auto ranges = wanted("eventcrop left=100 bottom=7", "width=[10,20], height=[1,16384]");
-  EXPECT_NE(ranges.find("width=(int)[ 110, 120 ], height=(int)[ 8, 16384 ]"), std::string::npos)
-      << ranges;
+  EXPECT_TRUE(contains(ranges, "width=(int)[ 110, 120 ], height=(int)[ 8, 16384 ]"));
 }
 
 TEST(Crop, FollowsChanges) {
@@ -132,8 +126,7 @@ TEST(Scale, KeepsTheShapeWhereOneSideIsFree) {
 
 TEST(Scale, TakesEverySizeUpstream) {
   const auto caps = wanted("eventscale", "width=20, height=30");
-  EXPECT_NE(caps.find("width=(int)[ 1, 16384 ], height=(int)[ 1, 16384 ]"), std::string::npos)
-      << caps;
+  EXPECT_TRUE(contains(caps, "width=(int)[ 1, 16384 ], height=(int)[ 1, 16384 ]"));
 }
 
 /// A file of the name of the test.
@@ -175,8 +168,8 @@ TEST_F(FileTest, MasksPixels) {
 TEST_F(FileTest, MaskThatDoesNotFitIsAnError) {
   write_mask(4, 8, std::vector<png_byte>(32, 255));
   const auto error = error_of("eventmask" + location());
-  EXPECT_NE(error.find("4 x 8 pixels, but the sensor has 8 x 4"), std::string::npos) << error;
-  EXPECT_NE(error.find(file.path()), std::string::npos) << error;
+  EXPECT_TRUE(contains(error, "4 x 8 pixels, but the sensor has 8 x 4"));
+  EXPECT_TRUE(contains(error, file.path()));
 }
 
 /// Focal length 10, principal point (4, 2).
@@ -202,16 +195,15 @@ TEST_F(FileTest, CalibrationMayBeText) {
   g_object_set(h.element(), "settings", calibration("-2.").c_str(), nullptr);
   h.caps(sensor);
   EXPECT_EQ(passed(h, {on(4, 2), on(6, 2), on(0, 2)}), (Pixels{{4, 2}, {6, 2}}));
-  EXPECT_NE(error_of("eventundistort settings=\"camera: [\"").find("\"settings\": line"),
-            std::string::npos);
+  EXPECT_TRUE(contains(error_of("eventundistort settings=\"camera: [\""), "\"settings\": line"));
 }
 
 TEST_F(FileTest, CalibrationThatDoesNotFitIsAnError) {
   write(calibration("0.", "image_width: 346\nimage_height: 260\n"));
   const auto error = error_of("eventundistort" + location());
-  EXPECT_NE(error.find("346 x 260 pixels, but the sensor has 8 x 4"), std::string::npos) << error;
+  EXPECT_TRUE(contains(error, "346 x 260 pixels, but the sensor has 8 x 4"));
   write("camera: [");
-  EXPECT_NE(error_of("eventundistort" + location()).find("line"), std::string::npos);
+  EXPECT_TRUE(contains(error_of("eventundistort" + location()), "line"));
 }
 
 }  // namespace

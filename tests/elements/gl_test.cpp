@@ -399,7 +399,7 @@ TEST_P(Busy, IntervalsComeBeforeWhatFollowsThem) {
   const auto output = h.pull();
   expect_interval(4, output);
   EXPECT_TRUE(GST_BUFFER_FLAG_IS_SET(output.get(), GST_BUFFER_FLAG_DISCONT));
-  EXPECT_NE(h.out_caps().find("width=(int)16"), std::string::npos);
+  EXPECT_TRUE(contains(h.out_caps(), "width=(int)16"));
 }
 
 TEST_P(Busy, IntervalsAreDroppedByAFlush) {
@@ -445,8 +445,7 @@ TEST(OpenGl, IsAnErrorWhereItsContextIsLost) {
       is_lost = true;
       EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
       is_lost = false;
-      EXPECT_NE(h.error().find("Use " + element.substr(2) + ", which runs on the CPU."),
-                std::string::npos);
+      EXPECT_TRUE(contains(h.error(), "Use " + element.substr(2) + ", which runs on the CPU."));
       EXPECT_EQ(flashes.push(), GST_FLOW_OK);  // starts over, if the application goes on
     }
   }
@@ -508,7 +507,7 @@ TEST(OpenGl, IsAnErrorWhereItsThreadHasEnded) {
     push_eos(h.get());
   }
   is_busy = false;
-  EXPECT_NE(h.error().find("the OpenGL context was destroyed"), std::string::npos);
+  EXPECT_TRUE(contains(h.error(), "the OpenGL context was destroyed"));
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
 }
 
@@ -518,7 +517,7 @@ TEST_P(EitherOutput, IsNotMistakenForTheFrameWhereItHasEnded) {
     const EndOfThreads end;
     EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
   }
-  EXPECT_NE(h.error().find("the OpenGL context was destroyed"), std::string::npos);
+  EXPECT_TRUE(contains(h.error(), "the OpenGL context was destroyed"));
   EXPECT_EQ(flashes.push(), GST_FLOW_OK);
 }
 

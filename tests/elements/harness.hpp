@@ -36,6 +36,11 @@ inline int repetitions(int usual, int soak) {
 /// An element between a source and a sink simulated by the test.
 namespace harness {
 
+inline testing::AssertionResult contains(const std::string& text, const std::string& part) {
+  if (text.find(part) != text.npos) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << '"' << text << "\" does not contain " << part;
+}
+
 struct Unref {
   void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
   void operator()(GstEvent* event) const { gst_event_unref(event); }
@@ -392,8 +397,7 @@ inline Owned<GstPad> static_pad(GstElement* element, const char* name) {
 inline std::vector<std::string> video_formats(const char* factory, const char* pad) {
   gst_init(nullptr, nullptr);
   const Owned<GstElement> element(gst_element_factory_make(factory, nullptr));
-  const Owned<GstCaps> caps(
-      gst_pad_get_pad_template_caps(static_pad(element.get(), pad).get()));
+  const Owned<GstCaps> caps(gst_pad_get_pad_template_caps(static_pad(element.get(), pad).get()));
   const GValue* const list = gst_structure_get_value(
       gst_caps_get_structure(caps.get(), gst_caps_get_size(caps.get()) - 1), "format");
   std::vector<std::string> names;

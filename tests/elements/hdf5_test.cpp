@@ -119,8 +119,8 @@ struct Sink : Harness {
 
 class Hdf5Sink : public testing::Test {
  protected:
-  const AbsoluteEvent late = AbsoluteEvent::at(5, 5, 1'000'000, Polarity::on);
-  const AbsoluteEvent early = AbsoluteEvent::at(6, 6, 1003, Polarity::off);
+  const AbsoluteEvent late = on_at(5, 5, 1'000'000);
+  const AbsoluteEvent early = off_at(6, 6, 1003);
   const TemporaryFolder folder;
   const std::string path = folder / "out.h5";
 };
@@ -143,9 +143,7 @@ TEST_F(Hdf5Sink, WritesToAnotherFileAfterAStop) {
 
 TEST_F(Hdf5Sink, LeavesOutWhatItCannotWrite) {
   Sink sink(path);
-  const Events events = {AbsoluteEvent::at(5, 5, 1000, Polarity::on),
-                         AbsoluteEvent::at(width, 5, 1001, Polarity::on),
-                         AbsoluteEvent::at(5, height, 1002, Polarity::on), early};
+  const Events events = {on_at(5, 5, 1000), on_at(width, 5, 1001), on_at(5, height, 1002), early};
   EXPECT_EQ(sink.push(events, 0), GST_FLOW_OK);
   EXPECT_TRUE(sink.warning().starts_with("Dropped 2 events outside"));
   EXPECT_EQ(sink.push({events[0]}, 0), GST_FLOW_OK);  // time goes back
@@ -175,27 +173,25 @@ TEST_F(Hdf5Sink, KeepsTheSizeOfTheSensor) {
   const auto small = "application/x-event-camera, format=XYTP, width=64, height=48, framerate=0/1";
   push_caps(sink.get(), small);
   push_caps(sink.get(), events_caps);  // nothing is written yet
-  EXPECT_EQ(sink.push({AbsoluteEvent::at(200, 5, 0, Polarity::on)}, 0), GST_FLOW_OK);
+  EXPECT_EQ(sink.push({on_at(200, 5, 0)}, 0), GST_FLOW_OK);
   push_caps(sink.get(),
             "application/x-event-camera, format=XYTP, width=320, height=240, framerate=30/1");
   EXPECT_EQ(sink.error(), "");
   push_caps(sink.get(), small);
-  EXPECT_NE(sink.error().find("The sensor size changes"), std::string::npos);
+  EXPECT_TRUE(contains(sink.error(), "The sensor size changes"));
 }
 
 TEST_F(Hdf5Sink, SaysWhatCannotBeWritten) {
-  EXPECT_NE(Sink("/no/such/folder/out.h5")
-                .error()
-                .find("Cannot write /no/such/folder/out.h5. Set location to"),
-            std::string::npos);
+  EXPECT_TRUE(contains(Sink("/no/such/folder/out.h5").error(),
+                       "Cannot write /no/such/folder/out.h5. Set location to"));
   Sink large(path, "format=metavision");
   push_caps(large.get(),
             "application/x-event-camera, format=XYTP, width=4000, height=48, framerate=0/1");
-  EXPECT_NE(large.error().find("at most 2048 pixels"), std::string::npos);
+  EXPECT_TRUE(contains(large.error(), "at most 2048 pixels"));
 
   Sink partial(path);
   EXPECT_EQ(partial.Harness::push(filled(7, 0, 0, GST_MSECOND)), GST_FLOW_ERROR);
-  EXPECT_NE(partial.error().find("partial event"), std::string::npos);
+  EXPECT_TRUE(contains(partial.error(), "partial event"));
 
   const Owned<GstElement> nowhere(gst_element_factory_make("eventhdf5sink", nullptr));
   EXPECT_EQ(gst_element_set_state(nowhere.get(), GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
@@ -220,8 +216,7 @@ TEST(Hdf5Dec, HasAPathAndAUnit) {
   const auto path = folder / "events.h5";
   {
     Hdf5Writer writer(path, {Hdf5Format::dsec, Hdf5Writer::Compression::gzip, {width, height}});
-    writer.append(Events{AbsoluteEvent::at(5, 6, 0, Polarity::on),
-                         AbsoluteEvent::at(7, 8, 3007, Polarity::off)});
+    writer.append(Events{on_at(5, 6, 0), off_at(7, 8, 3007)});
     writer.close();
   }
   const auto reader = "filesrc location=" + in_quotes(path) + " ! eventhdf5dec ";
@@ -231,9 +226,7 @@ TEST(Hdf5Dec, HasAPathAndAUnit) {
   EXPECT_EQ(player.events[1].t, 3);
   Player other(reader + "events-path=right");
   EXPECT_FALSE(other.play());
-  EXPECT_NE(other.error.find("no events at events-path /right; it has some at /events"),
-            std::string::npos)
-      << other.error;
+  EXPECT_TRUE(contains(other.error, "no events at events-path /right; it has some at /events"));
 }
 
 TEST(Hdf5Dec, SaysWhatCannotBeRead) {
@@ -245,7 +238,7 @@ TEST(Hdf5Dec, SaysWhatCannotBeRead) {
     Player player("filesrc location=" + in_quotes(folder / "text.h5") + " ! " + way +
                   "eventhdf5dec");
     EXPECT_FALSE(player.play());
-    EXPECT_NE(player.error.find("not an HDF5 file"), std::string::npos) << player.error;
+    EXPECT_TRUE(contains(player.error, "not an HDF5 file"));
   }
 }
 

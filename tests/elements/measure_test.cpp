@@ -15,7 +15,6 @@ namespace {
 
 using namespace harness;
 using eventcamera::Event;
-using eventcamera::Polarity;
 
 constexpr GstClockTime ms = GST_MSECOND;
 const std::string small_sensor = "application/x-event-camera, format=XYTP, width=8, height=4";
@@ -57,7 +56,7 @@ class MeasureTest : public testing::Test {
 
 /// Events of 10 ms: one at this place.
 GstBuffer* one_event(GstClockTime pts, int x = 1, int y = 1) {
-  return buffer_of(pts, {Event::at(x, y, 5, Polarity::on)}, 10 * ms);
+  return buffer_of(pts, {on(x, y, 5)}, 10 * ms);
 }
 
 /// One event per millisecond for 100 ms, those of the first half caused by light.
@@ -65,7 +64,7 @@ GstBuffer* hundred_events(GstClockTime pts) {
   std::vector<Event> events;
   std::vector<GstEventCameraLabel> labels;
   for (std::uint32_t t = 0; t < 100'000; t += 1000) {
-    events.push_back(Event::at(1, 0, t, Polarity::on));
+    events.push_back(on(1, 0, t));
     labels.push_back(
         {.object_class = 0, .cause = t < 50'000 ? guint8{1} : guint8{3}, .reserved = 0});
   }
@@ -84,8 +83,7 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   Harness h("eventstats interval=" + std::to_string(50 * ms) +
             " location=" + in_quotes(path("f.json")) + " map=" + in_quotes(path("map.png")));
   h.caps(small_sensor);
-  const std::vector first = {Event::at(1, 0, 0, Polarity::on), Event::at(1, 0, 30, Polarity::off),
-                             Event::at(2, 3, 40, Polarity::on)};
+  const std::vector first = {on(1, 0, 0), off(1, 0, 30), on(2, 3, 40)};
   h.push(buffer_of(1000 * ms, first, 40 * ms));
   EXPECT_EQ(bytes_of(h.pull().get()).size(), 24U);
   EXPECT_FALSE(h.message(GST_MESSAGE_ELEMENT));
@@ -102,7 +100,7 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   EXPECT_NEAR(number_in(recent, "mean"), 3 / 32.0 / 0.06, 1e-9);
   EXPECT_EQ(count_in(recent, "interval-p50"), 30 * GST_USECOND);
 
-  h.push(buffer_of(1060 * ms, {Event::at(2, 3, 40, Polarity::on)}, 40 * ms));
+  h.push(buffer_of(1060 * ms, {on(2, 3, 40)}, 40 * ms));
   push_eos(h.get());
   message = h.message(GST_MESSAGE_ELEMENT);
   const auto* cumulative = structure_of(message);
@@ -112,8 +110,8 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   EXPECT_NEAR(number_in(cumulative, "rate"), 40, 1e-9);
   // Two pixels with 2 events each, and 30 with none, in a tenth of a second.
   EXPECT_NEAR(number_in(cumulative, "std-dev"), std::sqrt(8 / 32.0 - 1 / 64.0) * 10, 1e-9);
-  EXPECT_NE(text_in(path("f.json")).find("\"events\" : 4"), std::string::npos);
-  EXPECT_NE(text_in(path("f.json")).find("\"cumulative\" : true"), std::string::npos);
+  EXPECT_TRUE(contains(text_in(path("f.json")), "\"events\" : 4"));
+  EXPECT_TRUE(contains(text_in(path("f.json")), "\"cumulative\" : true"));
   EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
 }
 
@@ -139,9 +137,7 @@ const Stream streams[] = {
     {"events past the end of their buffer",
      [](Harness& h) {
        for (const GstClockTime start : {0, 10, 20})
-         h.push(buffer_of(
-             start * ms, {Event::at(1, 0, 5, Polarity::on), Event::at(2, 0, 900'000, Polarity::on)},
-             10 * ms));
+         h.push(buffer_of(start * ms, {on(1, 0, 5), on(2, 0, 900'000)}, 10 * ms));
      },
      {{3, 100, 0, 30 * ms}}},
     {"a flush",
@@ -263,7 +259,7 @@ TEST_F(StatsTest, SaysBeforehandThatAFolderIsMissing) {
           {"location=" + in_quotes(path("")), "is a folder"}}) {
       Pipeline pipeline(element + " " + setting + "  fakesink");
       EXPECT_FALSE(pipeline.play());
-      EXPECT_NE(pipeline.error.find(error), std::string::npos) << pipeline.error;
+      EXPECT_TRUE(contains(pipeline.error, error));
       EXPECT_NE(pipeline.error.find(setting.substr(setting.find('"') + 1, 20)), std::string::npos);
     }
 }
@@ -322,18 +318,12 @@ TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
   make("location=" + in_quotes(path("f.json")) + " map=" + in_quotes(path("map.png")));
   begin();
   // The candidate starts 10 ms later; earlier events of the reference do not count.
-  gst_harness_push(reference, buffer_of(0,
-                                        {Event::at(1, 1, 5'000, Polarity::on),
-                                         Event::at(1, 1, 15'000, Polarity::on),
-                                         Event::at(6, 1, 18'000, Polarity::off)},
-                                        20 * ms));
-  gst_harness_push(candidate, buffer_of(10 * ms,
-                                        {Event::at(2, 2, 1'000, Polarity::on),
-                                         Event::at(6, 1, 8'500, Polarity::on)},
-                                        10 * ms));
-  gst_harness_push(reference, buffer_of(20 * ms, {Event::at(5, 1, 1'000, Polarity::on)}, 20 * ms));
+  gst_harness_push(reference,
+                   buffer_of(0, {on(1, 1, 5'000), on(1, 1, 15'000), off(6, 1, 18'000)}, 20 * ms));
+  gst_harness_push(candidate, buffer_of(10 * ms, {on(2, 2, 1'000), on(6, 1, 8'500)}, 10 * ms));
+  gst_harness_push(reference, buffer_of(20 * ms, {on(5, 1, 1'000)}, 20 * ms));
   push_gap(candidate, 20 * ms, 20 * ms);
-  gst_harness_push(reference, buffer_of(40 * ms, {Event::at(5, 1, 1'000, Polarity::on)}, 20 * ms));
+  gst_harness_push(reference, buffer_of(40 * ms, {on(5, 1, 1'000)}, 20 * ms));
   const auto* figures = conclude();
   ASSERT_TRUE(figures);
   EXPECT_TRUE(gst_structure_has_name(figures, "eventcompare"));
@@ -357,7 +347,7 @@ TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
   EXPECT_TRUE(next_event(candidate, GST_EVENT_GAP));
   const auto json = text_in(path("f.json"));
   for (const char* field : {"map-correlation", "candidate-matches", "rate-curve", "std-dev"})
-    EXPECT_NE(json.find(field), std::string::npos) << field;
+    EXPECT_TRUE(contains(json, field)) << field;
   EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
 }
 
@@ -468,7 +458,7 @@ TEST_F(CompareTest, ReportsAndRefusesAChangeOfSize) {
   const Owned<GstMessage> error(
       gst_bus_timed_pop_filtered(compare->bus.get(), 5 * GST_SECOND, GST_MESSAGE_ERROR));
   ASSERT_TRUE(error);
-  EXPECT_NE(text_of(error.get()).find("9 x 4"), std::string::npos);
+  EXPECT_TRUE(contains(text_of(error.get()), "9 x 4"));
 }
 
 }  // namespace

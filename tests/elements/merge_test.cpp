@@ -13,19 +13,11 @@ using namespace harness;
 using eventcamera::AbsoluteEvent;
 using eventcamera::Event;
 using eventcamera::Microseconds;
-using eventcamera::Polarity;
 
 constexpr GstClockTime ms = GST_MSECOND;
 constexpr const char* small = "application/x-event-camera, format=XYTP, width=8, height=4";
 
 using Events = std::vector<AbsoluteEvent>;
-
-Event on(int x, int y, std::uint32_t t) {
-  return Event::at(x, y, t, Polarity::on);
-}
-AbsoluteEvent on_at(int x, int y, Microseconds t) {
-  return AbsoluteEvent::at(x, y, t, Polarity::on);
-}
 
 /// Output of a merger, checked as it arrives: sorted events within intervals that follow each
 /// other.
@@ -201,7 +193,7 @@ TEST_P(MergedSize, IsThatOfDownstreamOrRefused) {
   if (found == "20x30")
     EXPECT_EQ(next_size(), found);
   else
-    EXPECT_NE(inputs_.error().find(found), std::string::npos);
+    EXPECT_TRUE(contains(inputs_.error(), found));
 }
 
 TEST_F(MergeTest, GoesOnWithoutAStreamThatEndsBeforeItBegins) {

@@ -7,7 +7,6 @@ namespace {
 
 using namespace harness;
 using eventcamera::Event;
-using eventcamera::Polarity;
 
 constexpr GstClockTime ms = GST_MSECOND;
 
@@ -62,10 +61,7 @@ using Places = std::vector<std::pair<int, int>>;
 TEST_F(OverlayTest, CutsBuffersOfEventsWhereFramesEnd) {
   begin("width=8, height=4");
   push_frame(0);
-  push_events(0,
-              {Event::at(0, 0, 40'000, Polarity::on), Event::at(1, 0, 40'001, Polarity::on),
-               Event::at(2, 0, 80'001, Polarity::on)},
-              120 * ms);
+  push_events(0, {on(0, 0, 40'000), on(1, 0, 40'001), on(2, 0, 80'001)}, 120 * ms);
   EXPECT_EQ(drawn(), (Places{{0, 255}}));
   push_frame(40 * ms);
   EXPECT_EQ(drawn(), (Places{{1, 255}}));
@@ -76,10 +72,7 @@ TEST_F(OverlayTest, CutsBuffersOfEventsWhereFramesEnd) {
 TEST_F(OverlayTest, DrawsTheEventsSinceTheLastFrameWhereItsEndIsNotKnown) {
   begin("width=8, height=4", "GRAY8", "0/1");
   push_frame(0, GST_CLOCK_TIME_NONE);
-  push_events(0,
-              {Event::at(0, 0, 0, Polarity::on), Event::at(1, 0, 40'000, Polarity::on),
-               Event::at(2, 0, 40'001, Polarity::on), Event::at(3, 0, 90'000, Polarity::on)},
-              120 * ms);
+  push_events(0, {on(0, 0, 0), on(1, 0, 40'000), on(2, 0, 40'001), on(3, 0, 90'000)}, 120 * ms);
   EXPECT_EQ(drawn(), Places{});
   push_frame(40 * ms, GST_CLOCK_TIME_NONE);
   EXPECT_EQ(drawn(), (Places{{0, 255}, {1, 255}}));
@@ -96,9 +89,7 @@ TEST_F(OverlayTest, DrawsTheEventsOfEachFrameAtEveryRate) {
       push_frame(start);
       for (int half = 0; half < 2; ++half)
         push_events(start + static_cast<GstClockTime>(half) * 20 * ms,
-                    {Event::at(i, 2 * half, 5'000, Polarity::on),
-                     Event::at(i, 2 * half + 1, 15'000, Polarity::on)},
-                    20 * ms);
+                    {on(i, 2 * half, 5'000), on(i, 2 * half + 1, 15'000)}, 20 * ms);
       EXPECT_EQ(drawn(), (Places{{i, 255}, {8 + i, 255}, {16 + i, 255}, {24 + i, 255}})) << rate;
     }
   }
@@ -139,7 +130,7 @@ TEST_F(OverlayTest, DrawsInColourOverGreyVideo) {
   g_object_set(overlay.element.get(), "palette", 3, nullptr);  // red-blue
   begin("width=8, height=4", "GRAY8", "25/1", "{ RGB, GRAY8 }");
   push_frame(0);
-  push_events(0, {Event::at(1, 0, 5, Polarity::off)});
+  push_events(0, {off(1, 0, 5)});
   const Buffer frame(gst_harness_pull(video.get()));
   ASSERT_TRUE(frame);
   EXPECT_EQ(GST_BUFFER_PTS(frame.get()), 0U);
@@ -153,12 +144,12 @@ TEST_F(OverlayTest, DrawsInColourOverGreyVideo) {
 TEST_F(OverlayTest, ScalesTheSensorToTheVideo) {
   begin("width=4, height=4");
   push_frame(0);
-  push_events(0, {Event::at(1, 2, 5, Polarity::on)});
+  push_events(0, {on(1, 2, 5)});
   EXPECT_EQ(drawn(), (Places{{18, 255}, {19, 255}}));
   gst_harness_set_src_caps_str(events.get(),
                                "application/x-event-camera, format=XYTP, width=16, height=8");
   push_frame(40 * ms);
-  push_events(40 * ms, {Event::at(14, 7, 5, Polarity::on), Event::at(15, 6, 5, Polarity::off)});
+  push_events(40 * ms, {on(14, 7, 5), off(15, 6, 5)});
   EXPECT_EQ(drawn(), (Places{{31, 64}}));
 }
 
@@ -184,7 +175,7 @@ TEST_F(OverlayTest, PassesGapsInTheVideoOn) {
   push_events(40 * ms, {});
   EXPECT_EQ(drawn(), Places{});
   push_gap(video.get(), 80 * ms, 40 * ms);
-  push_events(80 * ms, {Event::at(1, 0, 5, Polarity::on)});
+  push_events(80 * ms, {on(1, 0, 5)});
   push_frame(120 * ms);
   push_events(120 * ms, {});
   EXPECT_EQ(drawn(), Places{});
@@ -203,10 +194,10 @@ class OverlayHalf : public OverlayTest {
 TEST_F(OverlayHalf, MixesAndRemembers) {
   begin("width=8, height=4");
   push_frame(0);
-  push_events(0, {Event::at(1, 0, 5, Polarity::off)});
+  push_events(0, {off(1, 0, 5)});
   EXPECT_EQ(drawn(), (Places{{1, 50}}));
   push_frame(40 * ms);
-  push_events(40 * ms, {Event::at(2, 0, 5, Polarity::off)});
+  push_events(40 * ms, {off(2, 0, 5)});
   EXPECT_EQ(drawn(), (Places{{1, 50}, {2, 50}}));
   push_frame(80 * ms);
   push_gap(events.get(), 80 * ms, 40 * ms);
@@ -216,13 +207,12 @@ TEST_F(OverlayHalf, MixesAndRemembers) {
 TEST_F(OverlayTest, DrawsAllEventsAfterAFlushOfTheseAlone) {
   begin("width=8, height=4");
   push_frame(0);
-  push_events(0, {Event::at(1, 0, 5, Polarity::on), Event::at(2, 0, 50'000, Polarity::on)},
-              100 * ms);
+  push_events(0, {on(1, 0, 5), on(2, 0, 50'000)}, 100 * ms);
   EXPECT_EQ(drawn(), (Places{{1, 255}}));
   flush({events.get()});
   push_segment(events.get());
   push_frame(40 * ms);
-  push_events(40 * ms, {Event::at(3, 0, 5, Polarity::on)});
+  push_events(40 * ms, {on(3, 0, 5)});
   EXPECT_EQ(drawn(), (Places{{3, 255}}));
 }
 

@@ -11,7 +11,6 @@ namespace {
 
 using namespace harness;
 using eventcamera::Event;
-using eventcamera::Polarity;
 
 constexpr int width = 32;
 constexpr int height = 24;
@@ -26,7 +25,7 @@ std::string grey_at(const std::string& framerate) {
 /// ON in a column, halfway through an interval of 40 ms.
 std::vector<Event> column(int x) {
   std::vector<Event> events;
-  for (int y = 0; y < height; ++y) events.push_back(Event::at(x, y, 20'000, Polarity::on));
+  for (int y = 0; y < height; ++y) events.push_back(on(x, y, 20'000));
   return events;
 }
 
@@ -103,8 +102,8 @@ TEST_F(Render, Makes30PicturesASecondWhereNobodyAsks) {
   begin("video/x-raw");
   push(0, column(1), GST_SECOND);
   EXPECT_EQ(finish().size(), 30U);
-  EXPECT_NE(h.out_caps().find("framerate=(fraction)30/1"), std::string::npos);
-  EXPECT_NE(h.out_caps().find("format=(string)BGRx"), std::string::npos);
+  EXPECT_TRUE(contains(h.out_caps(), "framerate=(fraction)30/1"));
+  EXPECT_TRUE(contains(h.out_caps(), "format=(string)BGRx"));
 }
 
 TEST_F(Render, MakesAPictureOfEachBufferWhereTheFramerateVaries) {
@@ -131,7 +130,7 @@ TEST_F(Render, SkipsThePicturesOfLongPauses) {
   EXPECT_EQ(GST_BUFFER_PTS(pictures[26].get()), day);
   EXPECT_TRUE(GST_BUFFER_IS_DISCONT(pictures[26].get()));
   EXPECT_TRUE(bytes_of(pictures.back().get()) == accumulated(column(2)));
-  EXPECT_NE(h.warning().find("pause for more than a minute"), std::string::npos);
+  EXPECT_TRUE(contains(h.warning(), "pause for more than a minute"));
   EXPECT_EQ(h.warning(), "");
 }
 
@@ -230,7 +229,7 @@ TEST_F(Render, DrainsWhenTheSensorChanges) {
   push(0, column(1));
   gst_harness_set_src_caps_str(
       h.get(), "application/x-event-camera, format=XYTP, width=16, height=8, framerate=25/1");
-  push(100 * ms, {Event::at(15, 7, 5, Polarity::on)}, 100 * ms);
+  push(100 * ms, {on(15, 7, 5)}, 100 * ms);
   const auto pictures = finish();
   ASSERT_EQ(pictures.size(), 2U);
   EXPECT_TRUE(bytes_of(pictures[0].get()) == accumulated(column(1)));
@@ -393,8 +392,7 @@ TEST(RenderPipeline, SaysWhatToDoIfDownstreamWantsAnotherSize) {
       "videotestsrc num-buffers=3 ! eventsim-diff ! eventrender ! "
       "video/x-raw,width=32 ! fakesink");
   EXPECT_FALSE(pipeline.play());
-  EXPECT_NE(pipeline.error.find("the sensor has 320x240 pixels"), std::string::npos)
-      << pipeline.error;
+  EXPECT_TRUE(contains(pipeline.error, "the sensor has 320x240 pixels"));
 }
 
 class Reconstruct : public Render {
@@ -404,10 +402,10 @@ class Reconstruct : public Render {
 
 TEST_F(Reconstruct, ShowsBrightnessInGrey) {
   begin("video/x-raw, framerate=25/1");
-  push(0, {Event::at(1, 1, 0, Polarity::on), Event::at(2, 1, 1, Polarity::off)});
+  push(0, {on(1, 1, 0), off(2, 1, 1)});
   const auto picture = wait_for_picture();
   ASSERT_TRUE(picture);
-  EXPECT_NE(h.out_caps().find("format=(string)GRAY8"), std::string::npos);
+  EXPECT_TRUE(contains(h.out_caps(), "format=(string)GRAY8"));
   const auto bytes = bytes_of(picture.get());
   const auto grey = [&bytes](int x) {
     return static_cast<unsigned char>(bytes[static_cast<std::size_t>(width + x)]);

@@ -134,14 +134,14 @@ TEST_P(EveryFormat, GivesBackEveryBufferAndGap) {
     EXPECT_EQ(output.intervals, intervals);
     EXPECT_EQ(output.discontinuities, 1);
     EXPECT_EQ(output.segments.size(), 1U);
-    EXPECT_NE(h.out_caps().find("width=(int)346, height=(int)260"), std::string::npos);
+    EXPECT_TRUE(contains(h.out_caps(), "width=(int)346, height=(int)260"));
   }
 }
 
 TEST_P(EveryFormat, GivesTheEventsOfAnIntervalThatTheEndCutsOff) {
   Interval interval{0, 20'000'000, {}};
   for (std::uint32_t t = 0; t < 2000; ++t)
-    interval.events.push_back(Event::at(static_cast<int>(t * 7 % 346), 9, 10 * t, Polarity::on));
+    interval.events.push_back(on(static_cast<int>(t * 7 % 346), 9, 10 * t));
   auto packets = packets_of({interval}, "format=" + std::string(GetParam()));
   const auto cut_off = Fields(packets.back().get()).header.value().event_count;
   packets.pop_back();
@@ -233,7 +233,7 @@ TEST(RtpEventPay, JoinsBuffersWithTriggersAndImuSamplesBetweenThem) {
   const std::array names = {"GstEventCameraTriggers", "GstEventCameraImu"};
   for (int i = 0; i < 10; ++i) {
     for (const auto* name : names) push_custom(h.get(), name);
-    push(h, {i * 1'000'000, 1'000'000, {Event::at(i, 2, 500, Polarity::on)}});
+    push(h, {i * 1'000'000, 1'000'000, {on(i, 2, 500)}});
   }
   EXPECT_FALSE(h.pull());
   for (int i = 0; i < 10; ++i) {
@@ -253,9 +253,9 @@ TEST(RtpEventPay, JoinsBuffersWithTriggersAndImuSamplesBetweenThem) {
 TEST(RtpEventPay, SendsWaitingEventsAtTheEndAndBeforeAGap) {
   Harness h("rtpeventpay max-latency=1000000000");
   h.caps(davis_caps, "application/x-rtp");
-  push(h, {0, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});
+  push(h, {0, 1'000'000, {on(1, 2, 3)}});
   EXPECT_FALSE(h.pull());
-  push(h, {5'000'000, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});  // not the next interval
+  push(h, {5'000'000, 1'000'000, {on(1, 2, 3)}});  // not the next interval
   EXPECT_TRUE(h.pull());
   push_eos(h.get());
   EXPECT_TRUE(h.pull());
@@ -264,7 +264,7 @@ TEST(RtpEventPay, SendsWaitingEventsAtTheEndAndBeforeAGap) {
 TEST(RtpEventPay, TellsOfSilenceOfUnknownDuration) {
   Harness h("rtpeventpay max-latency=1000000000");
   h.caps(davis_caps, "application/x-rtp");
-  push(h, {0, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});
+  push(h, {0, 1'000'000, {on(1, 2, 3)}});
   for (const GstClockTime start : {ms, 5 * ms}) {
     push_gap(h.get(), start, GST_CLOCK_TIME_NONE);
     const auto packet = h.pull();
@@ -278,24 +278,20 @@ TEST(RtpEventPay, TellsOfSilenceOfUnknownDuration) {
 TEST(RtpEventPay, CountsTheEventsOfBuffersThatItCannotSend) {
   Harness h("rtpeventpay max-latency=1000000000");
   h.caps(davis_caps, "application/x-rtp");
-  const std::vector events(3, Event::at(1, 2, 3, Polarity::on));
+  const std::vector events(3, on(1, 2, 3));
   guint64 rejected = 0;
   const auto skips = [&](GstBuffer* buffer, const char* reason) {
     EXPECT_EQ(h.push(buffer), GST_FLOW_OK);
     const auto warning = h.warning();
-    EXPECT_NE(warning.find(reason), std::string::npos) << warning;
+    EXPECT_TRUE(contains(warning, reason));
     EXPECT_EQ(stat_of(h.element(), "rejected-events"), rejected += 3) << reason;
   };
   skips(buffer_of(GST_CLOCK_TIME_NONE, events, ms), "has no PTS");
   skips(buffer_of(static_cast<GstClockTime>(max_rtp_start) + 1, events, ms), "292 years");
   skips(gst_buffer_append(buffer_of(0, events, ms), gst_buffer_new_memdup("12345", 5)),
         "not a multiple of 8 bytes");
-  EXPECT_EQ(
-      h.push(buffer_of(
-          0, {Event::at(346, 2, 3, Polarity::on), events[0], Event::at(1, 2, 2, Polarity::on)},
-          ms)),
-      GST_FLOW_OK);
-  EXPECT_NE(h.warning().find("outside the sensor"), std::string::npos);
+  EXPECT_EQ(h.push(buffer_of(0, {on(346, 2, 3), events[0], on(1, 2, 2)}, ms)), GST_FLOW_OK);
+  EXPECT_TRUE(contains(h.warning(), "outside the sensor"));
   EXPECT_EQ(stat_of(h.element(), "rejected-events"), rejected += 2);
   flush({h.get()});  // drops the valid one
   EXPECT_EQ(stat_of(h.element(), "rejected-events"), rejected + 1);
@@ -308,12 +304,12 @@ TEST(RtpEventPay, CountsTheEventsOfBuffersThatItCannotSend) {
 TEST(RtpEventPay, RefusesWhatItCannotSend) {
   Harness small("rtpeventpay mtu=40");
   small.caps(davis_caps, "application/x-rtp");
-  EXPECT_EQ(small.push(buffer_of(0, {Event::at(1, 2, 3, Polarity::on)}, 10 * ms)), GST_FLOW_ERROR);
-  EXPECT_NE(small.error().find("set mtu to at least 56"), std::string::npos);
+  EXPECT_EQ(small.push(buffer_of(0, {on(1, 2, 3)}, 10 * ms)), GST_FLOW_ERROR);
+  EXPECT_TRUE(contains(small.error(), "set mtu to at least 56"));
 
   Harness xytp("rtpeventpay format=XYTP");  // EVT3 cannot hold it
   xytp.caps("application/x-event-camera, format=XYTP, width=2049, height=1", "application/x-rtp");
-  push(xytp, {0, 10'000'000, {Event::at(2048, 0, 3, Polarity::on)}});
+  push(xytp, {0, 10'000'000, {on(2048, 0, 3)}});
   EXPECT_TRUE(xytp.pull());
 }
 
@@ -322,18 +318,17 @@ TEST(RtpEventPay, KeepsTheFormatOfItsStream) {
   h.caps(davis_caps, "application/x-rtp");
   g_object_set(h.element(), "format", 1, nullptr);
   gst_harness_set_src_caps_str(h.get(), (davis_caps + ", framerate=30/1").c_str());
-  push(h, {0, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});
+  push(h, {0, 1'000'000, {on(1, 2, 3)}});
   const auto packet = h.pull();
   ASSERT_TRUE(packet);
   EXPECT_EQ(Fields(packet.get()).header->format, RtpEventFormat::evt3);
-  EXPECT_NE(h.out_caps().find("format=(string)EVT3"), std::string::npos);
+  EXPECT_TRUE(contains(h.out_caps(), "format=(string)EVT3"));
 }
 
 TEST(RtpEventDepay, MapsTheSendersTimesToTheTimeOfArrival) {
   std::vector<Interval> intervals;
   for (int i = 0; i < 30; ++i)
-    intervals.push_back(
-        {7'000'000'000 + i * 10'000'000, 10'000'000, {Event::at(i, 2, 500, Polarity::on)}});
+    intervals.push_back({7'000'000'000 + i * 10'000'000, 10'000'000, {on(i, 2, 500)}});
   const auto packets = packets_of(intervals);
   Depayloader h;
   for (int i = 0; i < 30; ++i) {
@@ -356,10 +351,9 @@ TEST(RtpEventDepay, MapsTheSendersTimesToTheTimeOfArrival) {
 }
 
 TEST(RtpEventDepay, StartsOverWithItsSender) {
-  const std::vector<Interval> intervals = {
-      {5'000'000'000, 10'000'000, {Event::at(1, 2, 500, Polarity::on)}},
-      {5'010'000'000, 10'000'000, {Event::at(2, 2, 500, Polarity::on)}}};
-  const std::vector<Interval> again = {{0, 10'000'000, {Event::at(3, 2, 500, Polarity::on)}}};
+  const std::vector<Interval> intervals = {{5'000'000'000, 10'000'000, {on(1, 2, 500)}},
+                                           {5'010'000'000, 10'000'000, {on(2, 2, 500)}}};
+  const std::vector<Interval> again = {{0, 10'000'000, {on(3, 2, 500)}}};
   Depayloader h;
   for (const auto& packet : packets_of(intervals)) h.take(packet.get(), 10 * ms);
   for (const auto& packet : packets_of(again)) h.take(packet.get(), 500 * ms);
@@ -374,8 +368,7 @@ TEST(RtpEventDepay, StartsOverWithItsSender) {
 
 TEST(RtpEventDepay, WarnsOnceOfASecondSender) {
   std::vector<Interval> intervals;
-  for (int i = 0; i < 20; ++i)
-    intervals.push_back({i * 10'000'000, 10'000'000, {Event::at(i, 2, 500, Polarity::on)}});
+  for (int i = 0; i < 20; ++i) intervals.push_back({i * 10'000'000, 10'000'000, {on(i, 2, 500)}});
   const auto first = packets_of(intervals, "ssrc=1 seqnum-offset=100");
   const auto second = packets_of(intervals, "ssrc=2 seqnum-offset=95");
   Depayloader h;
@@ -386,23 +379,23 @@ TEST(RtpEventDepay, WarnsOnceOfASecondSender) {
   EXPECT_EQ(stat_of(h.element(), "packets"), 21U);  // the second could have been a restart
   EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 19U);
   EXPECT_EQ(stat_of(h.element(), "late-packets"), 0U);
-  EXPECT_NE(h.warning().find("second sender"), std::string::npos);
+  EXPECT_TRUE(contains(h.warning(), "second sender"));
   EXPECT_EQ(h.warning(), "");
 }
 
 TEST(RtpEventDepay, CountsOnWithAnotherSensor) {
   Harness pay("rtpeventpay max-latency=0");
   pay.caps(davis_caps, "application/x-rtp");
-  const Interval first{0, 10'000'000, {Event::at(1, 2, 3, Polarity::on)}};
+  const Interval first{0, 10'000'000, {on(1, 2, 3)}};
   push(pay, first);
   Depayloader h;
   h.take(pay.pull().get());
   gst_harness_set_src_caps_str(pay.get(),
                                "application/x-event-camera, format=XYTP, width=640, height=480");
   h.caps(rtp_caps + ", width=640, height=480");
-  push(pay, {10'000'000, 10'000'000, {Event::at(639, 2, 3, Polarity::on)}});
+  push(pay, {10'000'000, 10'000'000, {on(639, 2, 3)}});
   EXPECT_TRUE(pay.pull());  // lost
-  const Interval last{20'000'000, 10'000'000, {Event::at(638, 2, 3, Polarity::on)}};
+  const Interval last{20'000'000, 10'000'000, {on(638, 2, 3)}};
   push(pay, last);
   h.take(pay.pull().get());
   EXPECT_EQ(Output(h).intervals, (std::vector{first, last}));
@@ -417,7 +410,7 @@ TEST(RtpEventDepay, NeedsTheSizeOfTheSensor) {
         ", width=16385, height=1", ", width=346, height=260, format=EVT9"}) {
     Harness h("rtpeventdepay");
     h.caps(rtp_caps + caps);
-    EXPECT_NE(h.error().find("set width, height and format"), std::string::npos) << caps;
+    EXPECT_TRUE(contains(h.error(), "set width, height and format")) << caps;
   }
 }
 

@@ -86,8 +86,7 @@ class EveryFlowSimulator : public testing::TestWithParam<Simulator> {
   }
 
   /// Bytes of the events, where each frame has the flow that `flow_from` gives.
-  static std::string events_with(
-      const std::function<std::optional<Image<Flow>>(int)>& flow_from) {
+  static std::string events_with(const std::function<std::optional<Image<Flow>>(int)>& flow_from) {
     Harness h = without_upload(GetParam().launch);  // glupload drops flow
     h.caps(video);
     for (int i = 0; i < frame_count; ++i) EXPECT_EQ(h.push(frame_of(i, flow_from(i))), GST_FLOW_OK);
@@ -189,7 +188,7 @@ TEST(FlowOfFrames, MustHaveTheirSize) {
   Harness h("eventsim-dense");
   h.caps("video/x-raw, format=GRAY8, width=64, height=96, framerate=25/1");
   EXPECT_EQ(h.push(frame_of(0, Image<Flow>(width, height))), GST_FLOW_ERROR);
-  EXPECT_NE(h.error().find("Add the flow after the video is scaled or cropped"), std::string::npos);
+  EXPECT_TRUE(contains(h.error(), "Add the flow after the video is scaled or cropped"));
 }
 
 TEST(FlowOfFrames, IsNotWrittenWhereNoneIsNeeded) {

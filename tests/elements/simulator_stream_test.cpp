@@ -62,7 +62,7 @@ TEST_P(EverySimulator, BeginsAnewWhenTheSizeChanges) {
   // A pixel with a reference level fires at each threshold it passes.
   const std::size_t each = is_physical(GetParam()) ? 8 : 1;
   EXPECT_EQ(events.size(), each * 33U * 29U);
-  EXPECT_NE(h.out_caps().find("width=(int)33"), std::string::npos);
+  EXPECT_TRUE(contains(h.out_caps(), "width=(int)33"));
 }
 
 TEST_P(EverySimulator, LosesNoIntervalWhenOnlyTheFormatOrTheFramerateChanges) {
@@ -143,7 +143,7 @@ TEST(Stream, RefusesFramesSmallerThanTheirCaps) {
     gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, meta.format, meta.width, 44,
                                    meta.planes, offsets, strides);
     EXPECT_EQ(h.push(buffer), GST_FLOW_ERROR);
-    EXPECT_NE(h.error().find(meta.error), std::string::npos);
+    EXPECT_TRUE(contains(h.error(), meta.error));
   }
 }
 
@@ -210,7 +210,7 @@ TEST(Stream, WarnsOnceOfInterlacedVideo) {
   h.caps(video(61, 43, "I420") + ", interlace-mode=interleaved");
   h.push(h.flat(0, 50));
   h.push(h.flat(40 * GST_MSECOND, 50));
-  EXPECT_NE(h.warning().find("deinterlace"), std::string::npos);
+  EXPECT_TRUE(contains(h.warning(), "deinterlace"));
   EXPECT_EQ(h.warning(), "");
 }
 
@@ -226,7 +226,7 @@ TEST(Stream, WarnsOnceOfRotatedVideo) {
   EXPECT_EQ(h.warning(), "");
   push_orientation(h, "rotate-90");
   push_orientation(h, "rotate-180");
-  EXPECT_NE(h.warning().find("videoflip video-direction=auto"), std::string::npos);
+  EXPECT_TRUE(contains(h.warning(), "videoflip video-direction=auto"));
   EXPECT_EQ(h.warning(), "");
 }
 

@@ -16,7 +16,6 @@ using namespace harness;
 using eventcamera::AbsoluteEvent;
 using eventcamera::Event;
 using eventcamera::EventTensor;
-using eventcamera::Polarity;
 using eventcamera::TensorSettings;
 
 constexpr int width = 32;
@@ -27,7 +26,7 @@ const std::string events_caps =
 
 /// Two events in a column, a third and two thirds through an interval of 10 ms.
 std::vector<Event> column(int x) {
-  return {Event::at(x, 1, 3'333, Polarity::on), Event::at(x, 2, 6'666, Polarity::off)};
+  return {on(x, 1, 3'333), off(x, 2, 6'666)};
 }
 
 /// The bytes of the tensor of events at times from 0 on.
@@ -85,7 +84,7 @@ TEST_F(Tensor, IsOneOfEachBufferByDefault) {
   for (const char* field :
        {"other/tensors", "format=(string)static", "num_tensors=(int)1",
         "dimensions=(string)32:24:5:1", "types=(string)float32", "framerate=(fraction)100/1"})
-    EXPECT_NE(caps.find(field), std::string::npos) << caps;
+    EXPECT_TRUE(contains(caps, field));
 }
 
 TEST_F(Tensor, HasTheSettings) {
@@ -96,10 +95,9 @@ TEST_F(Tensor, HasTheSettings) {
                                 .type = eventcamera::ElementType::uint8};
   expect_tensor(0, 25 * ms, 0, 5, settings);
   expect_tensor(25 * ms, 25 * ms, 5, 10, settings);
-  EXPECT_NE(h->out_caps().find(
-                "dimensions=(string)32:24:2:1, types=(string)uint8, framerate=(fraction)40/1"),
-            std::string::npos)
-      << h->out_caps();
+  EXPECT_TRUE(
+      contains(h->out_caps(),
+               "dimensions=(string)32:24:2:1, types=(string)uint8, framerate=(fraction)40/1"));
 }
 
 TEST_F(Tensor, EndsWithTheSegment) {
@@ -130,7 +128,7 @@ TEST_F(Tensor, IsNotMadeOfLongPauses) {
   expect_tensor(0, 10 * ms, 0, 2);
   expect_tensor(10 * ms, 10 * ms, 2, 2);
   expect_tensor(day, 10 * ms, 2, 4);
-  EXPECT_NE(h->warning().find("The events pause"), std::string::npos);
+  EXPECT_TRUE(contains(h->warning(), "The events pause"));
   EXPECT_EQ(h->warning(), "");
 }
 
@@ -170,7 +168,7 @@ TEST_F(Tensor, FollowsNewCaps) {
       h->get(), "application/x-event-camera, format=XYTP, width=64, height=48, framerate=100/1");
   const TensorSettings settings{.representation = eventcamera::Representation::event_frame};
   expect_tensor(0, 10 * ms, 0, 2, settings);
-  EXPECT_NE(h->out_caps().find("dimensions=(string)64:48:1:1"), std::string::npos);
+  EXPECT_TRUE(contains(h->out_caps(), "dimensions=(string)64:48:1:1"));
 }
 
 TEST_F(Tensor, TellsWhatToSetForTheTensorsThatDownstreamWants) {
@@ -183,7 +181,7 @@ TEST_F(Tensor, TellsWhatToSetForTheTensorsThatDownstreamWants) {
     gst_harness_set_sink_caps_str(h->get(), (std::string("other/tensors, ") + caps).c_str());
     gst_harness_set_src_caps_str(h->get(), events_caps.c_str());
     EXPECT_EQ(h->push(buffer_of(0, column(0), 10 * ms)), GST_FLOW_NOT_NEGOTIATED);
-    EXPECT_NE(h->error().find(wish), std::string::npos) << wish;
+    EXPECT_TRUE(contains(h->error(), wish)) << wish;
     h->push(buffer_of(10 * ms, column(0), 10 * ms));
     EXPECT_EQ(h->error(), "") << "told again";
   }
