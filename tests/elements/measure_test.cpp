@@ -65,8 +65,7 @@ GstBuffer* hundred_events(GstClockTime pts) {
   std::vector<GstEventCameraLabel> labels;
   for (std::uint32_t t = 0; t < 100'000; t += 1000) {
     events.push_back(on(1, 0, t));
-    labels.push_back(
-        {.object_class = 0, .cause = t < 50'000 ? guint8{1} : guint8{3}, .reserved = 0});
+    labels.push_back({0, t < 50'000 ? guint8{1} : guint8{3}, 0});
   }
   GstBuffer* const buffer = buffer_of(pts, events, 100 * ms);
   gst_buffer_add_event_camera_label_meta(buffer, labels.data(), labels.size());
@@ -83,8 +82,7 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   Harness h("eventstats interval=" + std::to_string(50 * ms) +
             " location=" + in_quotes(path("f.json")) + " map=" + in_quotes(path("map.png")));
   h.caps(small_sensor);
-  const std::vector first = {on(1, 0, 0), off(1, 0, 30), on(2, 3, 40)};
-  h.push(buffer_of(1000 * ms, first, 40 * ms));
+  h.push(buffer_of(1000 * ms, {on(1, 0, 0), off(1, 0, 30), on(2, 3, 40)}, 40 * ms));
   EXPECT_EQ(bytes_of(h.pull().get()).size(), 24U);
   EXPECT_FALSE(h.message(GST_MESSAGE_ELEMENT));
   push_gap(h.get(), 1040 * ms, 20 * ms);
@@ -272,12 +270,7 @@ class CompareTest : public MeasureTest {
     compare.emplace("eventcompare " + properties, "candidate", "reference");
     candidate = compare->first.get();
     reference = compare->second.get();
-  }
-
-  void begin(const std::string& of_reference = small_sensor,
-             const std::string& of_candidate = small_sensor) {
-    gst_harness_set_src_caps_str(reference, of_reference.c_str());
-    gst_harness_set_src_caps_str(candidate, of_candidate.c_str());
+    for (auto* h : {reference, candidate}) gst_harness_set_src_caps_str(h, small_sensor.c_str());
   }
 
   void push_both(std::initializer_list<GstClockTime> starts) {
@@ -316,7 +309,6 @@ class CompareTest : public MeasureTest {
 
 TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
   make("location=" + in_quotes(path("f.json")) + " map=" + in_quotes(path("map.png")));
-  begin();
   // The candidate starts 10 ms later; earlier events of the reference do not count.
   gst_harness_push(reference,
                    buffer_of(0, {on(1, 1, 5'000), on(1, 1, 15'000), off(6, 1, 18'000)}, 20 * ms));
@@ -334,7 +326,6 @@ TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
   const auto* of_reference = within(figures, "reference-matches");
   EXPECT_NEAR(number_in(of_reference, "within-1ms"), 0, 1e-9);
   EXPECT_NEAR(number_in(of_reference, "within-5ms"), 2 / 3.0, 1e-9);
-  EXPECT_NEAR(number_in(of_reference, "within-10ms"), 2 / 3.0, 1e-9);
   EXPECT_NEAR(number_in(within(figures, "candidate-matches"), "within-5ms"), 1, 1e-9);
   const GValue* curve = gst_structure_get_value(within(figures, "rate-curve"), "reference");
   ASSERT_TRUE(curve);
@@ -353,7 +344,6 @@ TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
 
 TEST_F(CompareTest, PassesTheCandidateOnWhereTheReferenceHasEnded) {
   make();
-  begin();
   gst_harness_push(reference, one_event(0));
   push_eos(reference);
   for (const GstClockTime t : {0 * ms, 10 * ms, 20 * ms}) gst_harness_push(candidate, one_event(t));
@@ -363,7 +353,6 @@ TEST_F(CompareTest, PassesTheCandidateOnWhereTheReferenceHasEnded) {
 
 TEST_F(CompareTest, ComparesEachSegment) {
   make();
-  begin();
   for (const GstClockTime base : {0 * ms, 10 * ms}) {
     for (auto* h : {reference, candidate}) {
       push_segment(h, {.base = base});
@@ -377,7 +366,6 @@ TEST_F(CompareTest, ComparesEachSegment) {
 
 TEST_F(CompareTest, StartsOverOnceTimeGoesBackInBothStreams) {
   make();
-  begin();
   push_both({0 * ms, 10 * ms});
   gst_harness_push(reference, one_event(20 * ms));
   gst_harness_push(candidate, one_event(0));
@@ -389,7 +377,6 @@ TEST_F(CompareTest, StartsOverOnceTimeGoesBackInBothStreams) {
 
 TEST_F(CompareTest, StartsOverAfterAFlush) {
   make();
-  begin();
   push_both({0});
   compare->start_over();
   push_both({10 * ms});
@@ -398,7 +385,6 @@ TEST_F(CompareTest, StartsOverAfterAFlush) {
 
 TEST_F(CompareTest, ComparesOnlyWhatIsInTheSegments) {
   make();
-  begin();
   for (auto* h : {reference, candidate}) {
     push_segment(h, from_50_to_80);
     gst_harness_push(h, hundred_events(0));
@@ -410,7 +396,6 @@ TEST_F(CompareTest, ComparesOnlyWhatIsInTheSegments) {
 
 TEST_F(CompareTest, ClassifiesTheEventsThatAreLeft) {
   make();
-  begin();
   const auto push_caused = [](GstHarness* h, guint lights, guint leaks) {
     std::vector<GstEventCameraLabel> labels(lights, {0, GST_EVENT_CAMERA_CAUSE_LIGHT, 0});
     labels.resize(lights + leaks, {0, GST_EVENT_CAMERA_CAUSE_LEAK, 0});
@@ -436,7 +421,6 @@ TEST_F(CompareTest, ClassifiesTheEventsThatAreLeft) {
 TEST_F(CompareTest, WritesAtAStopWhatHasComeSinceTheEnd) {
   for (const bool has_ended : {false, true}) {
     make("location=" + in_quotes(path("f.json")));
-    begin();
     push_both({0, 10 * ms});
     EXPECT_TRUE(Buffer(gst_harness_pull(candidate)));  // both have been compared
     if (has_ended) {
@@ -451,14 +435,10 @@ TEST_F(CompareTest, WritesAtAStopWhatHasComeSinceTheEnd) {
 /// At once, because a source whose size changes may wait for one of the streams itself.
 TEST_F(CompareTest, ReportsAndRefusesAChangeOfSize) {
   make();
-  begin();
   push_both({0});
   gst_harness_set_src_caps_str(reference,
                                "application/x-event-camera, format=XYTP, width=9, height=4");
-  const Owned<GstMessage> error(
-      gst_bus_timed_pop_filtered(compare->bus.get(), 5 * GST_SECOND, GST_MESSAGE_ERROR));
-  ASSERT_TRUE(error);
-  EXPECT_TRUE(contains(text_of(error.get()), "9 x 4"));
+  EXPECT_TRUE(contains(compare->error(), "9 x 4"));
 }
 
 }  // namespace

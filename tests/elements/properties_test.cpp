@@ -88,9 +88,6 @@ TEST(Dvs, DoesNotStartWithAProfileThatItCannotRead) {
     EXPECT_FALSE(pipeline.play());
     return pipeline.error;
   };
-  const auto expect_words = [](const std::string& error, const std::string& words) {
-    EXPECT_TRUE(contains(error, words)) << '"' << error << "\" does not say " << words;
-  };
   EXPECT_TRUE(contains(error_of("/nowhere/a.profile"), "\"/nowhere/a.profile\": No such file"));
   EXPECT_TRUE(contains(error_of("/"), "event-calibrate --profile"));
   struct Case {
