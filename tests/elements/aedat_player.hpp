@@ -66,24 +66,18 @@ class AedatPlayer : public Pipeline {
         if (const harness::Owned<GstEvent> event{gst_pad_get_sticky_event(pad, type, 0)})
           see(track, event.get());
     }
-    gst_pad_add_probe(pad,
-                      static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER |
-                                                   GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
-                      seen, self, nullptr);
+    const std::string name = GST_PAD_NAME(pad);
+    harness::watch(pad, {[self, name](GstBuffer* buffer) {
+                           const std::lock_guard lock(self->mutex_);
+                           see(self->tracks_[name], buffer, name.starts_with("events"));
+                         },
+                         [self, name](GstEvent* event) {
+                           const std::lock_guard lock(self->mutex_);
+                           see(self->tracks_[name], event);
+                         }});
     gst_pad_link(pad, harness::static_pad(queue, "sink").get());
     gst_element_sync_state_with_parent(sink);
     gst_element_sync_state_with_parent(queue);
-  }
-
-  static GstPadProbeReturn seen(GstPad* pad, GstPadProbeInfo* info, gpointer data) {
-    auto* const self = static_cast<AedatPlayer*>(data);
-    const std::lock_guard lock(self->mutex_);
-    auto& track = self->tracks_[GST_PAD_NAME(pad)];
-    if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0)
-      see(track, GST_PAD_PROBE_INFO_BUFFER(info), g_str_has_prefix(GST_PAD_NAME(pad), "events"));
-    else
-      see(track, GST_PAD_PROBE_INFO_EVENT(info));
-    return GST_PAD_PROBE_OK;
   }
 
   static void see(Track& track, GstBuffer* buffer, bool of_events) {

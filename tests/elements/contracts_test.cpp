@@ -27,21 +27,8 @@ class Output {
   };
 
   explicit Output(GstPad* pad) {
-    gst_pad_add_probe(
-        pad,
-        static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM |
-                                     GST_PAD_PROBE_TYPE_EVENT_FLUSH),
-        +[](GstPad*, GstPadProbeInfo* info, gpointer self) {
-          auto& output = *static_cast<Output*>(self);
-          if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0)
-            output.add(GST_PAD_PROBE_INFO_BUFFER(info));
-          else if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER_LIST) != 0)
-            output.add(gst_buffer_list_get(GST_PAD_PROBE_INFO_BUFFER_LIST(info), 0));
-          else
-            output.add(GST_PAD_PROBE_INFO_EVENT(info));
-          return GST_PAD_PROBE_OK;
-        },
-        this, nullptr);
+    watch(pad,
+          {[this](GstBuffer* buffer) { add(buffer); }, [this](GstEvent* event) { add(event); }});
   }
 
   /// Items of this name.

@@ -22,15 +22,8 @@ const std::string sensor = "application/x-event-camera, format=XYTP, width=8, he
 class Cut {
  public:
   explicit Cut(const std::string& settings = "") : h("eventcut " + settings) {
-    gst_pad_add_probe(
-        h->sinkpad,
-        static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER |
-                                     GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
-        +[](GstPad*, GstPadProbeInfo* info, gpointer self) {
-          static_cast<Cut*>(self)->take(info);
-          return GST_PAD_PROBE_OK;
-        },
-        this, nullptr);
+    watch(h->sinkpad,
+          {[this](GstBuffer* buffer) { take(buffer); }, [this](GstEvent* event) { take(event); }});
     h.caps(sensor + ", framerate=100/1");
   }
 
@@ -60,18 +53,16 @@ class Cut {
   Harness h;
 
  private:
-  void take(GstPadProbeInfo* info) {
-    const auto us = [](GstClockTime time) { return std::to_string(time / GST_USECOND); };
-    if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0) {
-      GstBuffer* const buffer = GST_PAD_PROBE_INFO_BUFFER(info);
-      auto text = us(GST_BUFFER_PTS(buffer)) + "+" + us(GST_BUFFER_DURATION(buffer)) + ":";
-      for (const auto& event : events_of(buffer)) text += " " + std::to_string(event.t);
-      texts_.push_back(text + (GST_BUFFER_IS_DISCONT(buffer) ? " DISCONT" : ""));
-    } else if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_GAP) {
-      const Gap gap = gap_of(GST_PAD_PROBE_INFO_EVENT(info));
-      const bool lasts = GST_CLOCK_TIME_IS_VALID(gap.duration);
-      texts_.push_back(us(gap.start) + (lasts ? "+" + us(gap.duration) : ""));
-    }
+  static std::string us(GstClockTime time) { return std::to_string(time / GST_USECOND); }
+  void take(GstBuffer* buffer) {
+    auto text = us(GST_BUFFER_PTS(buffer)) + "+" + us(GST_BUFFER_DURATION(buffer)) + ":";
+    for (const auto& event : events_of(buffer)) text += " " + std::to_string(event.t);
+    texts_.push_back(text + (GST_BUFFER_IS_DISCONT(buffer) ? " DISCONT" : ""));
+  }
+  void take(GstEvent* event) {
+    if (GST_EVENT_TYPE(event) != GST_EVENT_GAP) return;
+    const auto [start, duration] = gap_of(event);
+    texts_.push_back(us(start) + (GST_CLOCK_TIME_IS_VALID(duration) ? "+" + us(duration) : ""));
   }
 
   Texts texts_;

@@ -111,22 +111,15 @@ TEST_P(EveryFormat, EndsEachOfTwoFilesInItsOwnStream) {
   const TemporaryFile file(file_of(format(), events));
   Player player(file.source() + "queue ! c.  " + file.source() + "concat name=c ! " +
                 format().reader);
-  struct Streams {
-    Player& player;
-    std::vector<std::size_t> start_at;
-  } streams{player, {}};
-  gst_pad_add_probe(
-      GST_BASE_SINK_PAD(player["sink"]), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
-      +[](GstPad*, GstPadProbeInfo* info, gpointer data) {
-        auto& to = *static_cast<Streams*>(data);
-        if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_STREAM_START)
-          to.start_at.push_back(to.player.events.size());
-        return GST_PAD_PROBE_OK;
-      },
-      &streams, nullptr);
+  std::vector<std::size_t> starts;
+  watch(GST_BASE_SINK_PAD(player["sink"]), {[](GstBuffer*) {},
+                                            [&](GstEvent* event) {
+                                              if (GST_EVENT_TYPE(event) == GST_EVENT_STREAM_START)
+                                                starts.push_back(player.events.size());
+                                            }});
   ASSERT_TRUE(player.play()) << player.error;
   EXPECT_EQ(player.events.size(), 2 * events.size());
-  EXPECT_EQ(streams.start_at, (std::vector<std::size_t>{0, events.size()}));
+  EXPECT_EQ(starts, (std::vector<std::size_t>{0, events.size()}));
 }
 
 TEST_P(EveryFormat, BeginsAnewAfterAFlush) {

@@ -63,30 +63,23 @@ TEST_P(EveryFormat, SendsASegmentBeforeItsEnd) {
   for (const std::string way : {"", "queue ! "}) {
     Player player(file.source() + way + format().reader);
     ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
-    struct Segments {
-      GstClockTime last = GST_CLOCK_TIME_NONE;
-      std::promise<GstClockTime> ended{};
-    } segments;
-    gst_pad_add_probe(
-        GST_BASE_SINK_PAD(player["sink"]), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
-        +[](GstPad*, GstPadProbeInfo* info, gpointer data) {
-          auto& seen = *static_cast<Segments*>(data);
-          auto* const event = GST_PAD_PROBE_INFO_EVENT(info);
-          const GstSegment* segment = nullptr;
-          if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT) {
-            gst_event_parse_segment(event, &segment);
-            seen.last = segment->time;
-          }
-          if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT_DONE) seen.ended.set_value(seen.last);
-          return GST_PAD_PROBE_OK;
-        },
-        &segments, nullptr);
+    GstClockTime last_start = GST_CLOCK_TIME_NONE;
+    std::promise<GstClockTime> ended;
+    const auto take_event = [&](GstEvent* event) {
+      const GstSegment* segment = nullptr;
+      if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT) {
+        gst_event_parse_segment(event, &segment);
+        last_start = segment->time;
+      }
+      if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT_DONE) ended.set_value(last_start);
+    };
+    watch(GST_BASE_SINK_PAD(player["sink"]), {[](GstBuffer*) {}, take_event});
     ASSERT_TRUE(player.seek(GST_SECOND, GST_SECOND, GST_SEEK_FLAG_SEGMENT));
     ASSERT_TRUE(player.play()) << player.error;
     EXPECT_EQ(player.end, GST_MESSAGE_SEGMENT_DONE);
-    auto ended = segments.ended.get_future();
-    ASSERT_EQ(ended.wait_for(std::chrono::seconds(60)), std::future_status::ready);
-    EXPECT_EQ(ended.get(), GST_SECOND);
+    auto start = ended.get_future();
+    ASSERT_EQ(start.wait_for(std::chrono::seconds(60)), std::future_status::ready);
+    EXPECT_EQ(start.get(), GST_SECOND);
   }
 }
 

@@ -9,21 +9,6 @@ namespace {
 using namespace harness;
 using namespace event_files;
 
-TEST_P(EveryFormat, IsWrittenWithoutWhatLiesOutsideTheSensor) {
-  Writer h(format());
-  const std::vector events = {on_at(5, 5, 1000), on_at(width, 5, 1001), on_at(5, height, 1002),
-                              off_at(6, 6, 1003)};
-  h.write(events, 0);
-  push_gap(h.get(), 10 * GST_MSECOND, 10 * GST_MSECOND);
-  EXPECT_TRUE(h.pull_event(GST_EVENT_GAP));
-  EXPECT_TRUE(
-      h.warning().starts_with("Dropped 2 events outside the sensor. Correct the size in the "
-                              "caps, 320 x 240 pixels"));
-  EXPECT_EQ(events_in(format(), h.end()), (std::vector{events[0], events[3]}));
-  EXPECT_EQ(h.dropped(), "");
-  EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
-}
-
 TEST(Writers, EndInAnErrorOnAFullDisk) {
   for (const auto& [extension, writer] : recording_files::elements_with("output-extensions")) {
     if (writer.starts_with("eventhdf5sink")) continue;  // it writes the file itself

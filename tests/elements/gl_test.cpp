@@ -554,15 +554,8 @@ TEST(OpenGl, UploadsTexturesThatItCannotUse) {
       "gltestsrc num-buffers=3 ! video/x-raw(memory:GLMemory),width=64,height=48 ! gldownload ! "
       "video/x-raw ! fakesink name=sink sync=false");
   std::vector<Buffer> frames;
-  const Owned<GstPad> sink(gst_element_get_static_pad(source["sink"], "sink"));
-  gst_pad_add_probe(
-      sink.get(), GST_PAD_PROBE_TYPE_BUFFER,
-      [](GstPad*, GstPadProbeInfo* info, gpointer to) {
-        static_cast<std::vector<Buffer>*>(to)->emplace_back(
-            gst_buffer_ref(GST_PAD_PROBE_INFO_BUFFER(info)));
-        return GST_PAD_PROBE_OK;
-      },
-      &frames, nullptr);
+  watch(GST_BASE_SINK_PAD(source["sink"]),
+        {[&](GstBuffer* buffer) { frames.emplace_back(gst_buffer_ref(buffer)); }});
   give_display(source.get());
   ASSERT_TRUE(source.play()) << source.error;
   ASSERT_EQ(frames.size(), 3U);

@@ -468,30 +468,42 @@ inline std::string event_name(GstEvent* event) {
                    : GST_EVENT_TYPE_NAME(event);
 }
 
+/// Takes the buffers and downstream events that pass a pad.
+struct Watcher {
+  std::function<void(GstBuffer*)> take_buffer;
+  std::function<void(GstEvent*)> take_event = [](GstEvent*) {};
+};
+
+inline void watch(GstPad* pad, Watcher watcher) {
+  gst_pad_add_probe(
+      pad,
+      static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM |
+                                   GST_PAD_PROBE_TYPE_EVENT_FLUSH),
+      +[](GstPad*, GstPadProbeInfo* info, gpointer data) {
+        const auto& [take_buffer, take_event] = *static_cast<Watcher*>(data);
+        if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0)
+          take_buffer(GST_PAD_PROBE_INFO_BUFFER(info));
+        else if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER_LIST) != 0)
+          take_buffer(gst_buffer_list_get(GST_PAD_PROBE_INFO_BUFFER_LIST(info), 0));
+        else
+          take_event(GST_PAD_PROBE_INFO_EVENT(info));
+        return GST_PAD_PROBE_OK;
+      },
+      new Watcher(std::move(watcher)), +[](gpointer data) { delete static_cast<Watcher*>(data); });
+}
+
 /// The buffers and events of an output, in order: "buffer", or the name of the event.
 class OutputOrder {
  public:
   explicit OutputOrder(GstHarness* h) {
-    gst_pad_add_probe(
-        h->sinkpad,
-        static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER |
-                                     GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
-        +[](GstPad*, GstPadProbeInfo* info, gpointer self) {
-          static_cast<OutputOrder*>(self)->take(info);
-          return GST_PAD_PROBE_OK;
-        },
-        this, nullptr);
+    watch(h->sinkpad, {[this](GstBuffer*) { names_.emplace_back("buffer"); },
+                       [this](GstEvent* event) { names_.push_back(event_name(event)); }});
   }
 
   /// Once the output has ended.
   const std::vector<std::string>& names() const { return names_; }
 
  private:
-  void take(GstPadProbeInfo* info) {
-    const bool is_buffer = (GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0;
-    names_.push_back(is_buffer ? "buffer" : event_name(GST_PAD_PROBE_INFO_EVENT(info)));
-  }
-
   std::vector<std::string> names_;
 };
 

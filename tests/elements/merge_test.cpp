@@ -43,13 +43,7 @@ class RunningOutput {
   using Buffers = std::vector<std::pair<GstClockTime, Events>>;
 
   explicit RunningOutput(GstHarness* h) {
-    gst_pad_add_probe(
-        h->sinkpad, GST_PAD_PROBE_TYPE_BUFFER,
-        +[](GstPad* pad, GstPadProbeInfo* info, gpointer self) {
-          static_cast<RunningOutput*>(self)->take(pad, GST_PAD_PROBE_INFO_BUFFER(info));
-          return GST_PAD_PROBE_OK;
-        },
-        this, nullptr);
+    watch(h->sinkpad, {[this, pad = h->sinkpad](GstBuffer* buffer) { take(pad, buffer); }});
   }
 
   /// Once the output has ended.
