@@ -12,9 +12,7 @@
 namespace {
 
 using namespace harness;
-using eventcamera::AbsoluteEvent;
-using eventcamera::Event;
-using eventcamera::Polarity;
+using namespace eventcamera;
 
 constexpr int width = 640;
 constexpr int height = 480;

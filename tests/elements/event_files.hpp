@@ -13,9 +13,7 @@
 
 namespace event_files {
 
-using eventcamera::AbsoluteEvent;
-using eventcamera::Microseconds;
-using eventcamera::Polarity;
+using namespace eventcamera;
 using harness::Harness;
 using harness::Owned;
 using Events = std::vector<AbsoluteEvent>;

@@ -8,9 +8,7 @@
 namespace {
 
 using namespace harness;
-using eventcamera::Event;
-using eventcamera::Microseconds;
-using eventcamera::Trigger;
+using namespace eventcamera;
 
 using Triggers = std::vector<Trigger>;
 using Texts = std::vector<std::string>;

@@ -10,15 +10,11 @@
 namespace {
 
 using namespace harness;
-using eventcamera::AbsoluteEvent;
-using eventcamera::EvtFormat;
-using eventcamera::Microseconds;
-using eventcamera::Polarity;
-using eventcamera::Trigger;
+using namespace eventcamera;
 using Bytes = std::vector<std::uint8_t>;
 using Events = std::vector<AbsoluteEvent>;
 
-constexpr eventcamera::SensorSize sensor{320, 320};
+constexpr SensorSize sensor{320, 320};
 constexpr auto size = " width=320 height=320 ";
 constexpr auto padded_caps = "video/x-raw,format=GRAY8,width=4096,height=4,framerate=100/1";
 constexpr std::size_t buffer_size = 4096 * 4;
@@ -56,7 +52,7 @@ class Camera {
   }
 
  private:
-  std::unique_ptr<eventcamera::Encoder> encoder_;
+  std::unique_ptr<Encoder> encoder_;
   std::size_t sent_ = 0;
 };
 

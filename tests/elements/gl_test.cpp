@@ -343,7 +343,9 @@ class Busy : public testing::TestWithParam<const char*> {
   std::vector<std::string> intervals;
   Harness h{GetParam()};
 };
-INSTANTIATE_TEST_SUITE_P(, Busy, testing::Values("gleventsim-frame", "gleventsim-dense"));
+INSTANTIATE_TEST_SUITE_P(, Busy,
+                         testing::Values("gleventsim-frame", "gleventsim-dense",
+                                         "gleventsim-sparse", "gleventsim-diff"));
 
 TEST_P(Busy, IntervalsAreReadWhenTheNextFrameHasBeenQueued) {
   for (int i = 2; i < 6; ++i) {

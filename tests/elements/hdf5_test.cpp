@@ -14,12 +14,7 @@
 namespace {
 
 using namespace harness;
-using eventcamera::AbsoluteEvent;
-using eventcamera::Hdf5Format;
-using eventcamera::Hdf5Reader;
-using eventcamera::Hdf5Writer;
-using eventcamera::Microseconds;
-using eventcamera::Polarity;
+using namespace eventcamera;
 using Events = std::vector<AbsoluteEvent>;
 
 constexpr int width = 320;
@@ -45,12 +40,12 @@ std::vector<std::uint8_t> contents(const std::string& path) {
 }
 
 Events read(const std::string& path) {
-  eventcamera::MemoryBytes bytes(contents(path));
+  MemoryBytes bytes(contents(path));
   Hdf5Reader reader(bytes);
   Events events;
   while (reader.read(10'000, events) > 0) continue;
   EXPECT_EQ(reader.corruption().places, 0U) << reader.corruption().first;
-  EXPECT_EQ(reader.size(), (eventcamera::SensorSize{width, height}));
+  EXPECT_EQ(reader.size(), (SensorSize{width, height}));
   return events;
 }
 
@@ -79,7 +74,7 @@ TEST(Hdf5Elements, WriteWhatTheyRead) {
 
 /// Through EVT words and back.
 TEST(Hdf5Elements, KeepTriggers) {
-  using eventcamera::Trigger;
+  using namespace eventcamera;
   const auto events = some_events();
   const std::vector<Trigger> triggers{{events.front().t - 1'500, 1, true},
                                       {events[777].t, 7, false},
@@ -98,7 +93,7 @@ TEST(Hdf5Elements, KeepTriggers) {
   ASSERT_TRUE(player.play()) << player.error;
   EXPECT_TRUE(read(out) == events);
   std::vector<Trigger> found;
-  eventcamera::MemoryBytes bytes(contents(out));
+  MemoryBytes bytes(contents(out));
   Hdf5Reader reader(bytes);
   while (reader.read_triggers(1000, found) > 0) continue;
   EXPECT_EQ(found, triggers);

@@ -20,11 +20,7 @@
 /// A recording of five seconds, in files of every format.
 namespace recording_files {
 
-using eventcamera::AbsoluteEvent;
-using eventcamera::EvtFormat;
-using eventcamera::Microseconds;
-using eventcamera::Polarity;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 using harness::Owned;
 using Bytes = std::vector<std::uint8_t>;
 

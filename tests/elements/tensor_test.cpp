@@ -13,10 +13,7 @@
 namespace {
 
 using namespace harness;
-using eventcamera::AbsoluteEvent;
-using eventcamera::Event;
-using eventcamera::EventTensor;
-using eventcamera::TensorSettings;
+using namespace eventcamera;
 
 constexpr int width = 32;
 constexpr int height = 24;
