@@ -150,10 +150,7 @@ TEST(AedatMux, WritesFramesInTheSizeOfTheirCaps) {
   Bytes pixels(3 * 16);
   std::iota(pixels.begin(), pixels.end(), std::uint8_t{0});
   GstBuffer* const buffer = gst_buffer_new_memdup(pixels.data(), pixels.size());
-  gsize offsets[GST_VIDEO_MAX_PLANES] = {0};
-  gint strides[GST_VIDEO_MAX_PLANES] = {16};
-  gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, GST_VIDEO_FORMAT_GRAY8, 16, 999,
-                                 1, offsets, strides);
+  add_video_meta(buffer, GST_VIDEO_FORMAT_GRAY8, 16, 999, {{0, 16}});
   GST_BUFFER_PTS(buffer) = GST_SECOND;
   EXPECT_EQ(mux.Harness::push(buffer), GST_FLOW_OK);
   const auto pictures = mux.end().pictures;

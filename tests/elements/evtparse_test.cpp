@@ -140,10 +140,7 @@ TEST(EvtParse, LeavesOutThePaddingOfRows) {
   ASSERT_LT(marked.size(), width * height);
   for (gsize at = 0; at < marked.size(); ++at) rows[at / width * stride + at % width] = marked[at];
   GstBuffer* const buffer = gst_buffer_new_memdup(rows.data(), rows.size());
-  gsize offsets[GST_VIDEO_MAX_PLANES] = {0};
-  gint strides[GST_VIDEO_MAX_PLANES] = {stride};
-  gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, GST_VIDEO_FORMAT_GRAY8, width,
-                                 height, 1, offsets, strides);
+  add_video_meta(buffer, GST_VIDEO_FORMAT_GRAY8, width, height, {{0, stride}});
   Reading reading("video/x-raw,format=GRAY8,width=512,height=40,framerate=0/1",
                   "format=EVT3" + std::string(size));
   reading.push(buffer);

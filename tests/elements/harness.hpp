@@ -122,6 +122,25 @@ inline void tell_when_freed(GstElement* element, bool& freed) {
       &freed);
 }
 
+/// A plane of a video buffer.
+struct Plane {
+  gsize offset;
+  int stride;  ///< bytes
+};
+
+inline void add_video_meta(GstBuffer* buffer, GstVideoFormat format, int width, int height,
+                           const std::vector<Plane>& planes) {
+  gsize offsets[GST_VIDEO_MAX_PLANES] = {};
+  gint strides[GST_VIDEO_MAX_PLANES] = {};
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    offsets[i] = planes[i].offset;
+    strides[i] = planes[i].stride;
+  }
+  gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, format,
+                                 static_cast<guint>(width), static_cast<guint>(height),
+                                 static_cast<guint>(planes.size()), offsets, strides);
+}
+
 class Harness {
  public:
   /// For example "eventsim-dense flow=dis-hq".
@@ -180,25 +199,17 @@ class Harness {
   /// bytes, described by a GstVideoMeta.
   GstBuffer* frame(GstClockTime pts, const std::function<int(int x, int y)>& grey, int padding = 0,
                    int alpha = 255) const {
-    gsize size = GST_VIDEO_INFO_SIZE(&info_);
-    gsize offsets[GST_VIDEO_MAX_PLANES] = {};
-    gint strides[GST_VIDEO_MAX_PLANES] = {};
-    if (padding > 0) {
-      size = 0;
-      for (guint i = 0; i < GST_VIDEO_INFO_N_PLANES(&info_); ++i) {
-        offsets[i] = size;
-        strides[i] = GST_VIDEO_INFO_PLANE_STRIDE(&info_, i) + padding;
-        size += static_cast<gsize>(strides[i] * GST_VIDEO_INFO_HEIGHT(&info_));
-      }
+    gsize size = padding > 0 ? 0 : GST_VIDEO_INFO_SIZE(&info_);
+    std::vector<Plane> planes;
+    for (guint i = 0; padding > 0 && i < GST_VIDEO_INFO_N_PLANES(&info_); ++i) {
+      planes.push_back({size, GST_VIDEO_INFO_PLANE_STRIDE(&info_, i) + padding});
+      size += static_cast<gsize>(planes[i].stride * GST_VIDEO_INFO_HEIGHT(&info_));
     }
     GstBuffer* buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
     gst_buffer_memset(buffer, 0, 0xa5, size);
     if (padding > 0)
-      gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE,
-                                     GST_VIDEO_INFO_FORMAT(&info_),
-                                     static_cast<guint>(GST_VIDEO_INFO_WIDTH(&info_)),
-                                     static_cast<guint>(GST_VIDEO_INFO_HEIGHT(&info_)),
-                                     GST_VIDEO_INFO_N_PLANES(&info_), offsets, strides);
+      add_video_meta(buffer, GST_VIDEO_INFO_FORMAT(&info_), GST_VIDEO_INFO_WIDTH(&info_),
+                     GST_VIDEO_INFO_HEIGHT(&info_), planes);
     const int components = GST_VIDEO_INFO_IS_RGB(&info_) ? 3 : 1;
     for (int component = 0; component < components; ++component) draw(buffer, component, grey);
     draw_alpha(buffer, alpha);

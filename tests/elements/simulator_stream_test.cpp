@@ -100,14 +100,8 @@ TEST_P(EverySimulator, SwitchesFromEventsToVideoWithoutLosingAnInterval) {
 GstFlowReturn push_with_meta(const char* format, int stride, gsize offset, gsize size) {
   Harness h("eventsim-frame");
   h.caps(video(320, 240, format));
-  GstBuffer* buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
-  gst_buffer_memset(buffer, 0, 100, size);
-  GST_BUFFER_PTS(buffer) = 0;
-  gsize offsets[GST_VIDEO_MAX_PLANES] = {offset};
-  gint strides[GST_VIDEO_MAX_PLANES] = {stride};
-  gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE,
-                                 gst_video_format_from_string(format), 320, 240, 1, offsets,
-                                 strides);
+  GstBuffer* buffer = filled(size, 100, 0, GST_CLOCK_TIME_NONE);
+  add_video_meta(buffer, gst_video_format_from_string(format), 320, 240, {{offset, stride}});
   const GstFlowReturn flow = h.push(buffer);
   EXPECT_EQ(flow != GST_FLOW_OK, h.message(GST_MESSAGE_ERROR) != nullptr);
   return flow;
@@ -128,20 +122,19 @@ TEST(Stream, RefusesMetasThatLie) {
 TEST(Stream, RefusesFramesSmallerThanTheirCaps) {
   struct Meta {
     GstVideoFormat format;
-    guint width;
-    guint planes;
+    int width;
+    std::vector<Plane> planes;
     const char* error;
   };
-  for (const auto& meta : {Meta{GST_VIDEO_FORMAT_NV12, 60, 2, "NV12 of 60x44 pixels"},
-                           Meta{GST_VIDEO_FORMAT_GRAY8, 62, 1, "GRAY8 of 62x44 pixels"},
-                           Meta{GST_VIDEO_FORMAT_NV12, 62, 1, "NV12 of 62x44 pixels"}}) {
+  const std::vector<Plane> one_plane{{0, 62}};
+  const std::vector<Plane> two_planes{{0, 62}, {gsize{62} * 44, 62}};
+  for (const auto& meta : {Meta{GST_VIDEO_FORMAT_NV12, 60, two_planes, "NV12 of 60x44 pixels"},
+                           Meta{GST_VIDEO_FORMAT_GRAY8, 62, one_plane, "GRAY8 of 62x44 pixels"},
+                           Meta{GST_VIDEO_FORMAT_NV12, 62, one_plane, "NV12 of 62x44 pixels"}}) {
     Harness h("eventsim-frame");
     h.caps(video(62, 44, "NV12"));
     GstBuffer* buffer = h.flat(0, 100);
-    gsize offsets[GST_VIDEO_MAX_PLANES] = {0, 62 * 44};
-    gint strides[GST_VIDEO_MAX_PLANES] = {62, 62};
-    gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, meta.format, meta.width, 44,
-                                   meta.planes, offsets, strides);
+    add_video_meta(buffer, meta.format, meta.width, 44, meta.planes);
     EXPECT_EQ(h.push(buffer), GST_FLOW_ERROR);
     EXPECT_TRUE(contains(h.error(), meta.error));
   }
