@@ -131,15 +131,8 @@ class Consumer {
     steps_.emplace_back(
         [make](const Input& input) { gst_pad_push_event(input.pad.get(), make()); });
   }
-  void push_segment(GstClockTime base = 0, GstSegmentFlags flags = GST_SEGMENT_FLAG_NONE,
-                    GstFormat format = GST_FORMAT_TIME, double rate = 1) {
-    GstSegment segment;
-    gst_segment_init(&segment, format);
-    segment.base = base;
-    segment.flags = flags;
-    segment.rate = rate;
-    if (rate < 0) segment.stop = GST_SECOND;
-    push([segment] { return gst_event_new_segment(&segment); });
+  void push_segment(const SegmentFields& fields = {}) {
+    push([fields] { return segment_event(fields); });
   }
   /// Pushes a buffer of 10 ms after the first 10 ms into each input: a frame, or these events.
   void push_events(const std::vector<GstEventCameraEvent>& events,
@@ -255,7 +248,7 @@ INSTANTIATE_TEST_SUITE_P(, EveryConsumer, testing::ValuesIn(seekable_consumers()
 TEST_P(EveryConsumer, EndsEachSegmentOnceAfterItsStart) {
   Consumer it(GetParam());
   for (const GstClockTime base : {0 * GST_SECOND, 1 * GST_SECOND}) {
-    it.push_segment(base, GST_SEGMENT_FLAG_SEGMENT);
+    it.push_segment({.base = base, .flags = GST_SEGMENT_FLAG_SEGMENT});
     it.push([] { return gst_event_new_segment_done(GST_FORMAT_TIME, 0); });
   }
   it.end();
@@ -313,7 +306,7 @@ TEST_P(EveryConsumer, StartsOverAfterAFlush) {
       it.play();
     }
     for (auto* consumer : {&it, &fresh}) {
-      consumer->push_segment(1 * GST_SECOND);
+      consumer->push_segment({.base = 1 * GST_SECOND});
       for (guint i = 0; i < 3; ++i) consumer->push_interval(before + i);
       consumer->end();
       consumer->expect_segments();
@@ -381,14 +374,14 @@ TEST_P(EveryConsumer, SkipsInvalidEvents) {
 
 TEST_P(EveryConsumer, RefusesToRunBackwards) {
   Consumer it(GetParam());
-  it.push_segment(0, GST_SEGMENT_FLAG_NONE, GST_FORMAT_TIME, -1);
+  it.push_segment({.stop = GST_SECOND, .rate = -1});
   EXPECT_TRUE(contains(testing::PrintToString(it.faults()), "backwards"));
 }
 
 TEST_P(EveryConsumer, RefusesEventsWithoutTimes) {
   Consumer it(GetParam());
   if (!it.takes_events() || is_writer(GetParam())) GTEST_SKIP();
-  it.push_segment(0, GST_SEGMENT_FLAG_NONE, GST_FORMAT_BYTES);
+  it.push_segment({.format = GST_FORMAT_BYTES});
   EXPECT_TRUE(contains(testing::PrintToString(it.faults()), "no timestamps"));
 }
 

@@ -347,9 +347,10 @@ struct SegmentFields {
   GstClockTime base = 0;
   double rate = 1;
   GstFormat format = GST_FORMAT_TIME;
+  GstSegmentFlags flags = GST_SEGMENT_FLAG_NONE;
 };
 
-inline void push_segment(GstHarness* h, const SegmentFields& fields = {}) {
+inline GstEvent* segment_event(const SegmentFields& fields) {
   GstSegment segment;
   gst_segment_init(&segment, fields.format);
   segment.rate = fields.rate;
@@ -357,7 +358,12 @@ inline void push_segment(GstHarness* h, const SegmentFields& fields = {}) {
   segment.start = segment.position = fields.start;
   segment.time = fields.time;
   segment.stop = fields.stop;
-  gst_harness_push_event(h, gst_event_new_segment(&segment));
+  segment.flags = fields.flags;
+  return gst_event_new_segment(&segment);
+}
+
+inline void push_segment(GstHarness* h, const SegmentFields& fields = {}) {
+  gst_harness_push_event(h, segment_event(fields));
 }
 
 /// Ends the segment, but not the stream.

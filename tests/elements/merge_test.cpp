@@ -18,59 +18,12 @@ constexpr const char* small = "application/x-event-camera, format=XYTP, width=8,
 
 using Events = std::vector<AbsoluteEvent>;
 
-/// Output of a merger, checked as it arrives: sorted events within intervals that follow each
-/// other.
-class MergedOutput {
- public:
-  void take(GstBuffer* buffer) {
-    EXPECT_GE(GST_BUFFER_PTS(buffer), end_);
-    end_ = GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer);
-    for (const auto& event : events_of(buffer))
-      EXPECT_LE(event.t * GST_USECOND, GST_BUFFER_DURATION(buffer));
-    append_events(buffer, events);
-    EXPECT_TRUE(std::ranges::is_sorted(events, {}, &AbsoluteEvent::t));
-  }
-
-  Events events;
-
- private:
-  GstClockTime end_ = 0;
-};
-
-/// Events of each buffer of an output, after its running time in ms.
-class RunningOutput {
- public:
-  using Buffers = std::vector<std::pair<GstClockTime, Events>>;
-
-  explicit RunningOutput(GstHarness* h) {
-    watch(h->sinkpad, {[this, pad = h->sinkpad](GstBuffer* buffer) { take(pad, buffer); }});
-  }
-
-  /// Once the output has ended.
-  const Buffers& buffers() const { return buffers_; }
-
- private:
-  void take(GstPad* pad, GstBuffer* buffer) {
-    const Owned<GstEvent> event(gst_pad_get_sticky_event(pad, GST_EVENT_SEGMENT, 0));
-    GstSegment segment;
-    gst_event_copy_segment(event.get(), &segment);
-    Events events;
-    append_events(buffer, events);
-    buffers_.emplace_back(
-        gst_segment_to_running_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer)) / ms,
-        events);
-  }
-
-  Buffers buffers_;
-};
-
 class MergeTest : public testing::Test {
  protected:
   MergeTest() : inputs_("eventmerge", "sink_0", "sink_1") {}
 
-  void begin(const std::string& first = small, const std::string& second = small) {
-    gst_harness_set_src_caps_str(a(), first.c_str());
-    gst_harness_set_src_caps_str(b(), second.c_str());
+  void begin() {
+    for (auto* h : inputs_.both()) gst_harness_set_src_caps_str(h, small);
   }
 
   GstHarness* a() { return inputs_.first.get(); }
@@ -88,20 +41,33 @@ class MergeTest : public testing::Test {
   /// Events up to the end, after ending both inputs.
   Events rest() {
     inputs_.end();
-    for (const auto& buffer : pull_until_eos(a())) output_.take(buffer.get());
-    return output_.events;
+    for (const auto& buffer : pull_until_eos(a())) take(buffer.get());
+    return merged_;
   }
 
   /// Size in the caps of the next buffer, whose events are added to the output.
   std::string next_size() {
     const Buffer buffer(gst_harness_pull(a()));
     EXPECT_TRUE(buffer);
-    if (buffer) output_.take(buffer.get());
+    if (buffer) take(buffer.get());
     return size_of(a());
   }
 
+  /// Expects sorted events within intervals that follow each other.
+  void take(GstBuffer* buffer) {
+    EXPECT_GE(GST_BUFFER_PTS(buffer), end_);
+    end_ = GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer);
+    for (const auto& event : events_of(buffer))
+      EXPECT_LE(event.t * GST_USECOND, GST_BUFFER_DURATION(buffer));
+    append_events(buffer, merged_);
+    EXPECT_TRUE(std::ranges::is_sorted(merged_, {}, &AbsoluteEvent::t));
+  }
+
   TwoInputs inputs_;
-  MergedOutput output_;
+  Events merged_;
+
+ private:
+  GstClockTime end_ = 0;
 };
 
 TEST_F(MergeTest, SortsByTimeThenByPad) {
@@ -128,12 +94,12 @@ TEST_F(MergeTest, PutsSensorsSideBySide) {
   push(a(), 0, {on(7, 3, 1)});
   push(b(), 0, {on(0, 0, 2), on(7, 3, 3)});
   EXPECT_EQ(next_size(), "16x5");
-  EXPECT_EQ(output_.events, (Events{on_at(7, 3, 1), on_at(8, 1, 2), on_at(15, 4, 3)}));
+  EXPECT_EQ(merged_, (Events{on_at(7, 3, 1), on_at(8, 1, 2), on_at(15, 4, 3)}));
   place_second(0, 0);
   push(a(), 10 * ms, {on(7, 3, 1)});
   push(b(), 10 * ms, {on(0, 0, 2)});
   EXPECT_EQ(next_size(), "8x4");
-  EXPECT_EQ(output_.events.back(), on_at(0, 0, 10'002));
+  EXPECT_EQ(merged_.back(), on_at(0, 0, 10'002));
 }
 
 /// A launch line sets the position of a pad that it releases until there is a stream to link.
@@ -295,7 +261,7 @@ TEST_F(MergeTest, FollowsCapsThatChange) {
   push(a(), 10 * ms, {on(7, 3, 1)});
   push(b(), 10 * ms, {on(8, 39, 2)});
   EXPECT_EQ(next_size(), "9x40");
-  EXPECT_EQ(output_.events.back(), on_at(8, 39, 10'002));
+  EXPECT_EQ(merged_.back(), on_at(8, 39, 10'002));
   EXPECT_EQ(stat_of(element(), "rejected-events"), 0U);
 }
 
@@ -322,7 +288,15 @@ TEST_F(MergeTest, DropsIntervalsThatGoBack) {
 
 /// One stream is in its next recording before the other one.
 TEST_F(MergeTest, StartsOverOnceAllStreamsGoBackWithNewSegments) {
-  const RunningOutput output(a());
+  std::vector<std::pair<GstClockTime, Events>> output;  // buffers by running time, ms
+  watch(a()->sinkpad, {[&, pad = a()->sinkpad](GstBuffer* buffer) {
+          const Owned<GstEvent> event(gst_pad_get_sticky_event(pad, GST_EVENT_SEGMENT, 0));
+          GstSegment segment;
+          gst_event_copy_segment(event.get(), &segment);
+          const auto time =
+              gst_segment_to_running_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
+          append_events(buffer, output.emplace_back(time / ms, Events()).second);
+        }});
   begin();
   push(a(), 0, {on(1, 0, 1)});
   push(b(), 0, {on(2, 0, 2)});
@@ -337,11 +311,12 @@ TEST_F(MergeTest, StartsOverOnceAllStreamsGoBackWithNewSegments) {
   push(b(), 0, {on(7, 0, 7)});
   push_eos(b());
   ASSERT_TRUE(next_event(a(), GST_EVENT_EOS));
-  EXPECT_EQ(output.buffers(), (RunningOutput::Buffers{{0, {on_at(1, 0, 1), on_at(2, 0, 2)}},
-                                                      {10, {on_at(3, 0, 10'003)}},
-                                                      {100, {on_at(4, 0, 4), on_at(5, 0, 5)}},
-                                                      {110, {on_at(6, 0, 10'006)}},
-                                                      {200, {on_at(7, 0, 7)}}}));
+  EXPECT_EQ(output,
+            (std::vector<std::pair<GstClockTime, Events>>{{0, {on_at(1, 0, 1), on_at(2, 0, 2)}},
+                                                          {10, {on_at(3, 0, 10'003)}},
+                                                          {100, {on_at(4, 0, 4), on_at(5, 0, 5)}},
+                                                          {110, {on_at(6, 0, 10'006)}},
+                                                          {200, {on_at(7, 0, 7)}}}));
   EXPECT_EQ(stat_of(element(), "late-events"), 0U);
 }
 
