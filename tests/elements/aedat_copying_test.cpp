@@ -34,8 +34,8 @@ TEST(AedatMux, WritesWhatTheDemuxerReads) {
       for (auto& t : picture.times) t += 3'000;
     EXPECT_TRUE(after.pictures == before.pictures);
     // Duration and seek positions come from the table.
-    AedatPlayer player(out.source());
-    player.preroll();
+    AedatPlayer player(out.source(), {"events_0", "video_0"});
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
     EXPECT_EQ(player.duration(),
               static_cast<GstClockTime>(before.events.back().t + 3'001) * GST_USECOND);
     ASSERT_TRUE(player.seek(GST_SECOND));

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <atomic>
 #include <map>
-#include <mutex>
 #include <string>
 #include <vector>
 
@@ -25,59 +23,33 @@ struct Track {
   std::size_t eos = 0;
 };
 
-/// Plays an AEDAT file and records what each pad of aedatdemux gives. Launch lines of sources end
+/// Plays an AEDAT file and records what these pads of aedatdemux give. Launch lines of sources end
 /// before it; identity at their end forces push mode.
 class AedatPlayer : public Pipeline {
  public:
-  explicit AedatPlayer(const std::string& source) : Pipeline(source + "aedatdemux name=d") {
-    g_signal_connect((*this)["d"], "pad-added", G_CALLBACK(added), this);
-    g_signal_connect((*this)["d"], "no-more-pads",
-                     G_CALLBACK(+[](GstElement*, AedatPlayer* self) { ++self->no_more_pads; }),
-                     this);
+  explicit AedatPlayer(const std::string& source,
+                       const std::vector<std::string>& pads = {"events_0"})
+      : Pipeline(launch(source, pads)) {
+    for (const auto& pad : pads) {
+      auto& track = tracks_[pad];
+      const bool has_events = pad.starts_with("events");
+      harness::watch(GST_BASE_SINK_PAD((*this)[pad.c_str()]),
+                     {[&track, has_events](GstBuffer* buffer) { see(track, buffer, has_events); },
+                      [&track](GstEvent* event) { see(track, event); }});
+    }
   }
   ~AedatPlayer() { set(GST_STATE_NULL); }
 
-  void preroll() {
-    set(GST_STATE_PAUSED);
-    while (no_more_pads == 0) g_usleep(1000);  // before, there are no sinks to wait for
-    ASSERT_TRUE(reaches(GST_STATE_PAUSED));
-  }
-
   guint64 stat(const char* name) const { return Pipeline::stat("d", name); }
 
-  Track track(const std::string& pad) {
-    const std::lock_guard lock(mutex_);
-    return tracks_[pad];
-  }
-
-  std::atomic<int> no_more_pads = 0;
+  /// While nothing is played.
+  const Track& track(const std::string& pad) const { return tracks_.at(pad); }
 
  private:
-  static void added(GstElement*, GstPad* pad, AedatPlayer* self) {
-    GstElement* const queue = gst_element_factory_make("queue", nullptr);
-    GstElement* const sink = gst_element_factory_make("fakesink", nullptr);
-    gst_bin_add_many(GST_BIN(self->get()), queue, sink, nullptr);
-    gst_element_link(queue, sink);
-    {
-      const std::lock_guard lock(self->mutex_);
-      auto& track = self->tracks_[GST_PAD_NAME(pad)] = {};
-      // A pad whose caps may depend on what is linked has none yet.
-      for (const auto type : {GST_EVENT_CAPS, GST_EVENT_SEGMENT})
-        if (const harness::Owned<GstEvent> event{gst_pad_get_sticky_event(pad, type, 0)})
-          see(track, event.get());
-    }
-    const std::string name = GST_PAD_NAME(pad);
-    harness::watch(pad, {[self, name](GstBuffer* buffer) {
-                           const std::lock_guard lock(self->mutex_);
-                           see(self->tracks_[name], buffer, name.starts_with("events"));
-                         },
-                         [self, name](GstEvent* event) {
-                           const std::lock_guard lock(self->mutex_);
-                           see(self->tracks_[name], event);
-                         }});
-    gst_pad_link(pad, harness::static_pad(queue, "sink").get());
-    gst_element_sync_state_with_parent(sink);
-    gst_element_sync_state_with_parent(queue);
+  static std::string launch(const std::string& source, const std::vector<std::string>& pads) {
+    auto line = source + "aedatdemux name=d";
+    for (const auto& pad : pads) line += "  d." + pad + " ! queue ! fakesink name=" + pad;
+    return line;
   }
 
   static void see(Track& track, GstBuffer* buffer, bool of_events) {
@@ -125,6 +97,5 @@ class AedatPlayer : public Pipeline {
     }
   }
 
-  std::mutex mutex_;
   std::map<std::string, Track> tracks_;
 };

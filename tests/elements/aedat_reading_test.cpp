@@ -55,9 +55,9 @@ TEST(AedatDemux, PutsFramesInSyncWithEvents) {
   const auto events = steady_events(2'000'000, 1'000, of_1970);
   for (const auto& [format, name, size] : formats) {
     const TemporaryFile file(aedat4_with_frames(events, format, 50));
-    AedatPlayer player(file.source());
+    AedatPlayer player(file.source(), {"events_0", "video_0"});
     ASSERT_TRUE(player.play()) << player.error;
-    const auto video = player.track("video_0");
+    const auto& video = player.track("video_0");
     EXPECT_TRUE(contains(video.caps, "format=(string)" + std::string(name)));
     EXPECT_TRUE(contains(video.caps, "width=(int)5, height=(int)3"));
     ASSERT_EQ(video.pictures.size(), 50U);
@@ -77,12 +77,12 @@ TEST(AedatDemux, PutsFramesInSyncWithEvents) {
 TEST(AedatDemux, KeepsSilentStreamsGoing) {
   const auto few = steady_events(10'000, 100);
   const TemporaryFile frames(aedat4_with_frames(few, PixelFormat::grey8, 250));
-  AedatPlayer player(frames.source());
+  AedatPlayer player(frames.source(), {"events_0", "video_0"});
   ASSERT_TRUE(player.play()) << player.error;
   EXPECT_GE(player.track("events_0").end, 9 * GST_SECOND);
   const TemporaryFile events(
       aedat4_with_frames(steady_events(10'000'000, 1'000), PixelFormat::grey8, 2));
-  AedatPlayer other(events.source());
+  AedatPlayer other(events.source(), {"events_0", "video_0"});
   ASSERT_TRUE(other.play()) << other.error;
   EXPECT_GE(other.track("video_0").end, 9 * GST_SECOND);
   EXPECT_LE(other.track("video_0").gaps, 40U);

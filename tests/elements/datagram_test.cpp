@@ -289,14 +289,6 @@ TEST(Depayloader, SaysThatItHearsNothing) {
   }
 }
 
-TEST(Depayloader, GivesEventsWithoutTimesThatOfTheirArrival) {
-  Depay h("format=spif");
-  h.push(datagram({1, 0, 2, 0x80, 1, 0, 3, 0x80}, 7 * GST_MSECOND));
-  h.push(datagram({1, 0, 4, 0x80}, 9 * GST_MSECOND));
-  EXPECT_EQ(pull_events(h),
-            (std::vector{off_at(2, 1, 7000), off_at(3, 1, 7000), off_at(4, 1, 9000)}));
-}
-
 TEST(Depayloader, NeedsArrivalTimesForEventsWithoutTimes) {
   Depay h("format=spif");
   EXPECT_EQ(h.push(datagram({1, 0, 2, 0x80}, GST_CLOCK_TIME_NONE)), GST_FLOW_ERROR);

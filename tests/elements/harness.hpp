@@ -116,12 +116,6 @@ inline guint64 stat_of(GstElement* element, const char* name) {
   return value;
 }
 
-inline void tell_when_freed(GstElement* element, bool& freed) {
-  g_object_weak_ref(
-      G_OBJECT(element), +[](gpointer is_freed, GObject*) { *static_cast<bool*>(is_freed) = true; },
-      &freed);
-}
-
 /// A plane of a video buffer.
 struct Plane {
   gsize offset;

@@ -103,11 +103,16 @@ class Pipeline {
     return wait();
   }
   bool wait() {
-    constexpr auto types = static_cast<GstMessageType>(
-        GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING | GST_MESSAGE_SEGMENT_DONE);
+    constexpr auto types =
+        static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING |
+                                    GST_MESSAGE_SEGMENT_DONE | GST_MESSAGE_LATENCY);
     while (const harness::Owned<GstMessage> message{
         gst_bus_timed_pop_filtered(bus_.get(), 60 * GST_SECOND, types)}) {
       end = GST_MESSAGE_TYPE(message.get());
+      if (end == GST_MESSAGE_LATENCY) {
+        gst_bin_recalculate_latency(GST_BIN(get()));
+        continue;
+      }
       if (end == GST_MESSAGE_EOS || end == GST_MESSAGE_SEGMENT_DONE) return true;
       if (end == GST_MESSAGE_ERROR) {
         error = harness::text_of(message.get());

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/elements/harness.hpp"
+#include "tests/elements/pipeline.hpp"
 
 namespace {
 
@@ -162,32 +162,17 @@ struct View {
 
 /// Plays a camera at 30 frames/s, in real time.
 View show(const std::string& launch, int frames) {
-  gst_init(nullptr, nullptr);
-  const Owned<GstElement> pipeline(gst_parse_launch(
-      ("videotestsrc is-live=true pattern=ball num-buffers=" + std::to_string(frames) +
-       " ! video/x-raw,format=GRAY8,width=64,height=48,framerate=30/1 ! " + launch +
-       " ! fakesink name=sink sync=true qos=true signal-handoffs=true")
-          .c_str(),
-      nullptr));
-  const Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline.get()), "sink"));
+  Pipeline pipeline("videotestsrc is-live=true pattern=ball num-buffers=" + std::to_string(frames) +
+                    " ! video/x-raw,format=GRAY8,width=64,height=48,framerate=30/1 ! " + launch +
+                    " ! fakesink name=sink sync=true qos=true signal-handoffs=true");
   View view;
-  g_signal_connect(sink.get(), "handoff",
+  g_signal_connect(pipeline["sink"], "handoff",
                    G_CALLBACK(+[](GstElement* from, GstBuffer* buffer, GstPad*, View* to) {
                      to->times.push_back(gst_element_get_current_running_time(from));
                      to->ages.push_back(GST_CLOCK_DIFF(GST_BUFFER_PTS(buffer), to->times.back()));
                    }),
                    &view);
-  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
-  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
-  for (bool done = false; !done;) {
-    const Owned<GstMessage> message(gst_bus_timed_pop(bus.get(), 60 * GST_SECOND));
-    EXPECT_TRUE(message);
-    if (message && GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_LATENCY)
-      gst_bin_recalculate_latency(GST_BIN(pipeline.get()));
-    done = !message || GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_EOS ||
-           GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_ERROR;
-  }
-  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
   return view;
 }
 

@@ -88,45 +88,6 @@ TEST_P(EveryApi, MakesTheEventsOfTheCpuWhereNothingIsInterpolated) {
                      settings, frames);
 }
 
-TEST_P(EveryApi, ComputesTheLumaOfColoursBitForBit) {
-  constexpr int width = 61;
-  constexpr int height = 50;
-  const LumaFormat format{width, height, 8};
-  const auto weights = LumaWeights::of(0.2126, 0.0722);
-  const auto ours = gl::make_frame_simulator(context, format);
-  const auto reference = make_frame_simulator(format);
-  std::minstd_rand random(3);
-  Settings settings;
-  settings.positive_threshold = 0;
-  settings.negative_threshold = 0;
-  Texture texture(width, height, 4);
-  ThreadPool threads;
-  for (int i = 0; i < 5; ++i) {
-    std::vector<std::uint8_t> bgra(width * height * 4);
-    for (auto& byte : bgra) byte = static_cast<std::uint8_t>(random() >> 8);
-    Image<std::uint8_t> luma(width, height);
-    luma_of_rgb(RgbView{4,
-                        {bgra.data(), width * 4, 2},
-                        {bgra.data(), width * 4, 1},
-                        {bgra.data(), width * 4, 0}},
-                weights, threads, luma);
-    const bool is_narrow = i == 3;
-    const bool is_opaque = i < 2;
-    if (!is_opaque)
-      composite_on_black({format, luma.view().data, luma.stride(), is_narrow},
-                         {&bgra[3], width * 4, 4}, threads, luma);
-    texture.upload(bgra);
-    const auto* made =
-        gl_test::events_until(*ours,
-                              texture.frame({weights.blue, weights.green, weights.red, 0},
-                                            is_opaque ? -1 : 3, is_narrow ? 16 : 0),
-                              i * scene::frame_time, settings);
-    const auto* expected = reference->push(scene::luma(luma), i * scene::frame_time, settings);
-    if (i == 0) continue;
-    ASSERT_EQ(scene::copy(*made), scene::copy(*expected));
-  }
-}
-
 /// A patch of a texture that moves over a flat background.
 Image<std::uint8_t> patch(int side, int i) {
   auto frame = scene::flat<std::uint8_t>(side, side, 90);
