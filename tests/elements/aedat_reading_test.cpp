@@ -100,24 +100,25 @@ TEST(AedatDemux, SaysWhereTheTableIsWrong) {
   encoder.finish(ignored);
   const auto field_at = encoder.patch().value().position;
 
-  struct Fault {
+  const auto changed = [&](const auto& change) {
+    auto bytes = whole;
+    change(bytes);
+    return bytes;
+  };
+  const struct {
     std::size_t at;
     const char* what;
     Bytes bytes;
-  };
-  auto overwritten = whole;
-  for (auto i = table_at + 8; i < overwritten.size(); ++i) overwritten[i] ^= 0x5a;
-  auto cut = whole;
-  cut.resize(table_at);
-  auto far = whole;
-  far[field_at + 5] = 1;
-  auto near = whole;
-  near[field_at] ^= 0x10;
-  const Fault faults[] = {
-      {table_at, "the packet table that the header states is missing", overwritten},
-      {table_at, "the file ends before its packet table", cut},
-      {field_at, "the header has a wrong position for the packet table", far},
-      {field_at, "the header has a wrong position for the packet table", near}};
+  } faults[] = {
+      {table_at, "the packet table that the header states is missing", changed([&](Bytes& bytes) {
+         for (auto i = table_at + 8; i < bytes.size(); ++i) bytes[i] ^= 0x5a;
+       })},
+      {table_at, "the file ends before its packet table",
+       changed([&](Bytes& bytes) { bytes.resize(table_at); })},
+      {field_at, "the header has a wrong position for the packet table",
+       changed([&](Bytes& bytes) { bytes[field_at + 5] = 1; })},
+      {field_at, "the header has a wrong position for the packet table",
+       changed([&](Bytes& bytes) { bytes[field_at] ^= 0x10; })}};
   for (const auto& fault : faults) {
     const TemporaryFile file(fault.bytes);
     AedatPlayer player(file.source());

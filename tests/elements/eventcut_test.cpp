@@ -157,7 +157,7 @@ TEST(EventCut, StartsOverWhereTheStreamDoes) {
          push_segment(cut.h.get());
        },
        true},
-      {[](Cut& cut) { play_on(cut.h.get(), GST_SECOND); }, true},
+      {[](Cut& cut) { push_segment(cut.h.get(), {.base = GST_SECOND}); }, true},
       {[](Cut& cut) { end_segment(cut.h.get()); }, true},
       {[](Cut& cut) {
          gst_harness_set_src_caps_str(cut.h.get(),

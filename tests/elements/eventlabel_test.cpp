@@ -210,8 +210,8 @@ TEST_F(EventLabel, SkipsImagesWithoutATime) {
   push_image(5 * ms, 3);
   push_eos(images.get());
   EXPECT_EQ(classes(), (Classes{-1, 1}));
-  EXPECT_TRUE(contains(label.text_of_next(GST_MESSAGE_WARNING), "one has no PTS"));
-  EXPECT_EQ(label.text_of_next(GST_MESSAGE_WARNING), "");
+  EXPECT_TRUE(contains(label.warning(), "one has no PTS"));
+  EXPECT_EQ(label.warning(), "");
 }
 
 /// A live source of events, and images that never come.

@@ -76,7 +76,7 @@ TEST_F(FlowJoin, AddsTheFlowThatBeginsWithAFrame) {
   push_frame(40 * ms);
   EXPECT_EQ(joined(), 2.F);
   EXPECT_EQ(last_pts, 40 * ms);
-  EXPECT_EQ(join.text_of_next(GST_MESSAGE_WARNING), "");
+  EXPECT_EQ(join.warning(), "");
 }
 
 TEST_F(FlowJoin, PassesFramesWithoutFlow) {
@@ -84,7 +84,7 @@ TEST_F(FlowJoin, PassesFramesWithoutFlow) {
   push_frame(0);
   push_flow(40 * ms, 1);
   EXPECT_EQ(joined(), none);
-  EXPECT_TRUE(join.text_of_next(GST_MESSAGE_WARNING).starts_with("A frame has no optical flow;"));
+  EXPECT_TRUE(join.warning().starts_with("A frame has no optical flow;"));
   push_frame(40 * ms);
   EXPECT_EQ(joined(), 1.F);
   push_flow(60 * ms, 2);  // of no frame
@@ -99,7 +99,7 @@ TEST_F(FlowJoin, PassesFramesWithoutFlow) {
   push_frame(200 * ms);
   push_flow(200 * ms, 4);
   EXPECT_EQ(joined(), 4.F);
-  EXPECT_EQ(join.text_of_next(GST_MESSAGE_WARNING), "");
+  EXPECT_EQ(join.warning(), "");
 }
 
 TEST_F(FlowJoin, SkipsFlowOfOtherDurations) {
@@ -134,7 +134,7 @@ TEST_F(FlowJoin, GoesOnAfterTheEndOfFlow) {
     push_frame(pts);
     EXPECT_EQ(joined(), none);
   }
-  EXPECT_EQ(join.text_of_next(GST_MESSAGE_WARNING), "") << "no flow begins with the last frame";
+  EXPECT_EQ(join.warning(), "") << "no flow begins with the last frame";
   push_eos(video.get());
   EXPECT_TRUE(pull_until_eos(video.get()).empty());
 }

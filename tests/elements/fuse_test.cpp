@@ -134,7 +134,7 @@ TEST(Fuse, GoesOnWhereSizesChange) {
   fuse.end();
   EXPECT_EQ(fuse.pictures(),
             (std::vector<Picture>{{0, 100, 100}, {20, 125, 100}, {40, 50, 50}, {60, 50, 64}}));
-  EXPECT_EQ(fuse.text_of_next(GST_MESSAGE_WARNING), "");
+  EXPECT_EQ(fuse.warning(), "");
 }
 
 TEST(Fuse, WarnsOfAnotherSensorSize) {
@@ -145,7 +145,7 @@ TEST(Fuse, WarnsOfAnotherSensorSize) {
   fuse.push_events(0, {on(0, 0, 0)}, 40 * ms);
   fuse.end();
   EXPECT_EQ(fuse.pictures(), (std::vector<Picture>{{0, 100, 100}, {20, 100, 100}}));
-  EXPECT_TRUE(contains(fuse.text_of_next(GST_MESSAGE_WARNING), "Insert eventscale"));
+  EXPECT_TRUE(contains(fuse.warning(), "Insert eventscale"));
 }
 
 /// No picture of the pause.

@@ -456,8 +456,8 @@ struct TwoInputs {
     return Owned<GstMessage>(gst_bus_pop_filtered(bus.get(), type));
   }
 
-  /// Text of the next message of this type; empty if none was posted.
-  std::string text_of_next(GstMessageType type) { return text_of(message(type).get()); }
+  /// Text of the next warning, or empty.
+  std::string warning() { return text_of(message(GST_MESSAGE_WARNING).get()); }
 
   /// Waits for an error message, as the source pad has its own thread.
   std::string error() {

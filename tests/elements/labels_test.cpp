@@ -16,7 +16,8 @@ const std::string noisy =
     "exposure-pulse=0.05 exposure-lead=9000000 seed=3 ";
 
 /// Frames of a ball that moves over noise-free grey.
-std::vector<Buffer> simulated(const std::string& launch, const std::string& out_caps) {
+std::vector<Buffer> simulated(const std::string& launch,
+                              const std::string& out_caps = GST_EVENT_CAMERA_MEDIA_TYPE) {
   Harness h(launch);
   h.caps("video/x-raw, format=GRAY8, width=64, height=48, framerate=25/1", out_caps);
   std::vector<Buffer> buffers;
@@ -45,8 +46,8 @@ constexpr std::array names = {"unknown-events",    "light-events",     "leak-eve
                               "shot-noise-events", "hot-pixel-events", "exposure-pulse-events"};
 
 TEST(Labels, AreMadeOnRequestAndChangeNoEvent) {
-  const auto plain = simulated(noisy, GST_EVENT_CAMERA_MEDIA_TYPE);
-  const auto labelled = simulated(noisy + "label=true", GST_EVENT_CAMERA_MEDIA_TYPE);
+  const auto plain = simulated(noisy);
+  const auto labelled = simulated(noisy + "label=true");
   ASSERT_EQ(plain.size(), 7U);
   ASSERT_EQ(labelled.size(), plain.size());
   for (std::size_t i = 0; i < plain.size(); ++i) {
@@ -73,8 +74,7 @@ TEST(Labels, AreNotMadeForDrawnEvents) {
 
 TEST(Labels, AreCountedByEventstats) {
   for (const bool is_labelled : {true, false}) {
-    const auto buffers =
-        simulated(noisy + (is_labelled ? "label=true" : ""), GST_EVENT_CAMERA_MEDIA_TYPE);
+    const auto buffers = simulated(noisy + (is_labelled ? "label=true" : ""));
     const auto expected = counts_of(buffers);
     Harness h("eventstats interval=0");
     h.caps("application/x-event-camera, format=XYTP, width=64, height=48");
@@ -91,14 +91,11 @@ TEST(Labels, AreCountedByEventstats) {
   }
 }
 
-/// A source of these buffers.
-std::string source_of(const std::string& writer) {
-  return "appsrc name=in format=time caps=\"application/x-event-camera, format=XYTP, "
-         "width=64, height=48, framerate=0/1\" ! " +
-         writer;
-}
-
-void play(Pipeline& pipeline, const std::vector<Buffer>& buffers) {
+void write(const std::vector<Buffer>& buffers, const std::string& writer) {
+  Pipeline pipeline(
+      "appsrc name=in format=time caps=\"application/x-event-camera, format=XYTP, width=64, "
+      "height=48, framerate=0/1\" ! " +
+      writer);
   GstFlowReturn flow = GST_FLOW_ERROR;
   for (const auto& buffer : buffers)
     g_signal_emit_by_name(pipeline["in"], "push-buffer", buffer.get(), &flow);
@@ -107,15 +104,14 @@ void play(Pipeline& pipeline, const std::vector<Buffer>& buffers) {
 }
 
 TEST(Labels, AreReadBack) {
-  const auto buffers = simulated(noisy + "label=true", GST_EVENT_CAMERA_MEDIA_TYPE);
+  const auto buffers = simulated(noisy + "label=true");
   guint16 object_class = 0;
   for (const auto& buffer : buffers) {
     auto* meta = gst_buffer_get_event_camera_label_meta(buffer.get());
     for (gsize i = 0; i < meta->n_labels; ++i) meta->labels[i].object_class = object_class += 31;
   }
   const TemporaryFile text;
-  Pipeline writer(source_of("eventcsvenc format=labels" + text.sink()));
-  play(writer, buffers);
+  write(buffers, "eventcsvenc format=labels" + text.sink());
   const auto expected = text.bytes();
   ASSERT_GT(expected.size(), 10'000U);
 
@@ -124,9 +120,7 @@ TEST(Labels, AreReadBack) {
                                          {"eventhdf5sink format=dsec", "eventhdf5dec"}}) {
     const TemporaryFile file;
     const bool is_sink = std::string(encoder).starts_with("eventhdf5sink");
-    Pipeline encoding(
-        source_of(encoder + (is_sink ? " location=" + in_quotes(file.path()) : file.sink())));
-    play(encoding, buffers);
+    write(buffers, encoder + (is_sink ? " location=" + in_quotes(file.path()) : file.sink()));
     EXPECT_TRUE(copied(file, std::string(decoder) + " ! eventcsvenc format=labels") == expected)
         << decoder;
   }

@@ -73,7 +73,6 @@ std::vector<AbsoluteEvent> absolute(const std::vector<Interval>& intervals) {
 
 /// Fields of an RTP packet.
 struct Fields {
-  guint16 sequence_number;
   guint32 timestamp;
   bool marker;
   std::optional<RtpPayloadHeader> header;
@@ -81,7 +80,6 @@ struct Fields {
   explicit Fields(GstBuffer* packet) {
     GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
     EXPECT_TRUE(gst_rtp_buffer_map(packet, GST_MAP_READ, &rtp));
-    sequence_number = gst_rtp_buffer_get_seq(&rtp);
     timestamp = gst_rtp_buffer_get_timestamp(&rtp);
     marker = gst_rtp_buffer_get_marker(&rtp) != FALSE;
     header =

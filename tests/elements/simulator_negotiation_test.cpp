@@ -53,12 +53,9 @@ TEST(Negotiation, AsksUpstreamForTheSizeThatDownstreamWants) {
   }
 }
 
-std::vector<std::string> formats(const char* pad) {
-  return video_formats("eventsim-frame", pad);
-}
-
 class EveryInputFormat : public testing::TestWithParam<std::string> {};
-INSTANTIATE_TEST_SUITE_P(, EveryInputFormat, testing::ValuesIn(formats("sink")),
+INSTANTIATE_TEST_SUITE_P(, EveryInputFormat,
+                         testing::ValuesIn(video_formats("eventsim-frame", "sink")),
                          [](const auto& test) { return test.param; });
 
 /// A step of 100 grey levels on the left half, of 15 on the right; odd sizes and padded rows.
@@ -102,7 +99,7 @@ std::size_t fired_by(const std::string& format, const std::string& colorimetry, 
 /// Input formats whose GstVideoFormatInfo has this flag.
 std::vector<std::string> input_formats(GstVideoFormatFlags flag) {
   std::vector<std::string> names;
-  for (const auto& name : formats("sink"))
+  for (const auto& name : video_formats("eventsim-frame", "sink"))
     if (const auto* info = gst_video_format_get_info(gst_video_format_from_string(name.c_str()));
         (GST_VIDEO_FORMAT_INFO_FLAGS(info) & flag) != 0)
       names.push_back(name);
@@ -179,7 +176,8 @@ TEST(Negotiation, TakesTheWeightsOfColoursFromTheColorimetry) {
 }
 
 class EveryOutputFormat : public testing::TestWithParam<std::string> {};
-INSTANTIATE_TEST_SUITE_P(, EveryOutputFormat, testing::ValuesIn(formats("src")),
+INSTANTIATE_TEST_SUITE_P(, EveryOutputFormat,
+                         testing::ValuesIn(video_formats("eventsim-frame", "src")),
                          [](const auto& test) { return test.param; });
 
 /// ON in the left column, OFF in the right one; palette grey looks the same in every format.
