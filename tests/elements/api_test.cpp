@@ -23,10 +23,14 @@ Bytes bytes_of(const std::vector<Record>& records) {
   return Bytes(g_bytes_new(records.data(), records.size() * sizeof(Record)));
 }
 
+class Api : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { gst_init(nullptr, nullptr); }
+};
+
 /* events */
 
-TEST(EventCamera, MapsEventsAtAnyAddress) {
-  gst_init(nullptr, nullptr);
+TEST_F(Api, MapsEventsAtAnyAddress) {
   const guint8 bytes[] = {0, 1, 0, 0, 0, 2, 0, 3, 0x80};
   GstBuffer* whole = gst_buffer_new_memdup(bytes, sizeof bytes);
   GstBuffer* odd = gst_buffer_copy_region(whole, GST_BUFFER_COPY_MEMORY, 1, 8);
@@ -50,8 +54,7 @@ TEST(EventCamera, MapsEventsAtAnyAddress) {
   gst_buffer_unref(whole);
 }
 
-TEST(EventCamera, ReadsAndWritesCaps) {
-  gst_init(nullptr, nullptr);
+TEST_F(Api, ReadsAndWritesCaps) {
   const auto read = [](const char* text, GstEventCameraInfo* info) {
     Owned<GstCaps> caps(gst_caps_from_string(text));
     return gst_event_camera_info_from_caps(info, caps.get()) == TRUE;
@@ -83,10 +86,9 @@ TEST(EventCamera, ReadsAndWritesCaps) {
 
 /* labels */
 
-class LabelMeta : public testing::Test {
+class LabelMeta : public Api {
  protected:
   static constexpr gsize count = 5;
-  static void SetUpTestSuite() { gst_init(nullptr, nullptr); }
 
   /// Events 0 ... 4, whose labels have their index as class and cause.
   static Buffer labelled_buffer() {
@@ -171,11 +173,10 @@ TEST_F(LabelMeta, IsReadAndWrittenAsBytes) {
 
 /* optical flow */
 
-class FlowMeta : public testing::Test {
+class FlowMeta : public Api {
  protected:
   static constexpr guint width = 4;
   static constexpr guint height = 3;
-  static void SetUpTestSuite() { gst_init(nullptr, nullptr); }
 
   /// The numbers `first`, `first` + 1 ...
   static Bytes numbers(float first, gsize count) {
@@ -280,12 +281,7 @@ TEST_F(FlowMeta, RefusesOtherSizes) {
 
 /* triggers and IMU samples */
 
-class SensorData : public testing::Test {
- protected:
-  static void SetUpTestSuite() { gst_init(nullptr, nullptr); }
-};
-
-TEST_F(SensorData, TriggersAreCarriedByASerializedEvent) {
+TEST_F(Api, TriggersAreCarriedByASerializedEvent) {
   const auto triggers = bytes_of<GstEventCameraTrigger>({{-1, 2, 1}, {3, 4, 0}});
   const Owned<GstEvent> event(gst_event_new_event_camera_triggers(triggers.get()));
   EXPECT_EQ(GST_EVENT_TYPE(event.get()), GST_EVENT_CUSTOM_DOWNSTREAM);  // serialized
@@ -296,7 +292,7 @@ TEST_F(SensorData, TriggersAreCarriedByASerializedEvent) {
   EXPECT_EQ(gst_event_get_event_camera_triggers(other.get()), nullptr);
 }
 
-TEST_F(SensorData, ImuSamplesAreCarriedByASerializedEvent) {
+TEST_F(Api, ImuSamplesAreCarriedByASerializedEvent) {
   const auto samples =
       bytes_of<GstEventCameraImuSample>({{7, 20.5F, {1, 2, 3}, {4, 5, 6}, {7, 8, 9}}});
   const Owned<GstEvent> event(gst_event_new_event_camera_imu_samples(samples.get()));
@@ -306,7 +302,7 @@ TEST_F(SensorData, ImuSamplesAreCarriedByASerializedEvent) {
   EXPECT_EQ(gst_event_get_event_camera_triggers(event.get()), nullptr);
 }
 
-TEST_F(SensorData, ReadingSkipsAPartialRecordAndAligns) {
+TEST_F(Api, ReadingSkipsAPartialRecordAndAligns) {
   std::vector<std::byte> memory(1 + 16 + 15);
   memory[1] = std::byte{5};
   const Bytes odd(g_bytes_new_static(memory.data() + 1, 16 + 15));
@@ -326,7 +322,7 @@ TEST_F(SensorData, ReadingSkipsAPartialRecordAndAligns) {
   EXPECT_EQ(g_bytes_get_size(none.get()), 0U);
 }
 
-TEST_F(SensorData, RefusesPartialRecords) {
+TEST_F(Api, RefusesPartialRecords) {
   const auto fatal = g_log_set_always_fatal(static_cast<GLogLevelFlags>(G_LOG_FATAL_MASK));
   const auto partial = bytes_of<guint64>({1, 2, 3});
   EXPECT_EQ(gst_event_new_event_camera_triggers(partial.get()), nullptr);

@@ -61,34 +61,18 @@ GstBuffer* jaer(guint32 number, guint32 t, GstClockTime arrival) {
   return datagram(bytes, arrival);
 }
 
-struct Format {
-  const char* name;
-  const char* properties;
-  bool has_times = true;
-};
-
-void PrintTo(const Format& format, std::ostream* out) {
-  *out << format.name;
-}
-
-const Format formats[] = {
-    {"spif", "format=spif", false},
-    {"spif_big_endian", "format=spif byte-order=big-endian", false},
-    {"spif_timestamps", "format=spif-timestamps"},
-    {"spif_timestamps_big_endian", "format=spif-timestamps byte-order=big-endian"},
-    {"t64", "format=t64-x16-y16-on8"},
-    {"t32", "format=t32-x16-y15-on1"},
-    {"es", "format=es"},
-    {"jaer", "format=jaer"},
-    {"jaer_without_number", "format=jaer sequence-number=false"},
-};
-
-class EveryFormat : public testing::TestWithParam<Format> {};
-INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats),
-                         [](const auto& tested) { return std::string(tested.param.name); });
+class EveryFormat : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EveryFormat,
+                         testing::Values("format=spif", "format=spif byte-order=big-endian",
+                                         "format=spif-timestamps",
+                                         "format=spif-timestamps byte-order=big-endian",
+                                         "format=t64-x16-y16-on8", "format=t32-x16-y15-on1",
+                                         "format=es", "format=jaer",
+                                         "format=jaer sequence-number=false"));
 
 TEST_P(EveryFormat, BringsEveryEvent) {
-  const std::string properties = GetParam().properties;
+  const std::string properties = GetParam();
+  const bool has_times = !properties.starts_with("format=spif") || contains(properties, "stamps");
   Harness h("eventdatagrampay " + properties + " ! eventdatagramdepay " + properties + depay_size);
   h.caps(events_caps);
   const auto sent = stream(50'000);
@@ -100,7 +84,7 @@ TEST_P(EveryFormat, BringsEveryEvent) {
     ASSERT_EQ(received[i].x, sent[i].x);
     ASSERT_EQ(received[i].y_p, sent[i].y_p);
     // Without times, it is that of the datagram.
-    const auto earliest = GetParam().has_times ? sent[i].t : sent[i].t - 5000;
+    const auto earliest = has_times ? sent[i].t : sent[i].t - 5000;
     ASSERT_LE(received[i].t, sent[i].t);
     ASSERT_GE(received[i].t, earliest);
   }

@@ -73,10 +73,6 @@ struct Case {
   Texts windows;
 };
 
-void PrintTo(const Case& test, std::ostream* out) {
-  *out << test.name;
-}
-
 const std::vector<Case> cases = {
     {"RisingEdges",
      "",
