@@ -166,9 +166,8 @@ TEST_P(EveryApi, FollowsAMovingObjectAsTheCpuDoes) {
         for (int x = 0; x < object.width(); ++x)
           frame.at(80 + 2 * i + x, 60 + i + y) = object.at(x, y);
       const auto time = i * scene::frame_time;
-      texture.upload(gl_test::bytes_of(frame));
       const auto* made =
-          gl_test::events_until(*ours, texture.frame({gl_test::one, 0, 0, 0}), time, settings);
+          gl_test::events_until(*ours, texture.show(gl_test::bytes_of(frame)), time, settings);
       const auto* expected = reference->push(scene::luma(frame), time, settings);
       if (i == 0) continue;
       const auto events = scene::copy(*made);

@@ -36,7 +36,6 @@ namespace {
 using namespace eventcamera;
 using gl_test::bytes_of;
 using gl_test::EveryApi;
-using gl_test::one;
 using gl_test::Texture;
 
 INSTANTIATE_TEST_SUITE_P(, EveryApi, testing::Bool(), gl_test::name_of_api);
@@ -67,10 +66,9 @@ class Comparison {
 
   void push(const Image<std::uint8_t>& frame, Nanoseconds time,
             const std::optional<ImageView<Flow>>& flow = {}) {
-    texture_.upload(bytes_of(frame));
     const auto start = ours_->last_time().value_or(time);
     ours_->set_flow(flow);
-    const auto* made = gl_test::events_until(*ours_, texture_.frame({one, 0, 0, 0}), time, common);
+    const auto* made = gl_test::events_until(*ours_, texture_.show(bytes_of(frame)), time, common);
     const auto* wanted = reference_->push(scene::luma(frame), time, common, flow);
     if (wanted != nullptr) {
       const auto size = static_cast<double>(wanted->size());
@@ -82,8 +80,7 @@ class Comparison {
 
   /// Drops an interval before its events are read, and starts over.
   void restart_after(const Image<std::uint8_t>& frame, Nanoseconds time) {
-    texture_.upload(bytes_of(frame));
-    ours_->queue(texture_.frame({one, 0, 0, 0}), time, common);
+    ours_->queue(texture_.show(bytes_of(frame)), time, common);
     ours_->drop();
     ours_->reset();
     reference_->reset();

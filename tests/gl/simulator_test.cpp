@@ -6,13 +6,11 @@
 #include <bit>
 #include <cmath>
 #include <memory>
-#include <random>
 #include <span>
 #include <thread>
 #include <utility>
 #include <vector>
 
-#include "src/core/luma.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/gl/kernels.hpp"
 #include "src/gl/point_tracker.hpp"
@@ -31,7 +29,6 @@ using gl_test::bytes_of;
 using gl_test::EglContext;
 using gl_test::EveryApi;
 using gl_test::matched;
-using gl_test::one;
 using gl_test::Texture;
 
 INSTANTIATE_TEST_SUITE_P(, EveryApi, testing::Bool(), gl_test::name_of_api);
@@ -43,8 +40,7 @@ void expect_same_events(gl::Simulator& ours, Simulator& reference, const Setting
   Nanoseconds time = 5;
   std::size_t events = 0;
   for (const auto& frame : frames) {
-    texture.upload(bytes_of(frame));
-    const auto* made = gl_test::events_until(ours, texture.frame({one, 0, 0, 0}), time, settings);
+    const auto* made = gl_test::events_until(ours, texture.show(bytes_of(frame)), time, settings);
     const auto* expected = reference.push(scene::luma(frame), time, settings);
     ASSERT_EQ(made == nullptr, expected == nullptr);
     if (made != nullptr) {
@@ -109,10 +105,9 @@ TEST_P(EveryApi, InterpolatesMoreStepsThanItProcessesAtOnce) {
                                 : gl::make_diff_simulator(context, format);
     const auto reference = is_sparse ? make_sparse_simulator(format) : make_diff_simulator(format);
     for (int i = is_sparse ? 1 : 0; i < 3; ++i) {  // diff interpolates from the third frame on
-      texture.upload(bytes_of(patch(side, i)));
       const auto time = i * scene::frame_time;
       const auto* made =
-          gl_test::events_until(*ours, texture.frame({one, 0, 0, 0}), time, settings);
+          gl_test::events_until(*ours, texture.show(bytes_of(patch(side, i))), time, settings);
       const auto* expected = reference->push(scene::luma(patch(side, i)), time, settings);
       if (i < 2) continue;
       const auto events = scene::copy(*made);
@@ -156,8 +151,8 @@ TEST_P(EveryApi, DrawsItsEventsAsTheCpuDoes) {
       settings.positive_threshold = 3;
       settings.negative_threshold = 4;
       for (int i = 0; i < 4; ++i) {
-        texture.upload(bytes_of(scene::texture<std::uint8_t>(width, height, 8, 1.7 * i, 0.6 * i)));
-        const auto frame = texture.frame({one, 0, 0, 0});
+        const auto frame = texture.show(
+            bytes_of(scene::texture<std::uint8_t>(width, height, 8, 1.7 * i, 0.6 * i)));
         const Nanoseconds time = i * scene::frame_time;
         drawing->draw(frame, time, settings,
                       {picture.name(), pixels_by_kind(colours, {.bytes = 4})});
@@ -224,15 +219,20 @@ TEST_P(EveryApi, TracksPointsAsTheCpuDoes) {
   }
 }
 
+/// What work() throws; empty for nothing.
+std::string error_of(const auto& work) {
+  try {
+    work();
+  } catch (const gl::Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
 TEST(Context, NamesWhatIsMissing) {
   const EglContext current(true);
-  const auto message = [](const gl::Context::Load& load) -> std::string {
-    try {
-      const gl::Context context(load);
-    } catch (const gl::Error& error) {
-      return error.what();
-    }
-    return "";
+  const auto message = [](const gl::Context::Load& load) {
+    return error_of([&] { const gl::Context context(load); });
   };
   EXPECT_EQ(message(gl_test::load), "");
   EXPECT_EQ(message([](const char* name) -> void* {
@@ -269,8 +269,7 @@ TEST(Simulator, LeavesNoDataOfEglInAThreadThatWaits) {
   const gl::Context context(load_counting_releases);
   const auto simulator = gl::make_frame_simulator(context, {64, 48, 8});
   Texture texture(64, 48, 1);
-  texture.upload(bytes_of(scene::noise<std::uint8_t>(64, 48, 8, 1)));
-  simulator->queue(texture.frame({one, 0, 0, 0}), 0, {});
+  simulator->queue(texture.show(bytes_of(scene::noise<std::uint8_t>(64, 48, 8, 1))), 0, {});
   releases = 0;
   simulator->wait();  // this thread keeps its context
   EXPECT_EQ(releases, 0);
@@ -340,14 +339,6 @@ TEST_P(EveryFence, ReportsALostContext) {
   Texture texture(33, 21, 1);
   Texture picture(33, 21, 4);
   picture.upload(std::vector<std::uint8_t>(33 * 21 * 4));
-  const auto message = [](const auto& work) -> std::string {
-    try {
-      work();
-    } catch (const gl::Error& error) {
-      return error.what();
-    }
-    return "none";
-  };
   for (const auto make :
        {gl::make_frame_simulator, gl::make_sparse_simulator, gl::make_diff_simulator}) {
     for (const auto& [what, expected] : losses) {
@@ -356,8 +347,7 @@ TEST_P(EveryFence, ReportsALostContext) {
         const auto simulator = make(context, format);
         int i = 0;
         const auto push = [&] {
-          texture.upload(bytes_of(scene::noise<std::uint8_t>(33, 21, 8, ++i)));
-          const auto frame = texture.frame({one, 0, 0, 0});
+          const auto frame = texture.show(bytes_of(scene::noise<std::uint8_t>(33, 21, 8, ++i)));
           if (draws) {
             simulator->draw(frame, i * scene::frame_time, {}, {picture.name(), {}});
             simulator->drop();
@@ -368,32 +358,29 @@ TEST_P(EveryFence, ReportsALostContext) {
         push();
         push();
         loss = what;
-        EXPECT_EQ(message(push), expected);
+        EXPECT_EQ(error_of(push), expected);
         loss = Loss::none;
         while (context.GetError() != GL_NO_ERROR) continue;  // a buffer was not mapped
       }
     }
   }
   loss = Loss::reset;
-  EXPECT_EQ(message([&] { const gl::Kernel kernel(context, "wrong", "wrong"); }), lost);
+  EXPECT_EQ(error_of([&] { const gl::Kernel kernel(context, "wrong", "wrong"); }), lost);
   loss = Loss::error;
-  EXPECT_EQ(message([&] { context.forget_errors(); }), lost);
+  EXPECT_EQ(error_of([&] { context.forget_errors(); }), lost);
   loss = Loss::none;
 }
 
 TEST(Kernel, ReportsWhatTheCompilerSays) {
   const EglContext current(true);
   const gl::Context context(gl_test::load);
-  try {
+  const auto text = error_of([&] {
     const gl::Kernel kernel(context, "wrong",
                             "layout(local_size_x = 1) in; void main() { x = 1; }");
-    FAIL();
-  } catch (const gl::Error& error) {
-    const std::string text = error.what();
-    EXPECT_TRUE(text.starts_with("the driver cannot compile the compute shader 'wrong': "));
-    EXPECT_TRUE(text.find("undeclared") != text.npos || text.find("undefined") != text.npos)
-        << text;  // the words of Mesa and of NVIDIA
-  }
+  });
+  EXPECT_TRUE(text.starts_with("the driver cannot compile the compute shader 'wrong': "));
+  EXPECT_TRUE(text.find("undeclared") != text.npos || text.find("undefined") != text.npos)
+      << text;  // the words of Mesa and of NVIDIA
 }
 
 }  // namespace
