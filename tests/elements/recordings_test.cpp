@@ -82,8 +82,8 @@ TEST(CompressedRecordings, AreReadUpToWhereTheyAreCut) {
     ASSERT_TRUE(player.play()) << player.error;
     EXPECT_GT(player.events.size(), 10'000U);
     ASSERT_EQ(player.warnings.size(), 1U);
-    EXPECT_TRUE(contains(player.warnings.front(),
-                         "corrupt or cut short at byte " + std::to_string(cut.size())));
+    EXPECT_TRUE(harness::contains(player.warnings.front(),
+                                  "corrupt or cut short at byte " + std::to_string(cut.size())));
   }
 }
 
