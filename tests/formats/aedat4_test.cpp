@@ -24,61 +24,13 @@
 namespace {
 
 using namespace eventcamera;
-using aedat_files::Bytes;
+using recordings::Bytes;
+using recordings::decode;
 
 constexpr Microseconds hour = 3'600'000'000;
 constexpr std::array compressions{Aedat4Compression::none, Aedat4Compression::lz4,
                                   Aedat4Compression::lz4_high, Aedat4Compression::zstd,
                                   Aedat4Compression::zstd_high};
-
-struct Picture {
-  Frame frame;
-  Bytes pixels;
-};
-
-/// Complete output of a decoder.
-struct Contents {
-  std::vector<std::vector<AbsoluteEvent>> events;  ///< by stream
-  std::vector<Picture> frames;
-  std::vector<Trigger> triggers;
-  std::vector<ImuSample> imu_samples;
-  std::size_t items = 0;
-};
-
-void take(Aedat4Decoder& decoder, Contents& out) {
-  const auto append = [](const auto& some, auto& all) {
-    all.insert(all.end(), some.begin(), some.end());
-  };
-  while (const auto item = decoder.next()) {
-    ++out.items;
-    out.events.resize(decoder.streams().size());
-    if (const auto* events = std::get_if<EventItem>(&*item)) {
-      append(events->events, out.events[events->stream]);
-    } else if (const auto* picture = std::get_if<FrameItem>(&*item)) {
-      const auto& frame = picture->frame;
-      out.frames.push_back({frame, {frame.pixels, frame.pixels + frame.stride * frame.height}});
-    } else if (const auto* triggers = std::get_if<TriggerItem>(&*item)) {
-      append(triggers->triggers, out.triggers);
-    } else {
-      append(std::get<ImuItem>(*item).samples, out.imu_samples);
-    }
-  }
-}
-
-Contents decoded(Aedat4Decoder& decoder, std::span<const std::uint8_t> bytes,
-                 std::size_t piece = SIZE_MAX) {
-  Contents contents;
-  for (const auto part : recordings::pieces_of(bytes, piece)) {
-    // Pushed bytes are invalid once they have been read.
-    const Bytes copy(part.begin(), part.end());
-    decoder.push(copy);
-    take(decoder, contents);
-  }
-  decoder.drain();
-  take(decoder, contents);
-  contents.events.resize(decoder.streams().size());
-  return contents;
-}
 
 Bytes encoded(const Aedat4Settings& settings, std::span<const AbsoluteEvent> events) {
   Aedat4Encoder encoder(settings);
@@ -103,14 +55,14 @@ TEST(Aedat4, ReadsBackWhatItWrites) {
             recordings::random_events(size, size.width == 1 ? 0 : 10'000, ++seed, -5, 200 * hour);
         const auto bytes = encoded({size, "made", compression, false, table}, events);
         Aedat4Decoder decoder;
-        const auto contents = decoded(decoder, bytes);
+        const auto contents = decode(decoder, bytes);
         ASSERT_EQ(decoder.streams().size(), 1U);
         EXPECT_EQ(decoder.streams()[0].size, size);
         EXPECT_EQ(decoder.streams()[0].source, "made");
         EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
         EXPECT_EQ(decoder.corruption().outside, 0U);
         EXPECT_EQ(decoder.table_at().has_value(), table);
-        ASSERT_TRUE(contents.events[0] == events);
+        ASSERT_TRUE(contents.events == events);
       }
 }
 
@@ -130,21 +82,21 @@ TEST(Aedat4, FramesOfEveryFormatAmongEvents) {
     encoder.encode(std::span(events).subspan(50), bytes);
     encoder.finish(bytes);
     Aedat4Decoder decoder;
-    const auto contents = decoded(decoder, bytes);
+    const auto contents = decode(decoder, bytes);
     ASSERT_EQ(decoder.streams().size(), 2U);
     EXPECT_EQ(decoder.streams()[1].kind, StreamKind::frames);
     EXPECT_EQ(decoder.streams()[1].source, "a \"<camera>\" & more");
-    EXPECT_TRUE(contents.events[0] == events);
-    ASSERT_EQ(contents.frames.size(), 1U);
+    EXPECT_TRUE(contents.events == events);
+    ASSERT_EQ(contents.pictures.size(), 1U);
     const auto numbers = [](const Frame& some) {
       return std::tuple(some.t, some.begin, some.end, some.exposure_begin, some.exposure_end,
                         some.format, some.x, some.y, some.width, some.height);
     };
-    ASSERT_EQ(numbers(contents.frames[0].frame), numbers(frame));
+    ASSERT_EQ(numbers(contents.pictures[0].frame), numbers(frame));
     const auto row = static_cast<std::size_t>(13 * bytes_per_pixel(format));
     for (std::size_t y = 0; y < 50; ++y)
       EXPECT_EQ(
-          std::memcmp(contents.frames[0].pixels.data() + y * row, pixels.data() + y * 64, row), 0);
+          std::memcmp(contents.pictures[0].pixels.data() + y * row, pixels.data() + y * 64, row), 0);
   }
 }
 
@@ -172,7 +124,7 @@ TEST(Aedat4, EveryTriggerSource) {
   for (int source = 0; source < 10; ++source) sources.push_back({1000 + source, source});
   aedat_files::add_packet(bytes, 3, aedat_files::triggers_content(sources));
   Aedat4Decoder decoder;
-  EXPECT_EQ(decoded(decoder, bytes).triggers, triggers);
+  EXPECT_EQ(decode(decoder, bytes).triggers, triggers);
   EXPECT_EQ(decoder.streams()[0].kind, StreamKind::triggers);
   EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
 }
@@ -194,7 +146,7 @@ TEST(Aedat4, KeepsTriggersAndImuSamples) {
     EXPECT_EQ(encoder.encode(std::span<const ImuSample>(samples), bytes), samples.size());
     encoder.finish(bytes);
     Aedat4Decoder decoder;
-    const auto contents = decoded(decoder, bytes);
+    const auto contents = decode(decoder, bytes);
     EXPECT_EQ(contents.triggers, triggers);
     EXPECT_EQ(contents.imu_samples, samples);
     ASSERT_EQ(decoder.streams().size(), 3U);
@@ -218,13 +170,13 @@ TEST(Aedat4, AlignmentMayCountFromAnywhere) {
     auto bytes = aedat_files::aedat4_header("", 0, 5000, off_by);
     aedat_files::add_packet(bytes, 7, aedat_files::triggers_content(sources, off_by));
     Aedat4Decoder decoder;
-    EXPECT_EQ(decoded(decoder, bytes).triggers,
+    EXPECT_EQ(decode(decoder, bytes).triggers,
               (std::vector<Trigger>{{1000, 0, true}, {1001, 0, false}}));
     EXPECT_EQ(decoder.table_at(), 5000U);
     EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
 
     Aedat4Decoder of_xml;
-    decoded(of_xml, aedat_files::aedat4_header(aedat_files::xml_of_one_stream, 0, -1, off_by));
+    decode(of_xml, aedat_files::aedat4_header(aedat_files::xml_of_one_stream, 0, -1, off_by));
     ASSERT_EQ(of_xml.streams().size(), 1U);
     EXPECT_EQ(of_xml.streams()[0].size, (SensorSize{346, 260}));
 
@@ -247,7 +199,7 @@ TEST(Aedat4, EventsOutsideOrWithoutATimeAreCountedAndUnsortedOnesKept) {
   auto bytes = aedat_files::aedat4_header(aedat_files::xml_of_one_stream);
   aedat_files::add_packet(bytes, 0, aedat_files::events_content(events));
   Aedat4Decoder decoder;
-  EXPECT_TRUE(decoded(decoder, bytes).events[0] ==
+  EXPECT_TRUE(decode(decoder, bytes).events ==
               (std::vector{events[0], events[3], events[5], events[8]}));
   EXPECT_EQ(decoder.corruption().outside, 3U);
   EXPECT_EQ(decoder.corruption().places, 2U) << "impossible times";
@@ -268,7 +220,7 @@ TEST(Aedat4, WhatIsNotAedat4IsRefused) {
                     std::string(3 + static_cast<std::size_t>(size), '\0'));
   for (const auto& text : texts) {
     Aedat4Decoder decoder;
-    EXPECT_THROW(decoded(decoder, recordings::bytes_of(text)), UnsupportedFormat) << text;
+    EXPECT_THROW(decode(decoder, recordings::bytes_of(text)), UnsupportedFormat) << text;
   }
 }
 
@@ -286,9 +238,9 @@ TEST(Aedat4, AnXmlCutAnywhereOrCorruptLosesNoStream) {
     aedat_files::add_packet(bytes, 0, aedat_files::events_content(events));
     aedat_files::add_packet(bytes, 1, aedat_files::triggers_content(sources));
     Aedat4Decoder decoder;
-    const auto found = decoded(decoder, bytes);
-    ASSERT_EQ(found.events.size(), 2U);
-    EXPECT_TRUE(found.events[0] == events);
+    const auto found = decode(decoder, bytes);
+    ASSERT_EQ(decoder.streams().size(), 2U);
+    EXPECT_TRUE(found.events == events);
     EXPECT_EQ(found.triggers.size(), 2U);
     EXPECT_EQ(decoder.corruption().places, text.empty() || text == xml ? 0U : 1U);
   }
@@ -303,7 +255,7 @@ TEST(Aedat4, HostileXmlTakesTimeInProportion) {
   for (const auto& xml : {"<dv><node " + repeated(" x=''") + "/></dv>",
                           "<dv>" + repeated("<node>") + repeated("</node>") + "</dv>"}) {
     Aedat4Decoder decoder;
-    decoded(decoder, aedat_files::aedat4_header(xml));
+    decode(decoder, aedat_files::aedat4_header(xml));
     EXPECT_EQ(decoder.corruption().places, 0U);
   }
 }
@@ -313,7 +265,7 @@ TEST(Aedat4, EntitiesThatTheXmlDeclaresAreNotExpanded) {
   xml += aedat_files::xml_of_one_stream;
   xml.insert(xml.find("<attr key=\"sizeX"), "<attr key='source'>&many; &#65;</attr>");
   Aedat4Decoder decoder;
-  decoded(decoder, aedat_files::aedat4_header(xml));
+  decode(decoder, aedat_files::aedat4_header(xml));
   ASSERT_EQ(decoder.streams().size(), 1U);
   EXPECT_EQ(decoder.streams()[0].source, "&many; A");
   EXPECT_EQ(decoder.corruption().places, 0U);
@@ -326,7 +278,7 @@ TEST(Aedat4, ASizeOfWhichOneSideIsMissingIsNone) {
   const std::vector events{AbsoluteEvent::at(400, 300, 1000, Polarity::on)};
   aedat_files::add_packet(bytes, 0, aedat_files::events_content(events));
   Aedat4Decoder decoder;
-  EXPECT_TRUE(decoded(decoder, bytes).events[0] == events);
+  EXPECT_TRUE(decode(decoder, bytes).events == events);
   EXPECT_EQ(decoder.streams()[0].size, SensorSize{});
 }
 
@@ -336,7 +288,7 @@ TEST(Aedat4, ATableFoundWhereTheHeaderNamesNoneIsNoCorruption) {
     const auto events = some_events(9000);
     const auto bytes = recordings::encode(encoder, events);  // without patching the header
     Aedat4Decoder decoder;
-    EXPECT_TRUE(decoded(decoder, bytes, 100).events[0] == events);
+    EXPECT_TRUE(decode(decoder, bytes, 100).events == events);
     EXPECT_FALSE(decoder.table_at());
     EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
   }
@@ -345,7 +297,7 @@ TEST(Aedat4, ATableFoundWhereTheHeaderNamesNoneIsNoCorruption) {
 /// Positions of the packet headers, and of the end.
 std::vector<std::size_t> packets_of(std::span<const std::uint8_t> bytes) {
   Aedat4Decoder decoder;
-  decoded(decoder, bytes);
+  decode(decoder, bytes);
   const auto end = decoder.table_at().value_or(bytes.size());
   std::vector<std::size_t> found;
   for (std::size_t at = decoder.packets_at(); at < end;
@@ -370,8 +322,8 @@ TEST(Aedat4, ABrokenPacketIsLostAndNoOther) {
                        expected.begin() + std::min(4096 * (lost + 1), 20'000));
         for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1000}}) {
           Aedat4Decoder decoder;
-          const auto contents = decoded(decoder, bytes, piece);
-          EXPECT_TRUE(contents.events[0] == expected);
+          const auto contents = decode(decoder, bytes, piece);
+          EXPECT_TRUE(contents.events == expected);
           EXPECT_EQ(decoder.corruption().places, 1U) << decoder.corruption().first;
           EXPECT_EQ(decoder.corruption().first_at, at[static_cast<std::size_t>(lost)]);
         }
@@ -405,7 +357,7 @@ TEST(Aedat4, BytesBetweenPacketsAreSkipped) {
     const Bytes noise(333, 0xa5);
     bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(at[1]), noise.begin(), noise.end());
     Aedat4Decoder decoder;
-    EXPECT_TRUE(decoded(decoder, bytes, 50).events[0] == events);
+    EXPECT_TRUE(decode(decoder, bytes, 50).events == events);
     EXPECT_EQ(decoder.corruption().places, 1U);
     EXPECT_EQ(decoder.corruption().first_at, at[1]);
   }
@@ -423,7 +375,7 @@ TEST(Aedat4, BombsAreCappedAndSkipped) {
     aedat_files::add_packet(bytes, 0, bomb);
     aedat_files::add(bytes, packet);
     Aedat4Decoder decoder;
-    EXPECT_EQ(decoded(decoder, bytes).events[0].size(), 2000U);
+    EXPECT_EQ(decode(decoder, bytes).events.size(), 2000U);
     EXPECT_EQ(decoder.corruption().places, 1U);
   }
 }
@@ -449,7 +401,7 @@ TEST(Aedat4, PacketsWithinPacketsTakeNoTimeToSpeakOf) {
       }
     }
     Aedat4Decoder decoder;
-    EXPECT_EQ(decoded(decoder, bytes).items, 0U);
+    EXPECT_TRUE(decode(decoder, bytes).events.empty());
     EXPECT_GE(decoder.corruption().places, 1U);
   }
 }
@@ -500,18 +452,18 @@ TEST(Aedat4, ARecordingOfADavis346) {
   const auto bytes = shared_data::events_file("davis346-frames-events-imu.aedat4");
   if (bytes.empty()) GTEST_SKIP() << "no davis346-frames-events-imu.aedat4 in $SHARED_DATA";
   Aedat4Decoder decoder;
-  const auto contents = decoded(decoder, bytes, 0);
+  const auto contents = decode(decoder, bytes, 0);
   ASSERT_EQ(decoder.streams().size(), 4U);
   EXPECT_EQ(decoder.streams()[0].size, (SensorSize{346, 260}));
   EXPECT_EQ(decoder.streams()[0].source, "DAVIS346_00000104");
-  EXPECT_EQ(contents.events[0].size(), 117'667U);
-  EXPECT_EQ(std::ranges::count(contents.events[0], Polarity::on, &AbsoluteEvent::polarity), 72'363);
-  ASSERT_EQ(contents.frames.size(), 3U);
+  EXPECT_EQ(contents.events.size(), 117'667U);
+  EXPECT_EQ(std::ranges::count(contents.events, Polarity::on, &AbsoluteEvent::polarity), 72'363);
+  ASSERT_EQ(contents.pictures.size(), 3U);
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto& frame = contents.frames[i].frame;
+    const auto& frame = contents.pictures[i].frame;
     EXPECT_EQ((SensorSize{frame.width, frame.height}), (SensorSize{346, 260}));
     EXPECT_EQ(frame.format, PixelFormat::grey8);
-    EXPECT_EQ(frame.t - contents.frames[0].frame.t, static_cast<Microseconds>(i) * 40'000);
+    EXPECT_EQ(frame.t - contents.pictures[0].frame.t, static_cast<Microseconds>(i) * 40'000);
   }
   EXPECT_EQ(contents.triggers.size(), 15U);
   ASSERT_EQ(contents.imu_samples.size(), 130U);

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Writes ROS bags from the specifications of their formats, without this project's code:
   bag_files.py DIRECTORY
-The events are in events.bin (int64 t, uint16 x, y, p), the frames in frames.bin (int64 t, uint8
-value of all pixels).
+The events are in events.lines (t x y p), the frames in frames.lines (t and the value of all pixels).
 
 mcap.dev/spec; wiki.ros.org/Bags/Format/2.0; github.com/ros2/rosbag2 (rosbag2_storage_sqlite3)."""
 import bz2
@@ -346,12 +345,8 @@ def write_db3(path, all_messages, topics):
 
 def main():
     folder = Path(sys.argv[1])
-    with open(folder / "events.bin", "wb") as file:
-        for event in EVENTS:
-            file.write(struct.pack("<qHHH", *event))
-    with open(folder / "frames.bin", "wb") as file:
-        for frame in FRAMES:
-            file.write(struct.pack("<qB", *frame))
+    for name, rows in ("events", EVENTS), ("frames", FRAMES):
+        (folder / f"{name}.lines").write_text("".join(" ".join(map(str, row)) + "\n" for row in rows))
     for name, kind, encoding, image in [("evt3", "packet", "evt3", "mono8"), ("mono", "packet", "mono", "rgb8"),
                                         ("libcaer", "packet", "libcaer", "mono8"),
                                         ("libcaer_cmp", "packet", "libcaer_cmp", "mono8"),

@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Holds our tables of events against NumPy and h5py: what we write they read, what they write we
 read. other_readers.py TABLE_FILES"""
+import collections
 import io
 import pathlib
 import resource
+import struct
 import subprocess
 import sys
 import tempfile
@@ -19,6 +21,9 @@ RAW = np.dtype({'names': ['t', 'x', 'y_p'], 'formats': ['<i8', '<u2', '<u2'],
                 'offsets': [0, 8, 10], 'itemsize': 16})
 TABLE_FILES = sys.argv.pop(1)
 WIDTH, HEIGHT = 1280, 720
+SECONDS, NANOSECONDS = 0, 3  # of TimeUnit
+
+Report = collections.namedtuple('Report', 'places first_at outside size last_time rest')
 
 
 def random_events(count, seed, last=20_000_000, first=1_234_567):
@@ -46,27 +51,33 @@ class TableTest(unittest.TestCase):
         (self.folder / 'raw').write_bytes(raw.tobytes())
         subprocess.run([TABLE_FILES, 'write', kind, self.file, self.folder / 'raw'], check=True)
 
-    def read(self, kind):
-        out = subprocess.run([TABLE_FILES, 'read', kind, self.file, self.folder / 'raw'],
-                             stdout=subprocess.PIPE, text=True)
+    def run_reader(self, kind, options):
+        words = [f'{name}={value}' for name, value in options.items()]
+        return subprocess.run([TABLE_FILES, 'read', kind, self.file, self.folder / 'raw', *words],
+                              stdout=subprocess.PIPE, text=True, timeout=60)
+
+    def read(self, kind, **options):
+        out = self.run_reader(kind, options)
         self.assertEqual(out.returncode, 0, out.stdout)
         raw = np.frombuffer((self.folder / 'raw').read_bytes(), RAW)
+        *numbers, rest = out.stdout.split(' ', 6)
+        places, first_at, outside, width, height, last = map(int, numbers)
         return ({'t': raw['t'], 'x': raw['x'], 'y': raw['y_p'] & 0x7fff, 'p': raw['y_p'] >> 15},
-                out.stdout.strip())
+                Report(places, first_at, outside, (width, height), last, rest.strip()))
 
     def assert_equal(self, found, events):
         for name in 'txyp':
             np.testing.assert_array_equal(found[name], events[name], name)
 
-    def assert_read(self, kind, events):
-        found, corruption = self.read(kind)
-        self.assertEqual(corruption, '0 0')
+    def assert_read(self, kind, events, **options):
+        found, report = self.read(kind, **options)
+        self.assertEqual((report.places, report.outside), (0, 0), report)
         self.assert_equal(found, events)
+        return report
 
-    def refused(self):
+    def refused(self, kind='hdf5', **options):
         """What is said of a file that cannot be read."""
-        out = subprocess.run([TABLE_FILES, 'read', 'hdf5', self.file, self.folder / 'raw'],
-                             stdout=subprocess.PIPE, text=True, timeout=60)
+        out = self.run_reader(kind, options)
         self.assertEqual(out.returncode, 1, out.stdout)
         return out.stdout
 
@@ -96,13 +107,15 @@ class OtherReaders(TableTest):
                        [('x', '>u4'), ('y', '>i8'), ('p', '?'), ('t', '>u8')],
                        [('p', '<i4'), ('t', '<f8'), ('y', '<f4'), ('x', '<f8')],
                        [('timestamp', '<u4'), ('x', '<u2'), ('y', '<u2'), ('polarity', 'i1')],
-                       [('x', '<f2'), ('extra', '<c16', (2, 3)), ('y', 'u2'), ('name', 'U5'), ('t', 'i8'), ('on', '?')]):
+                       [('x', '<f2'), ('extra', '<c16', (2, 3)), ('y', 'u2'), ('name', 'U5'), ('t', 'i8'), ('on', '?')],
+                       [('p', 'i1'), ('pad', 'V3'), ('time', '>f8'), (('column', 'x'), '<f2'), ('y', '>u4')]):
             for align in (False, True):
                 dtype = np.dtype(fields, align=align)
                 array = np.zeros(len(events['t']), dtype)
                 expected = dict(events)
                 for name, _ in [field[:2] for field in fields]:
-                    key = {'timestamp': 't', 'polarity': 'p', 'on': 'p'}.get(name, name)
+                    name = name if isinstance(name, str) else name[1]  # after a title
+                    key = {'timestamp': 't', 'time': 't', 'polarity': 'p', 'on': 'p'}.get(name, name)
                     if key not in events:
                         continue
                     kind = dtype[name].kind
@@ -115,20 +128,112 @@ class OtherReaders(TableTest):
                     self.file.write_bytes(stream.getvalue())
                     self.assert_read('npy', expected)
 
-    def test_we_load_numpys_archives(self):
-        events = random_events(30_000, 6)
-        structured = np.zeros(30_000, [('t', '<i8'), ('x', '<u2'), ('y', '<u2'), ('p', 'u1')])
+    def save(self, array):
+        with open(self.file, 'wb') as file:
+            np.save(file, array)
+
+    def test_we_load_small_numbers(self):
+        events = random_events(30_000, 2)
+        events = {'t': np.arange(30_000) * 2, 'x': events['x'] % 256, 'y': events['y'] % 256, 'p': events['p']}
+        array = np.zeros(30_000, [('t', '<u2'), ('x', 'u1'), ('y', 'u1'), ('p', '?')])
         for name in 'txyp':
-            structured[name] = events[name]
-        for save in (np.savez, np.savez_compressed):
-            for arrays in ({**events, 'size': np.array([1280, 720])},
-                           {'ts': events['t'] / 1e6, 'xs': events['x'], 'ys': events['y'], 'ps': events['p'] > 0},
-                           {'t_ns': events['t'] * 1000, **{name: events[name].astype('u2') for name in 'xyp'}},
-                           {'events': structured},
-                           {'arr_0': np.stack([events[name] for name in 'xytp'], axis=1)}):
-                with open(self.file, 'wb') as file:
-                    save(file, **arrays)
-                self.assert_read('npz', events)
+            array[name] = events[name]
+        self.save(array)
+        self.assert_read('npy', events)
+
+    def test_we_load_numpys_rows_and_columns(self):
+        for count in (1, 7, 20_000):
+            events = random_events(count, 8, 100 * count, 0)
+            signs = {**events, 'p': 2 * events['p'] - 1}
+            rows = lambda order, kind, some=events: np.stack([some[name] for name in order], axis=1).astype(kind)
+            options = {} if count > 7 else {'unit': 2}
+            arrays = [rows('txyp', 'u4'), rows('txyp', 'f8'), np.asfortranarray(rows('txyp', 'i8'))]
+            if count > 4:
+                arrays.append(np.ascontiguousarray(rows('txyp', 'i8').T))
+            if count > 7:
+                arrays += [rows('xypt', '>i8', signs), rows('txyp', 'f8') / [1e6, 1, 1, 1],
+                           rows('xytp', 'f8', signs) / [1, 1, 1e6, 1]]
+            for array in arrays:
+                self.save(array)
+                self.assert_read('npy', events, columns='' if count > 7 else 'txyp', **options)
+        self.save(rows('pyxt', 'i4') * [1, 1, 1, 1000] + [0, 0, 0, 999])
+        self.refused('npy')
+        self.assert_read('npy', events, columns='pyxt', unit=NANOSECONDS)
+
+    def fields(self, t, p, name='t', kind='i8'):
+        array = np.zeros(len(t), [(name, kind), ('x', 'i8'), ('y', 'i8'), ('p', 'i8')])
+        array[name] = t
+        array['p'] = np.resize(p, len(t))
+        self.save(array)
+
+    def test_units_of_numpys_times(self):
+        epoch = 1_468_939_993_067_416_019
+        for name, kind, times, expected in (
+                ('t', 'i8', [1500, 2500], 1500), ('t_ns', 'i8', [1999, 2500], 1), ('t_ns', 'i8', [-1001, 2500], -2),
+                ('time_ms', 'u8', [1500, 2500], 1_500_000), ('ts', 'i8', [epoch, epoch + 1], epoch // 1000),
+                ('t', 'f8', [1.5, 2], 1_500_000), ('t', 'f8', [1500, 2500], 1500),
+                ('t_s', 'f4', [1500, 2500], 1_500_000_000)):
+            self.fields(times, 0, name, kind)
+            self.assertEqual(self.read('npy')[0]['t'][0], expected, name)
+        # Times with a fraction are rounded.
+        self.fields([33 * 1e-6, 1124 * 1e-6, (1.6e9 + 33e-6) - 1.6e9, 40.5e-6], 1, kind='f8')
+        np.testing.assert_array_equal(self.read('npy')[0]['t'], [33, 1124, 33, 40])
+        self.fields([*np.arange(200) / 1e3, np.nan], 1, kind='f8')
+        self.assertEqual(self.read('npy')[1].places, 1)
+
+    def test_doubtful_polarities_and_times(self):
+        times = np.arange(11_000) * 3
+        self.fields(times, [1, 2**32 - 1])
+        self.assertEqual(self.read('npy')[0]['p'][1], 0)
+        for t, p in ((times, [0, 1, 2, 3]), (times, np.repeat([1, 3], [10_000, 1000])),  # not only in the first rows
+                     (np.arange(11_000) * 5003, [1, -1])):
+            self.fields(t, p)
+            self.refused('npy')
+
+    def test_we_load_numpys_archives(self):
+        for count in (0, 1, 4095, 4096, 30_000):
+            events = random_events(count, 6, 5 * count + 1, 0)
+            t, x, y, p = (events[name] for name in 'txyp')
+            stack = lambda order: np.stack([events[name] for name in order], axis=1)
+            structured = np.zeros(count, [('t', '<i8'), ('x', '<u2'), ('y', '<u2'), ('p', 'u1')])
+            for name in 'txyp':
+                structured[name] = events[name]
+            own = {**events, 'x': x.astype('u2'), 'p': p > 0, 'frames': x}
+            others = {'frame': x / 2, 'K': np.ones((3, 3)), 'poses': np.ones((10, 5))}
+            cases = [(own, {})]
+            if count > 1:
+                cases += [({**events, 'size': np.array([1280, 720])}, {}),
+                          ({'ts': t / 1e6, 'xs': x, 'ys': y, 'ps': p > 0}, {}),
+                          ({'folder/xs': x, 'ys': y, 'ps': p, 'timestamp_ns': t * 1000}, {}),
+                          ({'x_coords': x, 'y_coords': y, 'timestamps': t, 'polarities': p}, {}),
+                          ({'dataset_events_xy': stack('xy'), 'dataset_events_t': t, 'dataset_events_p': p}, {}),
+                          ({'t_ns': t // 1_000_000, 'x': x, 'y': y, 'p': p}, {'unit': SECONDS}),
+                          ({'events': structured}, {}), ({'arr_0': stack('xytp')}, {}),
+                          ({**others, 'arr_0': stack('xytp') / [1, 1, 1e6, 1]}, {'columns': 'xytp'})]
+            for arrays, options in cases:
+                expected = {**events, 't': t // 1_000_000 * 1_000_000} if 'unit' in options else events
+                for save in (np.savez, np.savez_compressed):
+                    with open(self.file, 'wb') as file:
+                        save(file, **arrays)
+                    with zipfile.ZipFile(self.file, 'a') as archive:
+                        archive.writestr('readme.txt', 'hello')
+                    self.assert_read('npz', expected, **options)
+
+    def test_size_of_the_sensor_in_an_archive(self):
+        def size_with(width, height, places=0, names=('width', 'height'), **options):
+            with open(self.file, 'wb') as file:
+                np.savez(file, **random_events(10, 1, 30, 0), **dict(zip(names, (width, height))))
+            found, report = self.read('npz', **options)
+            self.assertEqual(report.places, places)
+            self.assertEqual(len(found['t']), 10 - report.outside)
+            return report.size
+        self.assertEqual(size_with(1280, 720), (1280, 720))
+        self.assertEqual(size_with(np.array([1280], 'u2'), 720.0), (1280, 720))
+        self.assertEqual(size_with(16384, 16384, names=('a/width', 'a/height')), (16384, 16384))
+        self.assertEqual(size_with(1, 720), (1, 720))  # without the events outside
+        self.assertEqual(size_with(1280, 720, names=('width', 'other')), (0, 0))
+        for height in 0, -1, 32769, float('nan'), 'text', [1.0, 2.0], []:
+            self.assertEqual(size_with(1280, np.array(height), places=1), (0, 0), height)
 
     def test_numpy_reads_our_text(self):
         events = random_events(20_000, 3)
@@ -208,6 +313,111 @@ class OtherReaders(TableTest):
                 file.create_dataset('events', data=table.astype(kind), **options)
             self.assert_read('hdf5', events)
 
+    def columns(self, names, events, others={}):
+        """Writes a file with these columns."""
+        with h5py.File(self.file, 'w') as file:
+            for name, column in zip(names, 'txyp'):
+                file[name] = events[column]
+            for name, data in others.items():
+                file[name] = data
+
+    def test_columns_are_found_by_their_names(self):
+        events = random_events(1000, 3)
+        for names in (['t', 'x', 'y', 'p'], ['events/ts', 'events/xs', 'events/ys', 'events/ps'],
+                      ['raw_events/t', 'raw_events/x', 'raw_events/y', 'raw_events/p'],
+                      ['events/timestamp', 'events/x', 'events/y', 'events/polarity'],
+                      ['prophesee/left/t', 'prophesee/left/x', 'prophesee/left/y', 'prophesee/left/p']):
+            others = {'imu/t': events['t'], 'imu/x': events['t']}
+            if names[0].startswith('prophesee'):
+                others.update({'prophesee/right/' + name: events[name] for name in 'txyp'})
+            for t in events['t'], events['t'] / 1e6:
+                self.columns(names, {**events, 't': t}, others)
+                self.assertEqual(self.assert_read('hdf5', events).last_time, events['t'][-1])
+                self.assertEqual(len(self.read('hdf5', seek=events['t'][990])[0]['t']), 10)
+        self.columns(['t_ns', 'x', 'y', 'p'], {**events, 't': events['t'] * 1000 + 7})
+        self.assert_read('hdf5', events)
+
+    def test_a_path_selects_a_camera(self):
+        left, right = random_events(100, 1), random_events(100, 2)
+        rows = np.stack([left[name] for name in 'txyp'], axis=1)
+        self.columns(['left/t', 'left/x', 'left/y', 'left/p'], left,
+                     {**{'right/' + name: right[name] for name in 'txyp'}, 'other/events': rows[:2],
+                      'other/event_numbers': left['t']})
+        self.assertEqual(self.assert_read('hdf5', left).rest, 'events in /other/events, /right')
+        self.assertEqual(self.assert_read('hdf5', left, path='left').rest, '')
+        self.assert_read('hdf5', right, path='/right/')
+        for path in 'other', 'other/events':
+            self.assertEqual(self.read('hdf5', path=path)[1].last_time, left['t'][1])
+        self.assertIn('/left, /other/events, /right', self.refused(path='middle'))
+
+    def test_unit_and_columns_may_be_set(self):
+        events = random_events(1000, 4)
+        nanoseconds = {**events, 't': events['t'] * 1000 + 7}
+        self.columns('txyp', nanoseconds)
+        self.assertIn('time-unit', self.refused())
+        self.assert_read('hdf5', events, columns='pyxt', unit=NANOSECONDS)
+        with h5py.File(self.file, 'w') as file:
+            file['events'] = np.stack([nanoseconds[name] for name in 'pyxt'], axis=1)
+        self.assert_read('hdf5', events, columns='pyxt', unit=NANOSECONDS)
+
+    def test_rows_are_records_or_numbers(self):
+        events = random_events(1000, 5)
+        signs = {**events, 't': events['t'] / 1e6, 'p': 2 * events['p'] - 1}
+        records = np.zeros(1000, [('x', 'u2'), ('y', 'u2'), ('polarity', 'i2'), ('timestamp', 'i8')])
+        for name, column in zip(records.dtype.names, 'xypt'):
+            records[name] = events[column]
+        stack = lambda order: np.stack([signs[name] for name in order], axis=1)
+        # The last is MVSEC's, of a DAVIS346.
+        for path, rows, size in (('events', records, (0, 0)), ('events', stack('txyp'), (0, 0)),
+                                 ('events', stack('xytp'), (0, 0)), ('davis/right/events', stack('xytp'), (346, 260))):
+            with h5py.File(self.file, 'w') as file:
+                file[path] = rows
+            found, report = self.read('hdf5')
+            self.assertEqual((report.places, report.size), (0, size))
+            kept = np.full(1000, True) if size == (0, 0) else (events['x'] < 346) & (events['y'] < 260)
+            self.assert_equal(found, {name: events[name][kept] for name in 'txyp'})
+
+    def test_the_size_may_be_an_attribute(self):
+        self.columns('txyp', random_events(100, 6))
+        with h5py.File(self.file, 'a') as file:
+            file.attrs['sensor_resolution'] = [720, 1280]
+        self.assertEqual(self.read('hdf5')[1].size, (1280, 720))
+
+    def check_seeks(self, events, times):
+        for t in times:
+            first = np.argmax(events['t'] >= t)
+            self.assert_equal(self.read('hdf5', seek=t)[0], {name: events[name][first:] for name in 'txyp'})
+
+    def write_times_of_32_bits(self, events, of_v2e):
+        table = {name: events[name].astype('u4') for name in 'txyp'}
+        with h5py.File(self.file, 'w') as file:
+            if of_v2e:
+                file['events'] = np.stack([table[name] for name in 'txyp'], axis=1)
+            else:
+                for name in 'txyp':
+                    file['events/' + name] = table[name]
+
+    def test_times_of_32_bits_wrap_without_an_index(self):
+        i = np.arange(30_000)
+        events = {'t': i * 500_000, 'x': i % 300, 'y': i % 200, 'p': i % 2}  # four hours: three wraps
+        for of_v2e in False, True:
+            self.write_times_of_32_bits(events, of_v2e)
+            self.assertEqual(self.assert_read('hdf5', events).last_time, events['t'][-1])
+            self.check_seeks(events, [events['t'][k] for k in (29_999, 8589, 8590, 8591, 20_000, 100, 0)])
+
+    def test_disorder_across_a_wrap_is_kept(self):
+        lap = 1 << 32
+        t = np.array([lap - 1, lap + 2, lap - 2, lap + 3, lap - 0x10000, lap - 0xffff, lap + 4, lap + 5, lap - 3])
+        events = {'t': t, **{name: np.ones(9, int) for name in 'xyp'}}
+        for of_v2e, has_index in ((False, False), (True, False), (False, True)):
+            self.write_times_of_32_bits(events, of_v2e)
+            if has_index:  # the first event at or after each millisecond
+                with h5py.File(self.file, 'a') as file:
+                    file['ms_to_idx'] = np.append(np.zeros(lap // 1000 + 1, 'u4'), np.uint32(9))
+            self.assertEqual(self.read('hdf5')[1].last_time, lap - 3)
+            self.assert_equal(self.read('hdf5')[0], events)
+            self.check_seeks(events, [lap + 5])
+
     def test_rows_of_fractions_are_refused(self):
         with h5py.File(self.file, 'w') as file:
             file['davis/left/events'] = np.full((10, 4), 1.5, 'f4')
@@ -267,6 +477,114 @@ class Corrupt(TableTest):
                 else:
                     file['events/' + name] = np.ones(10, 'u2')
 
+    def test_numpys_rows(self):
+        array = np.zeros(105, [('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<i4')])
+        array['t'], array['x'], array['y'], array['p'] = 4, 1, 16383, 1
+        for row, field, value in ((1, 't', 1 << 63), (2, 'x', -1), (3, 'x', 70_000), (4, 'y', 16384)):
+            array[row][field] = value
+        stream = io.BytesIO()
+        np.save(stream, array)
+        file = stream.getvalue()
+        self.file.write_bytes(file)
+        found, report = self.read('npy')
+        self.assertEqual(len(found['t']), 101)
+        self.assertEqual((report.places, report.first_at, report.outside), (1, len(file) - 104 * 20, 3))
+        for corrupt in file + bytes(1000), file[:-20], file[:-1]:
+            self.file.write_bytes(corrupt)
+            self.assertEqual(self.read('npy')[1].places, 2)
+
+    def test_headers_of_numpy(self):
+        txy = "[('t', '<u8'), ('x', '<i4'), ('y', '<i4'), "
+        fields = txy + "('p', '<i4')]"
+        array = lambda descr, shape, rest='': f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, {rest}}}"
+        headers = [array("'<f8'", shape) for shape in ('(3, 500)', '(5, 3)', '(5,)', '(5, 0)', '(5, 4, 1)', '()')]
+        headers += [array(descr, '(5,)') for descr in (
+            '[]', "[('t', '<u8')]", '[[', '[(', txy + ']', txy + "('p', '<i4'), ('p', '<i4')]", txy + "('p', '<c8')]",
+            txy + "('p', '<i3')]", txy + "('p', '<i4', (2,))]", txy + "('p', [('q', '<i4')])]",
+            txy + "('p', '<i4'), ('', '|V99999999999')]", txy + "('p', '<i4')",
+            txy + "('p', '<i4'), ('b', '|V60000', (65535, 65535))]")]
+        headers += [array(fields, shape) for shape in ('()', '(5, 4)', '(-1,)', '(5', '5', '(99999999999999999999,)', '(x,)')]
+        headers += [array("'<c8'", '(5, 4)'), f"{{'descr': {fields}, 'fortran_order': False}}",
+                    array(fields, '(1,)') + ' more', array(fields, '(1,)', "'other': 3"),
+                    "{'descr': '<f8', 'fortran_order': True, 'shape': (5, 4)}"]  # cut short
+        files = [b'\x93NUMPY\1\0' + struct.pack('<H', len(header)) + header.encode() for header in headers]
+        for file in [b'', b'hello, this is a text', b'\x93NUMPY', b'\x93NUMPY\4\0\x10\0',
+                     b"\x93NUMPY\2\0\xff\xff\xff\xff{'descr'", *files]:
+            self.file.write_bytes(file)
+            self.refused('npy')
+
+    def archive(self, arrays, text=None, cut=None):
+        with open(self.file, 'wb') as file:
+            np.savez_compressed(file, **arrays)
+        if text is not None:
+            self.file.write_bytes(text)
+        self.file.write_bytes(self.file.read_bytes()[:cut])
+
+    def test_archives(self):
+        columns = random_events(10, 1)
+        for arrays, words, options in (
+                ({}, 'neither arrays t, x, y and p', {}), ({'a': np.zeros((3, 500))}, '(N, 4) or (4, N)', {}),
+                ({'a': np.array(None)}, 'pickled', {}), ({'K': np.ones((3, 3))}, 'K.npy: the NumPy array has 3 columns', {}),
+                ({'poses': np.ones((10, 5))}, 'column-order has 4', {'columns': 'txyp'}),
+                ({'poses': np.ones((10, 5))}, 'set column-order for all 5', {}),
+                ({**columns, 'x': np.zeros((10, 2), 'u2')}, 'must have one column', {}),
+                ({name: columns[name] for name in 'txy'}, 'neither arrays t, x, y and p', {})):
+            self.archive(arrays)
+            self.assertIn(words, self.refused('npz', **options))
+        for file in {'text': b'hello, this is a text'}, {'cut': -30}:
+            self.archive(columns, **file)
+            self.assertIn('cannot be opened', self.refused('npz'))
+
+        events = random_events(50_000, 2)
+        self.archive({**events, 'y': events['y'][:100]})
+        found, report = self.read('npz')
+        self.assertEqual((len(found['t']), report.places), (100, 1))
+        with zipfile.ZipFile(self.file, 'w') as archive:
+            for name in 'txyp':  # more rows than there are
+                stream = io.BytesIO()
+                np.save(stream, events[name])
+                archive.writestr(name + '.npy', stream.getvalue().replace(b'50000', b'90000', 1))
+        found, report = self.read('npz')
+        self.assertEqual((len(found['t']), report.places), (50_000, 1))
+        file = bytearray(self.file.read_bytes())
+        file[300_000:300_010] = bytes(10)
+        self.file.write_bytes(file)
+        self.assertGreater(self.read('npz')[1].places, 0)
+
+    def test_compressed_twice(self):
+        with h5py.File(self.file, 'w') as file:
+            for name in 'xyp':
+                file['events/' + name] = np.zeros(1 << 16, 'u8')
+            creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+            creation.set_chunk((1 << 16,))
+            creation.set_deflate(1)
+            creation.set_filter(h5py.h5z.FILTER_DEFLATE, 0, (1,))
+            h5py.h5d.create(file['events'].id, b't', h5py.h5t.STD_U64LE, h5py.h5s.create_simple((1 << 16,)), creation)
+        self.assertIn('compressed more than once', self.refused())
+
+    def test_chunks_that_share_an_address(self):
+        rows, chunks = 1 << 16, 30
+        with h5py.File(self.file, 'w', libver='earliest') as file:
+            for name in 'xyp':
+                file['events/' + name] = np.zeros(rows * chunks, 'u1')
+            t = file.create_dataset('events/t', (rows * chunks,), 'u8', chunks=(rows,), compression='gzip').id
+            for i in range(chunks):
+                t.write_direct_chunk((rows * i,), bytes(400_000 if i == 0 else 1))
+        self.read('hdf5')
+        # Nodes of chunk indexes: a header of 24 bytes with the number of chunks, then for each chunk its size,
+        # filter mask and two offsets, and its address.
+        file = bytearray(self.file.read_bytes())
+        at = file.find(b'TREE\1')
+        while at >= 0:
+            first = at + 24
+            if struct.unpack_from('<I', file, first)[0] == 400_000:
+                for i in range(1, file[at + 6]):
+                    file[first + 32 * i:first + 32 * i + 4] = file[first:first + 4]
+                    file[first + 32 * i + 24:first + 32 * i + 32] = file[first + 24:first + 32]
+            at = file.find(b'TREE\1', at + 1)
+        self.file.write_bytes(file)
+        self.assertIn('chunks that overlap', self.refused())
+
     def test_shapes_and_types(self):
         for make in (lambda file, name: file.create_dataset(name, data=np.ones(10)),
                      lambda file, name: file.create_dataset(name, data=np.ones((10, 2), 'u2')),
@@ -287,7 +605,7 @@ class Corrupt(TableTest):
         numbers = np.arange(100_000) // 7 % 2
         lzf = lambda file, name: file.create_dataset(name, data=numbers, compression='lzf', shuffle=True)
         self.with_columns(**{name: lzf for name in 'txyp'})
-        found, corruption = self.read('hdf5')
+        found, report = self.read('hdf5')
         for name in 'txyp':
             np.testing.assert_array_equal(found[name], numbers)
 
@@ -295,11 +613,11 @@ class Corrupt(TableTest):
         def huge(file, name):
             file.create_dataset(name, shape=(1 << 60,), dtype='u2', chunks=(1000,), maxshape=(None,))[:10] = 1
         self.with_columns(**{name: huge for name in 'txyp'})
-        found, corruption = self.read('hdf5')
+        found, report = self.read('hdf5')
         self.assertEqual(len(found['t']), 1000)
-        self.assertGreater(int(corruption.split()[0]), 0)
+        self.assertGreater(report.places, 0)
         self.with_columns(t=huge)
-        found, corruption = self.read('hdf5')
+        found, report = self.read('hdf5')
         self.assertEqual(len(found['t']), 10)
 
     def test_holes(self):
@@ -311,8 +629,8 @@ class Corrupt(TableTest):
                     for first in range(0, 30_000, 1000):
                         if name != hole or first != 5000:
                             dataset[first:first + 1000] = values[first:first + 1000]
-            found, corruption = self.read('hdf5')
-            self.assertEqual(corruption.split()[0], '1')
+            found, report = self.read('hdf5')
+            self.assertEqual(report.places, 1)
             np.testing.assert_array_equal(found['t'], np.r_[0:5000, 6000:30_000])
 
     def test_chunks_stored_with_other_sizes(self):
@@ -331,8 +649,8 @@ class Corrupt(TableTest):
             data = file['events/x'].id
             _, chunk = data.read_direct_chunk((4000,))
             data.write_direct_chunk((4000,), chunk[:100] + b'\0' + chunk[101:])
-        found, corruption = self.read('hdf5')
-        self.assertEqual((len(found['t']), corruption.split()[0]), (29_000, '1'))
+        found, report = self.read('hdf5')
+        self.assertEqual((len(found['t']), report.places), (29_000, 1))
 
     def test_bombs(self):
         """A chunk that would unpack to more than it should is corruption, and takes no memory."""
@@ -345,9 +663,9 @@ class Corrupt(TableTest):
                                               compression='gzip')
                 dataset[:] = 1
             file['events/t'].id.write_direct_chunk((0,), bomb)
-        found, corruption = self.read('hdf5')
+        found, report = self.read('hdf5')
         self.assertEqual(len(found['t']), rows)
-        self.assertGreater(int(corruption.split()[0]), 0)
+        self.assertGreater(report.places, 0)
         self.assertLess(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, 800_000)
 
 

@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Writes and reads tables of events for scripts: table_files write|read KIND FILE RAW. RAW contains
-// AbsoluteEvents in memory layout. Prints the corruption of a file that is read.
-#include <cstdio>
+// Writes and reads tables of events for scripts:
+//   table_files write KIND FILE RAW
+//   table_files read KIND FILE RAW [columns=LETTERS] [unit=NUMBER] [path=PATH] [seek=MICROSECONDS]
+// RAW contains AbsoluteEvents in memory layout. Prints what else there is to know of a file that is
+// read: corrupt places, the position of the first, events outside the sensor, width, height and last
+// time, and then the first corruption and the streams that are not read.
 #include <cstring>
 #include <fstream>
+#include <iostream>
 #include <iterator>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -20,6 +25,8 @@
 namespace {
 
 using namespace recordings;
+
+using Options = std::map<std::string, std::string>;
 
 constexpr SensorSize size = {1280, 720};
 
@@ -60,43 +67,57 @@ void write_file(const std::string& kind, const std::string& file, const std::str
   writer.close();
 }
 
-void read_file(const std::string& kind, const std::string& file, const std::string& raw) {
-  Events events;
-  Corruption corruption;
-  MemoryBytes bytes(load(file));
-  if (kind == "hdf5") {
-    Hdf5Reader reader(bytes);
-    while (reader.read(10'000, events) > 0) {
-    }
-    corruption = reader.corruption();
-  } else if (kind == "npz") {
-    const auto reader = make_npz_decoder();
-    reader->open(bytes);
-    while (const auto item = reader->next()) {
-      const auto some = std::get<EventItem>(*item).events;
-      events.insert(events.end(), some.begin(), some.end());
-    }
-    corruption = reader->corruption();
+std::unique_ptr<Decoder> make_decoder(const std::string& kind, Options& options) {
+  TableSettings settings;
+  if (const auto& letters = options["columns"]; !letters.empty())
+    settings.columns = columns_of(letters).value();
+  if (const auto& unit = options["unit"]; !unit.empty())
+    settings.unit = static_cast<TimeUnit>(std::stoi(unit));
+  if (kind == "hdf5") return make_hdf5_decoder({.path = options["path"], .table = settings});
+  if (kind == "npz") return make_npz_decoder(settings);
+  if (kind == "npy") return std::make_unique<NpyDecoder>(settings);
+  return std::make_unique<CsvDecoder>(settings);
+}
+
+/// Reads a file with random access, and expects the same events in pieces.
+void read_file(const std::string& kind, const std::string& file, const std::string& raw,
+               Options options) {
+  const auto bytes = load(file);
+  MemoryBytes source(bytes);
+  const auto decoder = make_decoder(kind, options);
+  Contents contents;
+  if (!decoder->open(source)) {
+    contents = decode(*decoder, bytes);
   } else {
-    const std::unique_ptr<EventDecoder> decoder =
-        kind == "npy" ? std::unique_ptr<EventDecoder>(std::make_unique<NpyDecoder>())
-                      : std::make_unique<CsvDecoder>();
-    events = decode(*decoder, load(file)).events;
-    corruption = decoder->corruption();
+    if (const auto& t = options["seek"]; !t.empty())
+      decoder->restart(decoder->seek_point_before(std::stoll(t)).value());
+    contents.take_all(*decoder);
   }
-  save(raw, events.data(), events.size() * sizeof(AbsoluteEvent));
-  std::printf("%d %d %s\n", static_cast<int>(corruption.places),
-              static_cast<int>(corruption.outside), corruption.first.c_str());
+  if (options["seek"].empty() &&
+      decode(*make_decoder(kind, options), bytes, 0).events != contents.events)
+    throw std::logic_error("other events in pieces");
+  save(raw, contents.events.data(), contents.events.size() * sizeof(AbsoluteEvent));
+  const auto& corruption = decoder->corruption();
+  const auto sensor = decoder->streams().front().size;
+  std::cout << corruption.places << ' ' << corruption.first_at << ' ' << corruption.outside << ' '
+            << sensor.width << ' ' << sensor.height << ' ' << decoder->last_time().value_or(-1)
+            << ' ' << corruption.first << decoder->unread_streams().names << '\n';
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 5) return 2;
+  if (argc < 5) return 2;
+  Options options;
+  for (const std::string word : std::span(argv, static_cast<std::size_t>(argc)).subspan(5))
+    options[word.substr(0, word.find('='))] = word.substr(word.find('=') + 1);
   try {
-    (std::string(argv[1]) == "write" ? write_file : read_file)(argv[2], argv[3], argv[4]);
+    if (std::string(argv[1]) == "write")
+      write_file(argv[2], argv[3], argv[4]);
+    else
+      read_file(argv[2], argv[3], argv[4], options);
   } catch (const std::exception& error) {
-    std::printf("%s\n", error.what());
+    std::cout << error.what() << '\n';
     return 1;
   }
   return 0;
