@@ -96,7 +96,8 @@ TEST(Aedat4, FramesOfEveryFormatAmongEvents) {
     const auto row = static_cast<std::size_t>(13 * bytes_per_pixel(format));
     for (std::size_t y = 0; y < 50; ++y)
       EXPECT_EQ(
-          std::memcmp(contents.pictures[0].pixels.data() + y * row, pixels.data() + y * 64, row), 0);
+          std::memcmp(contents.pictures[0].pixels.data() + y * row, pixels.data() + y * 64, row),
+          0);
   }
 }
 

@@ -237,8 +237,8 @@ TEST_F(Bags, LoseOnlyWhatIsCutOffOrCorrupt) {
       if (pulled) decoder.open(source);
       const auto contents = decode(decoder, cut);
       EXPECT_GT(contents.events.size(), 2000U);
-      EXPECT_TRUE(std::ranges::equal(contents.events,
-                                     std::span(events).first(contents.events.size())));
+      EXPECT_TRUE(
+          std::ranges::equal(contents.events, std::span(events).first(contents.events.size())));
       EXPECT_EQ(decoder.corruption().places, 1U);
     }
     auto corrupt = bytes;

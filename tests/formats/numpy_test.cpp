@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What our encoders of NumPy arrays and archives write, and hostile archives. other_readers.py holds
-// both against NumPy.
+// What our encoders of NumPy arrays and archives write, and hostile archives. other_readers.py
+// holds both against NumPy.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -47,8 +47,8 @@ TEST(NpyEncoder, ComesBackWithAndWithoutThePatch) {
   auto patched = unpatched;
   apply_patch(encoder, patched);
   for (const auto& bytes : {unpatched, patched})
-    EXPECT_TRUE(
-        events_however_split([] { return std::make_unique<NpyDecoder>(); }, bytes) == events);
+    EXPECT_TRUE(events_however_split([] { return std::make_unique<NpyDecoder>(); }, bytes) ==
+                events);
 }
 
 /// Archive as an encoder writes it. Checks that its end comes in pieces.
