@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// AEDAT4: written files are read back equal, by Aedat4Decoder and by Python libraries; a recording
+// AEDAT4: written files are read back equal, by the decoder and by Python libraries; a recording
 // of a camera gives the known counts; corrupt files lose only the corrupt parts.
 #include <gtest/gtest.h>
 
@@ -14,10 +14,10 @@
 
 #include "src/core/byte_order.hpp"
 #include "src/formats/aedat/aedat4.hpp"
-#include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
 #include "src/formats/compression/compressed_frames.hpp"
 #include "tests/formats/aedat_files.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 #include "tests/formats/shared_data.hpp"
 
@@ -54,14 +54,14 @@ TEST(Aedat4, ReadsBackWhatItWrites) {
         const auto events =
             recordings::random_events(size, size.width == 1 ? 0 : 10'000, ++seed, -5, 200 * hour);
         const auto bytes = encoded({size, "made", compression, false, table}, events);
-        Aedat4Decoder decoder;
-        const auto contents = decode(decoder, bytes);
-        ASSERT_EQ(decoder.streams().size(), 1U);
-        EXPECT_EQ(decoder.streams()[0].size, size);
-        EXPECT_EQ(decoder.streams()[0].source, "made");
-        EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
-        EXPECT_EQ(decoder.corruption().outside, 0U);
-        EXPECT_EQ(decoder.table_at().has_value(), table);
+        const auto decoder = make_aedat4_decoder();
+        const auto contents = decode(*decoder, bytes);
+        ASSERT_EQ(decoder->streams().size(), 1U);
+        EXPECT_EQ(decoder->streams()[0].size, size);
+        EXPECT_EQ(decoder->streams()[0].source, "made");
+        EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
+        EXPECT_EQ(decoder->corruption().outside, 0U);
+        EXPECT_EQ(read_aedat4_header(bytes)->table_at.has_value(), table);
         ASSERT_TRUE(contents.events == events);
       }
 }
@@ -81,11 +81,11 @@ TEST(Aedat4, FramesOfEveryFormatAmongEvents) {
     encoder.encode(frame, bytes);
     encoder.encode(std::span(events).subspan(50), bytes);
     encoder.finish(bytes);
-    Aedat4Decoder decoder;
-    const auto contents = decode(decoder, bytes);
-    ASSERT_EQ(decoder.streams().size(), 2U);
-    EXPECT_EQ(decoder.streams()[1].kind, StreamKind::frames);
-    EXPECT_EQ(decoder.streams()[1].source, "a \"<camera>\" & more");
+    const auto decoder = make_aedat4_decoder();
+    const auto contents = decode(*decoder, bytes);
+    ASSERT_EQ(decoder->streams().size(), 2U);
+    EXPECT_EQ(decoder->streams()[1].kind, StreamKind::frames);
+    EXPECT_EQ(decoder->streams()[1].source, "a \"<camera>\" & more");
     EXPECT_TRUE(contents.events == events);
     ASSERT_EQ(contents.pictures.size(), 1U);
     const auto numbers = [](const Frame& some) {
@@ -124,10 +124,10 @@ TEST(Aedat4, EveryTriggerSource) {
   std::vector<aedat_files::TriggerSource> sources;
   for (int source = 0; source < 10; ++source) sources.push_back({1000 + source, source});
   aedat_files::add_packet(bytes, 3, aedat_files::triggers_content(sources));
-  Aedat4Decoder decoder;
-  EXPECT_EQ(decode(decoder, bytes).triggers, triggers);
-  EXPECT_EQ(decoder.streams()[0].kind, StreamKind::triggers);
-  EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+  const auto decoder = make_aedat4_decoder();
+  EXPECT_EQ(decode(*decoder, bytes).triggers, triggers);
+  EXPECT_EQ(decoder->streams()[0].kind, StreamKind::triggers);
+  EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
 }
 
 TEST(Aedat4, KeepsTriggersAndImuSamples) {
@@ -146,14 +146,14 @@ TEST(Aedat4, KeepsTriggersAndImuSamples) {
     EXPECT_EQ(encoder.encode(std::span<const Trigger>(with_unknown), bytes), triggers.size());
     EXPECT_EQ(encoder.encode(std::span<const ImuSample>(samples), bytes), samples.size());
     encoder.finish(bytes);
-    Aedat4Decoder decoder;
-    const auto contents = decode(decoder, bytes);
+    const auto decoder = make_aedat4_decoder();
+    const auto contents = decode(*decoder, bytes);
     EXPECT_EQ(contents.triggers, triggers);
     EXPECT_EQ(contents.imu_samples, samples);
-    ASSERT_EQ(decoder.streams().size(), 3U);
-    EXPECT_EQ(decoder.streams()[1].kind, StreamKind::triggers);
-    EXPECT_EQ(decoder.streams()[2].kind, StreamKind::imu);
-    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+    ASSERT_EQ(decoder->streams().size(), 3U);
+    EXPECT_EQ(decoder->streams()[1].kind, StreamKind::triggers);
+    EXPECT_EQ(decoder->streams()[2].kind, StreamKind::imu);
+    EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
   }
   Aedat4Encoder without({{346, 260}, ""});
   Bytes bytes;
@@ -170,16 +170,16 @@ TEST(Aedat4, AlignmentMayCountFromAnywhere) {
     SCOPED_TRACE(off_by);
     auto bytes = aedat_files::aedat4_header("", 0, 5000, off_by);
     aedat_files::add_packet(bytes, 7, aedat_files::triggers_content(sources, off_by));
-    Aedat4Decoder decoder;
-    EXPECT_EQ(decode(decoder, bytes).triggers,
+    const auto decoder = make_aedat4_decoder();
+    EXPECT_EQ(decode(*decoder, bytes).triggers,
               (std::vector<Trigger>{{1000, 0, true}, {1001, 0, false}}));
-    EXPECT_EQ(decoder.table_at(), 5000U);
-    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+    EXPECT_EQ(read_aedat4_header(bytes)->table_at, 5000U);
+    EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
 
-    Aedat4Decoder of_xml;
-    decode(of_xml, aedat_files::aedat4_header(aedat_files::xml_of_one_stream, 0, -1, off_by));
-    ASSERT_EQ(of_xml.streams().size(), 1U);
-    EXPECT_EQ(of_xml.streams()[0].size, (SensorSize{346, 260}));
+    const auto of_xml = make_aedat4_decoder();
+    decode(*of_xml, aedat_files::aedat4_header(aedat_files::xml_of_one_stream, 0, -1, off_by));
+    ASSERT_EQ(of_xml->streams().size(), 1U);
+    EXPECT_EQ(of_xml->streams()[0].size, (SensorSize{346, 260}));
 
     const auto moved = aedat_files::moved(table_body, off_by);
     Bytes content;
@@ -199,11 +199,11 @@ TEST(Aedat4, EventsOutsideOrWithoutATimeAreCountedAndUnsortedOnesKept) {
                                           at(1, 3, far),     at(32767, 1, 99),   at(5, 6, 100)};
   auto bytes = aedat_files::aedat4_header(aedat_files::xml_of_one_stream);
   aedat_files::add_packet(bytes, 0, aedat_files::events_content(events));
-  Aedat4Decoder decoder;
-  EXPECT_TRUE(decode(decoder, bytes).events ==
+  const auto decoder = make_aedat4_decoder();
+  EXPECT_TRUE(decode(*decoder, bytes).events ==
               (std::vector{events[0], events[3], events[5], events[8]}));
-  EXPECT_EQ(decoder.corruption().outside, 3U);
-  EXPECT_EQ(decoder.corruption().places, 2U) << "impossible times";
+  EXPECT_EQ(decoder->corruption().outside, 3U);
+  EXPECT_EQ(decoder->corruption().places, 2U) << "impossible times";
 }
 
 TEST(Aedat4, WhatIsNotAedat4IsRefused) {
@@ -220,8 +220,8 @@ TEST(Aedat4, WhatIsNotAedat4IsRefused) {
     texts.push_back(std::string("#!AER-DAT4.0\r\n") + size +
                     std::string(3 + static_cast<std::size_t>(size), '\0'));
   for (const auto& text : texts) {
-    Aedat4Decoder decoder;
-    EXPECT_THROW(decode(decoder, recordings::bytes_of(text)), UnsupportedFormat) << text;
+    const auto decoder = make_aedat4_decoder();
+    EXPECT_THROW(decode(*decoder, recordings::bytes_of(text)), UnsupportedFormat) << text;
   }
 }
 
@@ -238,12 +238,12 @@ TEST(Aedat4, AnXmlCutAnywhereOrCorruptLosesNoStream) {
     auto bytes = aedat_files::aedat4_header(text);
     aedat_files::add_packet(bytes, 0, aedat_files::events_content(events));
     aedat_files::add_packet(bytes, 1, aedat_files::triggers_content(sources));
-    Aedat4Decoder decoder;
-    const auto found = decode(decoder, bytes);
-    ASSERT_EQ(decoder.streams().size(), 2U);
+    const auto decoder = make_aedat4_decoder();
+    const auto found = decode(*decoder, bytes);
+    ASSERT_EQ(decoder->streams().size(), 2U);
     EXPECT_TRUE(found.events == events);
     EXPECT_EQ(found.triggers.size(), 2U);
-    EXPECT_EQ(decoder.corruption().places, text.empty() || text == xml ? 0U : 1U);
+    EXPECT_EQ(decoder->corruption().places, text.empty() || text == xml ? 0U : 1U);
   }
 }
 
@@ -255,9 +255,9 @@ TEST(Aedat4, HostileXmlTakesTimeInProportion) {
   };
   for (const auto& xml : {"<dv><node " + repeated(" x=''") + "/></dv>",
                           "<dv>" + repeated("<node>") + repeated("</node>") + "</dv>"}) {
-    Aedat4Decoder decoder;
-    decode(decoder, aedat_files::aedat4_header(xml));
-    EXPECT_EQ(decoder.corruption().places, 0U);
+    const auto decoder = make_aedat4_decoder();
+    decode(*decoder, aedat_files::aedat4_header(xml));
+    EXPECT_EQ(decoder->corruption().places, 0U);
   }
 }
 
@@ -265,11 +265,11 @@ TEST(Aedat4, EntitiesThatTheXmlDeclaresAreNotExpanded) {
   std::string xml = "<!DOCTYPE dv [<!ENTITY many '&#65;&#65;'>]>";
   xml += aedat_files::xml_of_one_stream;
   xml.insert(xml.find("<attr key=\"sizeX"), "<attr key='source'>&many; &#65;</attr>");
-  Aedat4Decoder decoder;
-  decode(decoder, aedat_files::aedat4_header(xml));
-  ASSERT_EQ(decoder.streams().size(), 1U);
-  EXPECT_EQ(decoder.streams()[0].source, "&many; A");
-  EXPECT_EQ(decoder.corruption().places, 0U);
+  const auto decoder = make_aedat4_decoder();
+  decode(*decoder, aedat_files::aedat4_header(xml));
+  ASSERT_EQ(decoder->streams().size(), 1U);
+  EXPECT_EQ(decoder->streams()[0].source, "&many; A");
+  EXPECT_EQ(decoder->corruption().places, 0U);
 }
 
 TEST(Aedat4, ASizeOfWhichOneSideIsMissingIsNone) {
@@ -278,9 +278,9 @@ TEST(Aedat4, ASizeOfWhichOneSideIsMissingIsNone) {
   auto bytes = aedat_files::aedat4_header(xml);
   const std::vector events{AbsoluteEvent::at(400, 300, 1000, Polarity::on)};
   aedat_files::add_packet(bytes, 0, aedat_files::events_content(events));
-  Aedat4Decoder decoder;
-  EXPECT_TRUE(decode(decoder, bytes).events == events);
-  EXPECT_EQ(decoder.streams()[0].size, SensorSize{});
+  const auto decoder = make_aedat4_decoder();
+  EXPECT_TRUE(decode(*decoder, bytes).events == events);
+  EXPECT_EQ(decoder->streams()[0].size, SensorSize{});
 }
 
 TEST(Aedat4, ATableFoundWhereTheHeaderNamesNoneIsNoCorruption) {
@@ -288,20 +288,19 @@ TEST(Aedat4, ATableFoundWhereTheHeaderNamesNoneIsNoCorruption) {
     Aedat4Encoder encoder({{346, 260}, "", compression, false, true});
     const auto events = some_events(9000);
     const auto bytes = recordings::encode(encoder, events);  // without patching the header
-    Aedat4Decoder decoder;
-    EXPECT_TRUE(decode(decoder, bytes, 100).events == events);
-    EXPECT_FALSE(decoder.table_at());
-    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+    const auto decoder = make_aedat4_decoder();
+    EXPECT_TRUE(decode(*decoder, bytes, 100).events == events);
+    EXPECT_FALSE(read_aedat4_header(bytes)->table_at);
+    EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
   }
 }
 
 /// Positions of the packet headers, and of the end.
 std::vector<std::size_t> packets_of(std::span<const std::uint8_t> bytes) {
-  Aedat4Decoder decoder;
-  decode(decoder, bytes);
-  const auto end = decoder.table_at().value_or(bytes.size());
+  const auto header = read_aedat4_header(bytes).value();
+  const auto end = header.table_at.value_or(bytes.size());
   std::vector<std::size_t> found;
-  for (std::size_t at = decoder.packets_at(); at < end;
+  for (std::size_t at = header.packets_at; at < end;
        at += 8 + little_endian<std::uint32_t>(&bytes[at + 4]))
     found.push_back(at);
   return found;
@@ -322,11 +321,11 @@ TEST(Aedat4, ABrokenPacketIsLostAndNoOther) {
         expected.erase(expected.begin() + 4096 * lost,
                        expected.begin() + std::min(4096 * (lost + 1), 20'000));
         for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1000}}) {
-          Aedat4Decoder decoder;
-          const auto contents = decode(decoder, bytes, piece);
+          const auto decoder = make_aedat4_decoder();
+          const auto contents = decode(*decoder, bytes, piece);
           EXPECT_TRUE(contents.events == expected);
-          EXPECT_EQ(decoder.corruption().places, 1U) << decoder.corruption().first;
-          EXPECT_EQ(decoder.corruption().first_at, at[static_cast<std::size_t>(lost)]);
+          EXPECT_EQ(decoder->corruption().places, 1U) << decoder->corruption().first;
+          EXPECT_EQ(decoder->corruption().first_at, at[static_cast<std::size_t>(lost)]);
         }
       };
       const auto set = [](Bytes& bytes, std::size_t place, std::uint32_t number) {
@@ -357,10 +356,10 @@ TEST(Aedat4, BytesBetweenPacketsAreSkipped) {
     const auto at = packets_of(bytes);
     const Bytes noise(333, 0xa5);
     bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(at[1]), noise.begin(), noise.end());
-    Aedat4Decoder decoder;
-    EXPECT_TRUE(decode(decoder, bytes, 50).events == events);
-    EXPECT_EQ(decoder.corruption().places, 1U);
-    EXPECT_EQ(decoder.corruption().first_at, at[1]);
+    const auto decoder = make_aedat4_decoder();
+    EXPECT_TRUE(decode(*decoder, bytes, 50).events == events);
+    EXPECT_EQ(decoder->corruption().places, 1U);
+    EXPECT_EQ(decoder->corruption().first_at, at[1]);
   }
 }
 
@@ -375,9 +374,9 @@ TEST(Aedat4, BombsAreCappedAndSkipped) {
         .compress(Bytes(aedat4_max_packet + 1), bomb);
     aedat_files::add_packet(bytes, 0, bomb);
     aedat_files::add(bytes, packet);
-    Aedat4Decoder decoder;
-    EXPECT_EQ(decode(decoder, bytes).events.size(), 2000U);
-    EXPECT_EQ(decoder.corruption().places, 1U);
+    const auto decoder = make_aedat4_decoder();
+    EXPECT_EQ(decode(*decoder, bytes).events.size(), 2000U);
+    EXPECT_EQ(decoder->corruption().places, 1U);
   }
 }
 
@@ -401,9 +400,9 @@ TEST(Aedat4, PacketsWithinPacketsTakeNoTimeToSpeakOf) {
         aedat_files::add_little(bytes, std::int64_t{0x80010000}, 4);
       }
     }
-    Aedat4Decoder decoder;
-    EXPECT_TRUE(decode(decoder, bytes).events.empty());
-    EXPECT_GE(decoder.corruption().places, 1U);
+    const auto decoder = make_aedat4_decoder();
+    EXPECT_TRUE(decode(*decoder, bytes).events.empty());
+    EXPECT_GE(decoder->corruption().places, 1U);
   }
 }
 
@@ -452,11 +451,11 @@ TEST(Aedat4, TablesWithThePositionsOfHeadersAreUnderstood) {
 TEST(Aedat4, ARecordingOfADavis346) {
   const auto bytes = shared_data::events_file("davis346-frames-events-imu.aedat4");
   if (bytes.empty()) GTEST_SKIP() << "no davis346-frames-events-imu.aedat4 in $SHARED_DATA";
-  Aedat4Decoder decoder;
-  const auto contents = decode(decoder, bytes, 0);
-  ASSERT_EQ(decoder.streams().size(), 4U);
-  EXPECT_EQ(decoder.streams()[0].size, (SensorSize{346, 260}));
-  EXPECT_EQ(decoder.streams()[0].source, "DAVIS346_00000104");
+  const auto decoder = make_aedat4_decoder();
+  const auto contents = decode(*decoder, bytes, 0);
+  ASSERT_EQ(decoder->streams().size(), 4U);
+  EXPECT_EQ(decoder->streams()[0].size, (SensorSize{346, 260}));
+  EXPECT_EQ(decoder->streams()[0].source, "DAVIS346_00000104");
   EXPECT_EQ(contents.events.size(), 117'667U);
   EXPECT_EQ(std::ranges::count(contents.events, Polarity::on, &AbsoluteEvent::polarity), 72'363);
   ASSERT_EQ(contents.pictures.size(), 3U);
@@ -473,12 +472,13 @@ TEST(Aedat4, ARecordingOfADavis346) {
     EXPECT_NEAR(std::hypot(x, y, z), 1, 0.2) << "gravity";
     EXPECT_NEAR(sample.temperature, 40, 20);
   }
-  EXPECT_EQ(decoder.corruption().places + decoder.corruption().outside, 0U);
-  const auto table = read_aedat4_table(std::span(bytes).subspan(*decoder.table_at()),
-                                       decoder.compression(), decoder.packets_at());
+  EXPECT_EQ(decoder->corruption().places + decoder->corruption().outside, 0U);
+  const auto header = read_aedat4_header(bytes).value();
+  const auto table = read_aedat4_table(std::span(bytes).subspan(*header.table_at),
+                                       header.compression, header.packets_at);
   ASSERT_TRUE(table);
   EXPECT_EQ(table->size(), 40U);
-  EXPECT_EQ(table->front().position, decoder.packets_at());
+  EXPECT_EQ(table->front().position, header.packets_at);
 }
 
 TEST(Aedat4, PythonsLibrariesReadWhatWeWrite) {

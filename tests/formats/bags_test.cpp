@@ -20,8 +20,8 @@
 
 #include "src/core/byte_order.hpp"
 #include "src/formats/compression/compressed_frames.hpp"
-#include "src/formats/ros/bag_decoder.hpp"
 #include "src/formats/ros/mcap_encoder.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 #include "tests/formats/rosbags.hpp"
 
@@ -51,10 +51,10 @@ std::string refusal_of(const Bytes& bytes, const std::string& topics = "") {
   const auto start = std::chrono::steady_clock::now();
   std::string refusal;
   MemoryBytes source(bytes);
-  BagDecoder decoder(topics);
+  const auto decoder = make_bag_decoder(topics);
   try {
-    const bool reads_itself = decoder.open(source);
-    decode(decoder, reads_itself ? std::span<const std::uint8_t>() : bytes);
+    const bool reads_itself = decoder->open(source);
+    decode(*decoder, reads_itself ? std::span<const std::uint8_t>() : bytes);
   } catch (const UnsupportedFormat& error) {
     refusal = error.what();
   }
@@ -107,17 +107,17 @@ TEST_F(Bags, HaveTheirEventsAndFrames) {
     const auto bytes = bytes_of(folder / name);
     for (const bool pulled : {false, true}) {
       MemoryBytes source(bytes);
-      BagDecoder decoder("");
-      if (pulled) decoder.open(source);
-      const auto contents = decode(decoder, bytes, pulled ? bytes.size() : 77'777);
+      const auto decoder = make_bag_decoder("");
+      if (pulled) decoder->open(source);
+      const auto contents = decode(*decoder, bytes, pulled ? bytes.size() : 77'777);
       EXPECT_EQ(contents.events, events);
       EXPECT_EQ(values_of(contents.pictures), frames);
-      EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
-      ASSERT_EQ(decoder.streams().size(), 2U);
-      for (const auto& stream : decoder.streams())
+      EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
+      ASSERT_EQ(decoder->streams().size(), 2U);
+      for (const auto& stream : decoder->streams())
         EXPECT_EQ(stream.size, stream.kind == StreamKind::events ? (SensorSize{346, 260})
                                                                  : (SensorSize{86, 65}));
-      EXPECT_EQ(decoder.unread_streams().names, "topics /second/events");
+      EXPECT_EQ(decoder->unread_streams().names, "topics /second/events");
     }
   }
 }
@@ -127,26 +127,26 @@ TEST_F(Bags, SayInTheirIndexWhereTopicsBegin) {
     SCOPED_TRACE(name);
     const auto bytes = bytes_of(folder / name);
     MemoryBytes source(bytes);
-    BagDecoder decoder("");
-    const bool reads_itself = decoder.open(source);
+    const auto decoder = make_bag_decoder("");
+    const bool reads_itself = decoder->open(source);
     const bool has_index = name.find("-no-") == std::string::npos;
-    EXPECT_EQ(decoder.knows_all_streams(), has_index);
-    ASSERT_TRUE(!has_index || decoder.streams().size() == 2U);
-    for (std::size_t i = 0; i < decoder.streams().size(); ++i) {
-      const auto first = decoder.first_of(i);
+    EXPECT_EQ(decoder->knows_all_streams(), has_index);
+    ASSERT_TRUE(!has_index || decoder->streams().size() == 2U);
+    for (std::size_t i = 0; i < decoder->streams().size(); ++i) {
+      const auto first = decoder->first_of(i);
       ASSERT_EQ(first.has_value(), has_index);
       if (!first) continue;
-      decoder.restart(*first);
+      decoder->restart(*first);
       if (!reads_itself)
-        decoder.push(std::span(bytes).subspan(static_cast<std::size_t>(first->position)));
+        decoder->push(std::span(bytes).subspan(static_cast<std::size_t>(first->position)));
       std::optional<Microseconds> t;
-      while (const auto item = t ? std::nullopt : decoder.next()) {
+      while (const auto item = t ? std::nullopt : decoder->next()) {
         const auto* const some = std::get_if<EventItem>(&*item);
         const auto* const picture = std::get_if<FrameItem>(&*item);
         if (some != nullptr && some->stream == i) t = some->events.front().t;
         if (picture != nullptr && picture->stream == i) t = picture->frame.t;
       }
-      const bool of_events = decoder.streams()[i].kind == StreamKind::events;
+      const bool of_events = decoder->streams()[i].kind == StreamKind::events;
       EXPECT_EQ(t, of_events ? events.front().t : frames.front().first);
     }
   }
@@ -156,11 +156,11 @@ TEST_F(Bags, HaveTheTopicsThatAreChosen) {
   const auto bytes = bytes_of(folder / "evt3-lz4.mcap");
   for (const auto& [topics, count] :
        {std::pair{"/second/events", 39U}, {"/camera/events, /second/events", 6039U}}) {
-    BagDecoder decoder(topics);
-    const auto contents = decode(decoder, bytes);
+    const auto decoder = make_bag_decoder(topics);
+    const auto contents = decode(*decoder, bytes);
     EXPECT_EQ(contents.events.size(), count);
     EXPECT_TRUE(contents.pictures.empty());
-    EXPECT_EQ(decoder.streams().size(), count == 39U ? 1U : 2U);
+    EXPECT_EQ(decoder->streams().size(), count == 39U ? 1U : 2U);
   }
   const auto refusal = refusal_of(bytes, "/none");
   EXPECT_NE(refusal.find("/none"), std::string::npos);
@@ -190,12 +190,12 @@ TEST_F(Bags, EndWherePagesOfADatabaseRepeat) {
   auto bytes = bytes_of(folder / "evt3.db3");
   repeat_first_pages(bytes);
   MemoryBytes source(bytes);
-  BagDecoder decoder("");
-  decoder.open(source);
-  const auto contents = decode(decoder, bytes);
+  const auto decoder = make_bag_decoder("");
+  decoder->open(source);
+  const auto contents = decode(*decoder, bytes);
   EXPECT_GT(contents.events.size(), 0U);
   EXPECT_LT(contents.events.size(), events.size() / 2);
-  EXPECT_EQ(decoder.corruption().places, 1U);
+  EXPECT_EQ(decoder->corruption().places, 1U);
 }
 
 TEST_F(Bags, StateNoLastTimeOfASourceThatIsStopped) {
@@ -203,11 +203,11 @@ TEST_F(Bags, StateNoLastTimeOfASourceThatIsStopped) {
     SCOPED_TRACE(name);
     const auto bytes = bytes_of(folder / name);
     recordings::BreakableBytes source(bytes);
-    BagDecoder decoder("");
-    decoder.open(source);
-    decode(decoder, bytes);
+    const auto decoder = make_bag_decoder("");
+    decoder->open(source);
+    decode(*decoder, bytes);
     source.is_broken = true;
-    EXPECT_EQ(decoder.last_time(), std::nullopt);
+    EXPECT_EQ(decoder->last_time(), std::nullopt);
   }
 }
 
@@ -233,23 +233,23 @@ TEST_F(Bags, LoseOnlyWhatIsCutOffOrCorrupt) {
     cut.resize(cut.size() / 2);
     for (const bool pulled : {false, true}) {
       MemoryBytes source(cut);
-      BagDecoder decoder("");
-      if (pulled) decoder.open(source);
-      const auto contents = decode(decoder, cut);
+      const auto decoder = make_bag_decoder("");
+      if (pulled) decoder->open(source);
+      const auto contents = decode(*decoder, cut);
       EXPECT_GT(contents.events.size(), 2000U);
       EXPECT_TRUE(
           std::ranges::equal(contents.events, std::span(events).first(contents.events.size())));
-      EXPECT_EQ(decoder.corruption().places, 1U);
+      EXPECT_EQ(decoder->corruption().places, 1U);
     }
     auto corrupt = bytes;
     std::ranges::fill(std::span(corrupt).subspan(corrupt.size() / 3, 500), 0xa5);
-    BagDecoder decoder("");
-    EXPECT_GT(common(events, decode(decoder, corrupt).events), 4000U);
+    const auto decoder = make_bag_decoder("");
+    EXPECT_GT(common(events, decode(*decoder, corrupt).events), 4000U);
     // Bags of ROS 1 have no checksums.
     const bool has_checksums =
         name.ends_with(".mcap") && name.find("-no-chunks") == std::string::npos;
-    EXPECT_GE(decoder.corruption().places, has_checksums ? 1U : 0U);
-    EXPECT_LE(decoder.corruption().places, 100U);
+    EXPECT_GE(decoder->corruption().places, has_checksums ? 1U : 0U);
+    EXPECT_LE(decoder->corruption().places, 100U);
   }
 }
 
@@ -263,11 +263,11 @@ TEST_F(Bags, OfDatabasesSurviveCorruptPages) {
                       static_cast<std::uint8_t>(i * 37));
     if (i % 4 == 0) corrupt.resize(bytes.size() - at);
     MemoryBytes source(corrupt);
-    BagDecoder decoder("");
+    const auto decoder = make_bag_decoder("");
     try {
-      decoder.open(source);
-      EXPECT_LE(decode(decoder, {}).events.size(), events.size());
-      noticed += decoder.corruption().places > 0 ? 1 : 0;
+      decoder->open(source);
+      EXPECT_LE(decode(*decoder, {}).events.size(), events.size());
+      noticed += decoder->corruption().places > 0 ? 1 : 0;
     } catch (const UnsupportedFormat&) {
       ++noticed;
     }
@@ -281,11 +281,11 @@ TEST(Databases, OfManyMessagesAreReadWhole) {
   const auto events = recordings::random_events(size, 200'000, 3, 1'700'000'000'000'000, 1000);
   const auto bytes = rosbags::db3_of_events(size, events, 1);
   MemoryBytes source(bytes);
-  BagDecoder decoder("");
-  decoder.open(source);
-  EXPECT_EQ(decode(decoder, {}).events, events);
-  EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
-  EXPECT_EQ(decoder.last_time(), events.back().t);
+  const auto decoder = make_bag_decoder("");
+  decoder->open(source);
+  EXPECT_EQ(decode(*decoder, {}).events, events);
+  EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
+  EXPECT_EQ(decoder->last_time(), events.back().t);
 }
 
 /// A database made by statements of SQL.
@@ -372,9 +372,9 @@ TEST_F(Bags, HaveTheSensorSizeOfTheirFirstPacket) {
   const auto found = std::search(bytes.begin(), bytes.end(), stated.begin(), stated.end());
   ASSERT_NE(found, bytes.end());
   std::fill_n(found, stated.size(), std::uint8_t{0});
-  BagDecoder decoder("/camera/events");
-  EXPECT_EQ(decode(decoder, bytes).events, events);
-  EXPECT_EQ(decoder.streams().front().size, SensorSize{});
+  const auto decoder = make_bag_decoder("/camera/events");
+  EXPECT_EQ(decode(*decoder, bytes).events, events);
+  EXPECT_EQ(decoder->streams().front().size, SensorSize{});
 }
 
 TEST_F(Bags, KeepNoOverlongNames) {
@@ -388,9 +388,9 @@ TEST_F(Bags, KeepNoOverlongNames) {
                                           rosbags::sized("cdr") + rosbags::sized(""));
   auto bytes = bytes_of(folder / "evt3-no-chunks.mcap");
   bytes.insert(bytes.begin() + 8, records.begin(), records.end());
-  BagDecoder decoder("");
-  EXPECT_EQ(decode(decoder, bytes).events, events);
-  EXPECT_EQ(decoder.corruption().places, 2U);
+  const auto decoder = make_bag_decoder("");
+  EXPECT_EQ(decode(*decoder, bytes).events, events);
+  EXPECT_EQ(decoder->corruption().places, 2U);
   EXPECT_EQ(refusal_of(bytes, "/none").find(name), std::string::npos);
 }
 
@@ -438,10 +438,10 @@ TEST(Mcap, LosesAMessageOfAnUncompressedChunkByAFlippedBit) {
     for (const std::size_t bit : {0, 10, 20, 40, 63}) {
       auto corrupt = bytes;
       corrupt[at + 1 + bit / 8] ^= static_cast<std::uint8_t>(1U << bit % 8);
-      BagDecoder decoder("");
-      EXPECT_GE(decode(decoder, corrupt).events.size(), events.size() * 8 / 10)
+      const auto decoder = make_bag_decoder("");
+      EXPECT_GE(decode(*decoder, corrupt).events.size(), events.size() * 8 / 10)
           << "bit " << bit << " at " << at;
-      EXPECT_GE(decoder.corruption().places, 1U);
+      EXPECT_GE(decoder->corruption().places, 1U);
       ++flipped;
     }
     at += 9 + size - 1;
@@ -460,12 +460,12 @@ TEST(Mcap, ReadsBackWhatItWrites) {
         const auto events = recordings::random_events(hd, 20'000, seed++, start, pause);
         const auto bytes = encoded({hd, format, compression}, events, 1 + seed * 37);
         MemoryBytes source(bytes);
-        BagDecoder decoder("");
-        decoder.open(source);
-        EXPECT_EQ(decode(decoder, bytes).events, events);
-        EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
-        EXPECT_EQ(decoder.streams().front().size, hd);
-        EXPECT_EQ(decoder.last_time(), events.back().t);
+        const auto decoder = make_bag_decoder("");
+        decoder->open(source);
+        EXPECT_EQ(decode(*decoder, bytes).events, events);
+        EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
+        EXPECT_EQ(decoder->streams().front().size, hd);
+        EXPECT_EQ(decoder->last_time(), events.back().t);
       }
 }
 
@@ -482,8 +482,8 @@ TEST(Mcap, KeepsTriggersWithEvt3) {
   EXPECT_GT(encoder->pending(), 0U);
   encoder->finish(bytes);
   EXPECT_EQ(encoder->pending(), 0U);
-  BagDecoder decoder("");
-  const auto contents = decode(decoder, bytes);
+  const auto decoder = make_bag_decoder("");
+  const auto contents = decode(*decoder, bytes);
   EXPECT_EQ(contents.events, events);
   EXPECT_EQ(contents.triggers, triggers);
   EXPECT_FALSE(make_mcap_encoder({hd, BagEvents::mono})->encode_trigger(triggers[0], bytes));

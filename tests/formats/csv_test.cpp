@@ -4,8 +4,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "src/formats/text/csv_decoder.hpp"
-#include "src/formats/text/csv_encoder.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {
@@ -19,9 +18,9 @@ struct Read {
 };
 
 Read read(std::string_view text, const TableSettings& settings = {}) {
-  CsvDecoder decoder(settings);
-  auto events = decode(decoder, bytes_of(text)).events;
-  return {std::move(events), decoder.corruption(), decoder.size()};
+  const auto decoder = make_csv_decoder(settings);
+  auto events = decode(*decoder, bytes_of(text)).events;
+  return {std::move(events), decoder->corruption(), decoder->size()};
 }
 
 AbsoluteEvent on(int x, int y, Microseconds t) {
@@ -254,7 +253,7 @@ TEST(Csv, CorruptionIsSkippedAndCounted) {
   EXPECT_EQ(found.corruption.places, 5U);
   EXPECT_EQ(found.corruption.first_at, 16U);
   EXPECT_EQ(found.corruption.outside, 3U);
-  events_however_split([] { return std::make_unique<CsvDecoder>(); }, bytes_of(text));
+  events_however_split([] { return make_csv_decoder(); }, bytes_of(text));
 
   const auto outside = read("t,x,y,p\n1,9,7,1\n1,10,7,1\n1,9,8,1\n", {.size = {10, 8}});
   EXPECT_EQ(outside.events.size(), 1U);
@@ -374,7 +373,7 @@ TEST(Csv, Utf16IsReadAsUtf8) {
       bytes.push_back(static_cast<std::uint8_t>(is_big ? unit >> 8 : unit));
       bytes.push_back(static_cast<std::uint8_t>(is_big ? unit : unit >> 8));
     }
-    EXPECT_EQ(events_however_split([] { return std::make_unique<CsvDecoder>(); }, bytes), two);
+    EXPECT_EQ(events_however_split([] { return make_csv_decoder(); }, bytes), two);
   }
   EXPECT_THROW(read("5"), UnsupportedFormat);
 }
@@ -393,7 +392,7 @@ TEST(Csv, ALongLineIsSkippedWithoutBeingKept) {
   EXPECT_EQ(found.events.size(), 304U);
   EXPECT_EQ(found.corruption.places, 2U);
   EXPECT_EQ(found.corruption.first_at, at);
-  events_however_split([] { return std::make_unique<CsvDecoder>(); }, bytes_of(text));
+  events_however_split([] { return make_csv_decoder(); }, bytes_of(text));
 }
 
 TEST(Csv, WhatIsNoTextOfEventsIsRefused) {
@@ -424,13 +423,13 @@ std::vector<std::optional<EventColumn>> columns_in(const CsvFormat& format) {
 }
 
 TEST(Csv, HasTheLabelsOfEvents) {
-  CsvEncoder encoder({.labels = true}, {640, 480});
+  const auto encoder = make_csv_encoder({.labels = true}, {640, 480});
   std::vector<std::uint8_t> bytes;
   const std::vector<Label> labels = {{300, Cause::leak}, {0, Cause::light}};
-  encoder.encode(Events{on(1, 2, 3)}, bytes);  // without
-  encoder.label(labels);
-  encoder.encode(Events{on(4, 5, 6)}, bytes);
-  encoder.encode(Events{on(7, 8, 9)}, bytes);
+  encoder->encode(Events{on(1, 2, 3)}, bytes);  // without
+  encoder->label(labels);
+  encoder->encode(Events{on(4, 5, 6)}, bytes);
+  encoder->encode(Events{on(7, 8, 9)}, bytes);
   EXPECT_EQ(std::string(bytes.begin(), bytes.end()),
             "t,x,y,p,cause,class\n3,1,2,1,0,0\n6,4,5,1,2,300\n9,7,8,1,1,0\n");
 }
@@ -440,7 +439,7 @@ TEST(Csv, EveryFormatComesBack) {
     for (const SensorSize size : {SensorSize{1, 1}, {128, 128}, {1280, 720}}) {
       SCOPED_TRACE(testing::Message() << name << " " << size.width);
       auto events = random_events(size, 20'000, 1, 1000);
-      CsvEncoder encoder(format, size);
+      const auto encoder = make_csv_encoder(format, size);
       // With a sensor of a few pixels, times and coordinates are indistinguishable; bursts and
       // silences make the unit ambiguous.
       const bool is_small = size.width < 100;
@@ -449,14 +448,14 @@ TEST(Csv, EveryFormatComesBack) {
         settings.columns = columns_in(format);
         events.insert(events.begin(), {on(0, 0, -3'000'001), on(0, 0, -1)});
       }
-      CsvDecoder decoder(settings);
-      EXPECT_TRUE(decode(decoder, encode(encoder, events, 77), 0).events == events);
-      EXPECT_EQ(decoder.corruption().places + decoder.corruption().outside, 0U);
+      const auto decoder = make_csv_decoder(settings);
+      EXPECT_TRUE(decode(*decoder, encode(*encoder, events, 77), 0).events == events);
+      EXPECT_EQ(decoder->corruption().places + decoder->corruption().outside, 0U);
       using Header = CsvFormat::Header;
       const auto header = format.header;
       const bool sized =
           header == Header::names_and_size || header == Header::geometry || header == Header::size;
-      EXPECT_EQ(decoder.size(), sized ? size : SensorSize{});
+      EXPECT_EQ(decoder->size(), sized ? size : SensorSize{});
     }
   }
 }

@@ -3,9 +3,8 @@
 // files lose only the corrupt parts.
 #include <gtest/gtest.h>
 
-#include "src/formats/aedat/aedat2_decoder.hpp"
-#include "src/formats/aedat/aedat3_decoder.hpp"
 #include "tests/formats/aedat_files.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 #include "tests/formats/shared_data.hpp"
 
@@ -28,12 +27,11 @@ Events some_events(SensorSize size) {
 void expect_events(const Bytes& bytes, const Events& events, SensorSize size,
                    Aedat2Version version = Aedat2Version::two) {
   EXPECT_TRUE(recordings::events_however_split(
-                  [&] { return std::make_unique<Aedat2Decoder>(SensorSize{}, version); }, bytes) ==
-              events);
-  Aedat2Decoder decoder({}, version);
-  decode(decoder, bytes);
-  EXPECT_EQ(decoder.size(), size);
-  EXPECT_EQ(decoder.corruption().places + decoder.corruption().outside, 0U);
+                  [&] { return make_aedat2_decoder(SensorSize{}, version); }, bytes) == events);
+  const auto decoder = make_aedat2_decoder({}, version);
+  decode(*decoder, bytes);
+  EXPECT_EQ(decoder->size(), size);
+  EXPECT_EQ(decoder->corruption().places + decoder->corruption().outside, 0U);
 }
 
 TEST(Aedat2, ReadsTheFilesOfEveryProgram) {
@@ -58,8 +56,8 @@ TEST(Aedat1, RecordsAsTheFormatHasThem) {
   for (const std::uint8_t byte :
        {0x02, 0x13, 0x00, 0x00, 0x01, 0x02, 0x80, 0x00, 0x00, 0x00, 0x01, 0x03})
     bytes.push_back(byte);
-  Aedat2Decoder decoder({}, Aedat2Version::one);
-  const auto out = decode(decoder, bytes);
+  const auto decoder = make_aedat2_decoder({}, Aedat2Version::one);
+  const auto out = decode(*decoder, bytes);
   EXPECT_EQ(out.events, (std::vector{AbsoluteEvent::at(118, 125, 0x102, Polarity::off)}));
   EXPECT_EQ(out.triggers, (std::vector<Trigger>{{0x103, 0, true}}));
 }
@@ -72,9 +70,9 @@ TEST(Aedat2, AddressesAsTheFormatHasThem) {
   aedat_files::add_record(bytes, 1U << 10, 1003);                        // a trigger
   aedat_files::add_record(bytes, 1U << 10 | 2, 1004);                    // falling edge
   aedat_files::add_record(bytes, 9U << 22 | 4U << 12 | 1U << 10, 1005);  // v2e noise event
-  Aedat2Decoder decoder;
-  const auto out = decode(decoder, bytes);
-  EXPECT_EQ(decoder.size(), (SensorSize{240, 180}));
+  const auto decoder = make_aedat2_decoder();
+  const auto out = decode(*decoder, bytes);
+  EXPECT_EQ(decoder->size(), (SensorSize{240, 180}));
   EXPECT_EQ(out.events, (std::vector{AbsoluteEvent::at(236, 172, 1000, Polarity::on),
                                      AbsoluteEvent::at(235, 170, 1005, Polarity::off)}));
   EXPECT_EQ(out.triggers, (std::vector<Trigger>{{1003, 0, true}, {1004, 0, false}}));
@@ -83,8 +81,8 @@ TEST(Aedat2, AddressesAsTheFormatHasThem) {
   aedat_files::add_record(bytes, 2U << 8 | 9U << 1, 50);
   aedat_files::add_record(bytes, 2U << 8 | 9U << 1 | 1, 51);
   aedat_files::add_record(bytes, 0x8000, 52);
-  Aedat2Decoder other;
-  const auto of_dvs = decode(other, bytes);
+  const auto other = make_aedat2_decoder();
+  const auto of_dvs = decode(*other, bytes);
   EXPECT_EQ(of_dvs.events, (std::vector{AbsoluteEvent::at(118, 125, 50, Polarity::on),
                                         AbsoluteEvent::at(118, 125, 51, Polarity::off)}));
   EXPECT_EQ(of_dvs.triggers, (std::vector<Trigger>{{52, 0, true}}));
@@ -109,30 +107,30 @@ TEST(Aedat2, TheHeaderOrTheUserTellsTheSizeOfADavis) {
     const auto text = std::to_string(size.width) + "x" + std::to_string(size.height);
     for (const std::string& line : {"# sensor size " + text + "\r\n", std::string()}) {
       const auto bytes = aedat_files::aedat2_v2e(events, size, line);
-      Aedat2Decoder decoder(line.empty() ? size : SensorSize{});
-      EXPECT_TRUE(decode(decoder, bytes).events == events) << line;
-      EXPECT_EQ(decoder.size(), size);
-      EXPECT_FALSE(decoder.streams().front().mirrored);
+      const auto decoder = make_aedat2_decoder(line.empty() ? size : SensorSize{});
+      EXPECT_TRUE(decode(*decoder, bytes).events == events) << line;
+      EXPECT_EQ(decoder->size(), size);
+      EXPECT_FALSE(decoder->streams().front().mirrored);
     }
   }
   auto bytes = aedat_files::aedat2_header("DAVI346");
   aedat_files::add_record(bytes, 7U << 22 | 3U << 12 | 1U << 11, 1000);
-  Aedat2Decoder decoder(davis346);
-  EXPECT_EQ(decode(decoder, bytes).events,
+  const auto decoder = make_aedat2_decoder(davis346);
+  EXPECT_EQ(decode(*decoder, bytes).events,
             std::vector{AbsoluteEvent::at(342, 252, 1000, Polarity::on)});
 }
 
 TEST(Aedat2, WithoutASizeEventsStayMirrored) {
   const SensorSize size{240, 180};
   const auto events = some_events(size);
-  Aedat2Decoder decoder;
-  auto turned = decode(decoder, aedat_files::aedat2_v2e(events, size), 1).events;
-  EXPECT_EQ(decoder.size(), SensorSize{});
-  EXPECT_TRUE(decoder.streams().front().mirrored);
+  const auto decoder = make_aedat2_decoder();
+  auto turned = decode(*decoder, aedat_files::aedat2_v2e(events, size), 1).events;
+  EXPECT_EQ(decoder->size(), SensorSize{});
+  EXPECT_TRUE(decoder->streams().front().mirrored);
   for (auto& event : turned)
     event = AbsoluteEvent::at(239 - event.x, 179 - event.y(), event.t, event.polarity());
   EXPECT_TRUE(turned == events);
-  EXPECT_EQ(decoder.corruption().places + decoder.corruption().outside, 0U);
+  EXPECT_EQ(decoder->corruption().places + decoder->corruption().outside, 0U);
 }
 
 TEST(Aedat2, MissingBytesCostNoMoreThanTheNextFewRecords) {
@@ -143,12 +141,12 @@ TEST(Aedat2, MissingBytesCostNoMoreThanTheNextFewRecords) {
     auto bytes = sound;
     const auto at = static_cast<std::ptrdiff_t>(data + 8 * 1000 + 3);
     bytes.erase(bytes.begin() + at, bytes.begin() + at + static_cast<std::ptrdiff_t>(missing));
-    Aedat2Decoder decoder;
-    const auto found = decode(decoder, bytes, 1).events;
+    const auto decoder = make_aedat2_decoder();
+    const auto found = decode(*decoder, bytes, 1).events;
     EXPECT_GE(found.size(), 1990U);
     EXPECT_TRUE(std::equal(events.end() - 990, events.end(), found.end() - 990)) << missing;
-    EXPECT_EQ(decoder.corruption().places, 1U);
-    EXPECT_NEAR(static_cast<double>(decoder.corruption().first_at), static_cast<double>(at), 16);
+    EXPECT_EQ(decoder->corruption().places, 1U);
+    EXPECT_NEAR(static_cast<double>(decoder->corruption().first_at), static_cast<double>(at), 16);
   }
 }
 
@@ -157,38 +155,37 @@ TEST(Aedat2, ATimeFarFromItsNeighboursMovesNoOther) {
   auto bytes = aedat_files::aedat2_davis(events, davis346, "Davis346");
   bytes[bytes.size() - 8 * 50 + 4] ^= 0x40;
   bytes[bytes.size() - 8 * 30] |= 0x7f;  // a row outside the sensor
-  Aedat2Decoder decoder;
+  const auto decoder = make_aedat2_decoder();
   auto expected = events;
   expected.erase(expected.begin() + 70);
   expected.erase(expected.begin() + 50);
-  EXPECT_TRUE(decode(decoder, bytes, 1).events == expected);
-  EXPECT_EQ(decoder.corruption().places, 1U);
-  EXPECT_EQ(decoder.corruption().outside, 1U);
+  EXPECT_TRUE(decode(*decoder, bytes, 1).events == expected);
+  EXPECT_EQ(decoder->corruption().places, 1U);
+  EXPECT_EQ(decoder->corruption().outside, 1U);
 }
 
 TEST(Aedat2, ARecordingWithALongHeader) {
   const auto bytes = shared_data::events_file("aedat2-dvs128-header.aedat");
   if (bytes.empty()) GTEST_SKIP() << "no aedat2-dvs128-header.aedat in $SHARED_DATA";
-  Aedat2Decoder decoder;
-  decode(decoder, bytes, 1);
-  EXPECT_EQ(decoder.data_at(), 4241U);
-  EXPECT_EQ(decoder.size(), dvs128);
+  const auto decoder = make_aedat2_decoder();
+  decode(*decoder, bytes, 1);
+  EXPECT_EQ(decoder->size(), dvs128);
   // The content is "$$$...\r\n", which is no address of a DVS128; the last 6 bytes are a partial
   // record.
-  EXPECT_EQ(decoder.corruption().places, 1U);
-  EXPECT_EQ(decoder.corruption().first_at, 4241U);
+  EXPECT_EQ(decoder->corruption().places, 1U);
+  EXPECT_EQ(decoder->corruption().first_at, 4241U);
 }
 
 TEST(Aedat3, PolarityEventsOfAllTimes) {
   for (const auto& [size, camera] : {std::pair{davis346, "DAVIS346C"}, {{2048, 2048}, "Other"}}) {
     const auto events = recordings::random_events(size, 30'000, 1, 0, 300 * hour);
     const auto bytes = aedat_files::aedat3(events, camera, 1000);
-    EXPECT_TRUE(recordings::events_however_split([] { return std::make_unique<Aedat3Decoder>(); },
-                                                 bytes) == events);
-    Aedat3Decoder decoder;
-    decode(decoder, bytes);
-    EXPECT_EQ(decoder.size(), size == davis346 ? size : SensorSize{});
-    EXPECT_EQ(decoder.corruption().places + decoder.corruption().outside, 0U);
+    EXPECT_TRUE(recordings::events_however_split([] { return make_aedat3_decoder(); }, bytes) ==
+                events);
+    const auto decoder = make_aedat3_decoder();
+    decode(*decoder, bytes);
+    EXPECT_EQ(decoder->size(), size == davis346 ? size : SensorSize{});
+    EXPECT_EQ(decoder->corruption().places + decoder->corruption().outside, 0U);
   }
 }
 
@@ -206,8 +203,8 @@ TEST(Aedat3, OtherPacketsAreLeftOutAndEdgesAreTriggers) {
   aedat_files::add_little(bytes, 200, 4);
   aedat_files::add_little(bytes, 5 << 17 | 6 << 2 | 3, 4);
   aedat_files::add_little(bytes, 201, 4);
-  Aedat3Decoder decoder;
-  const auto out = decode(decoder, bytes, 1);
+  const auto decoder = make_aedat3_decoder();
+  const auto out = decode(*decoder, bytes, 1);
   const auto base = Microseconds{1} << 31;
   EXPECT_EQ(out.events, (std::vector{AbsoluteEvent::at(5, 6, base + 201, Polarity::on)}));
   EXPECT_EQ(out.triggers, (std::vector<Trigger>{{base + 102, 0, true},
@@ -215,20 +212,20 @@ TEST(Aedat3, OtherPacketsAreLeftOutAndEdgesAreTriggers) {
                                                 {base + 104, 0, true},
                                                 {base + 107, 1, false},
                                                 {base + 109, 2, true}}));
-  EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+  EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
 }
 
 TEST(EarlyAedat, WhatIsOfAnotherVersionIsRefused) {
   for (const std::string_view text : {"", "#", "#!AER-DAT3.1\r\n", "#!AER-DAT4.0\r\n",
                                       "% evt 3.0\n", "#!AER-DAT2.0\r\n# AEChip: Cochlea\r\n"}) {
-    Aedat2Decoder decoder;
-    EXPECT_NE(recordings::refusal(decoder, recordings::bytes_of(text)), "") << text;
+    const auto decoder = make_aedat2_decoder();
+    EXPECT_NE(recordings::refusal(*decoder, recordings::bytes_of(text)), "") << text;
   }
   for (const std::string_view text :
        {"", "#!AER-DAT2.0\r\n", "#!AER-DAT3.1\r\n", "#!AER-DAT3.1\r\nno end",
         "#!AER-DAT3.1\r\n#Format: Serial-TS\r\n#!END-HEADER\r\n"}) {
-    Aedat3Decoder decoder;
-    EXPECT_NE(recordings::refusal(decoder, recordings::bytes_of(text)), "") << text;
+    const auto decoder = make_aedat3_decoder();
+    EXPECT_NE(recordings::refusal(*decoder, recordings::bytes_of(text)), "") << text;
   }
 }
 
@@ -243,13 +240,13 @@ TEST(Aedat3, ABrokenPacketCostsNoOther) {
     auto bytes = sound;
     change(bytes);
     for (const std::size_t piece : {SIZE_MAX, std::size_t{0}}) {
-      Aedat3Decoder decoder;
-      const auto found = decode(decoder, bytes, piece).events;
+      const auto decoder = make_aedat3_decoder();
+      const auto found = decode(*decoder, bytes, piece).events;
       ASSERT_GE(found.size() + max_lost, events.size());
       const auto before = static_cast<std::ptrdiff_t>(first_lost);
       EXPECT_TRUE(std::equal(events.begin(), events.begin() + before, found.begin()));
       EXPECT_TRUE(std::equal(events.end() - 3000, events.end(), found.end() - 3000));
-      EXPECT_EQ(decoder.corruption().places, 1U) << decoder.corruption().first;
+      EXPECT_EQ(decoder->corruption().places, 1U) << decoder->corruption().first;
     }
   };
   broken("header", 1000, 1000, [&](Bytes& b) { b[header + packet + 5] = 3; });
@@ -267,9 +264,9 @@ TEST(Aedat3, ABrokenPacketCostsNoOther) {
 
   auto bytes = sound;
   bytes.erase(bytes.end() - 12, bytes.end());
-  Aedat3Decoder decoder;
-  EXPECT_EQ(decode(decoder, bytes, 0).events.size(), 4998U);
-  EXPECT_EQ(decoder.corruption().places, 1U);
+  const auto decoder = make_aedat3_decoder();
+  EXPECT_EQ(decode(*decoder, bytes, 0).events.size(), 4998U);
+  EXPECT_EQ(decoder->corruption().places, 1U);
 }
 
 TEST(Aedat3, EventsOutsideAreDroppedAlone) {
@@ -282,10 +279,10 @@ TEST(Aedat3, EventsOutsideAreDroppedAlone) {
     }
     const auto bytes = aedat_files::aedat3(events, "DAVIS346", max_events);
     for (const std::size_t piece : {SIZE_MAX, std::size_t{1}}) {
-      Aedat3Decoder decoder;
-      EXPECT_TRUE(decode(decoder, bytes, piece).events == expected);
-      EXPECT_EQ(decoder.corruption().outside, 5U);
-      EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+      const auto decoder = make_aedat3_decoder();
+      EXPECT_TRUE(decode(*decoder, bytes, piece).events == expected);
+      EXPECT_EQ(decoder->corruption().outside, 5U);
+      EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
     }
   }
 }

@@ -15,8 +15,8 @@
 #include "src/formats/byte_source.hpp"
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_filters.hpp"
-#include "src/formats/hdf5/hdf5_reader.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {
@@ -29,13 +29,9 @@ using Settings = Hdf5Writer::Settings;
 constexpr SensorSize vga{640, 480};
 constexpr Settings metavision = {Hdf5Format::metavision, Compression::none, vga};
 
-Bytes contents(const std::filesystem::path& file) {
+Bytes bytes_in(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-std::unique_ptr<ByteSource> in_memory(Bytes file) {
-  return std::make_unique<MemoryBytes>(std::move(file));
 }
 
 class Hdf5 : public testing::Test {
@@ -56,7 +52,7 @@ class Hdf5 : public testing::Test {
     for (; !events.empty(); events = events.subspan(std::min(at_once, events.size())))
       writer.append(events.first(std::min(at_once, events.size())));
     writer.close();
-    return contents(path());
+    return bytes_in(path());
   }
 
  private:
@@ -69,16 +65,28 @@ std::vector<Settings> all_settings() {
           metavision};
 }
 
-Events read_all(Hdf5Reader& reader) {
-  Events events;
-  while (reader.read(10'000, events) > 0) {
+/// A file in memory, and its content.
+struct Read {
+  explicit Read(Bytes file) : bytes(std::move(file)) {
+    decoder->open(bytes);
+    contents.take_all(*decoder);
   }
-  return events;
-}
+
+  /// Content from this time on.
+  Contents from(Microseconds t) const {
+    Contents rest;
+    decoder->restart({.t = t});
+    rest.take_all(*decoder);
+    return rest;
+  }
+
+  MemoryBytes bytes;
+  std::unique_ptr<Decoder> decoder = make_hdf5_decoder();
+  Contents contents;
+};
 
 Events read_all(const Bytes& file) {
-  Hdf5Reader reader(in_memory(file));
-  return read_all(reader);
+  return Read(file).contents.events;
 }
 
 /// All numbers of a dataset.
@@ -117,7 +125,7 @@ TEST_F(Hdf5, LabelsAreDatasets) {
       writer.append(std::span(events).subspan(i, size));
     }
   }
-  EXPECT_TRUE(read_all(contents(path())) == events);
+  EXPECT_TRUE(read_all(bytes_in(path())) == events);
   EXPECT_TRUE(numbers_in(path(), "events/cause") == causes);
   EXPECT_TRUE(numbers_in(path(), "events/class") == classes);
 }
@@ -131,15 +139,9 @@ TEST_F(Hdf5, TriggersComeBack) {
     writer.append(std::span<const Trigger>(triggers).first(100));
     writer.append(std::span<const Trigger>(triggers).subspan(100));
   }
-  Hdf5Reader reader(in_memory(contents(path())));
-  std::vector<Trigger> found;
-  while (reader.read_triggers(777, found) > 0) {
-  }
-  EXPECT_TRUE(found == triggers);
-  reader.seek(1'000'050);
-  found.clear();
-  EXPECT_EQ(reader.read_triggers(1, found), 1U);
-  EXPECT_EQ(found.front().t, 1'000'100);
+  const Read read(bytes_in(path()));
+  EXPECT_TRUE(read.contents.triggers == triggers);
+  EXPECT_EQ(read.from(1'000'050).triggers.front().t, 1'000'100);
 }
 
 TEST_F(Hdf5, WhatALayoutCannotHoldIsRefused) {
@@ -202,9 +204,9 @@ TEST_F(Hdf5, MostEventsSurviveAFullDisk) {
             << error.what();
       }
       if (min_kept(written) == 0) continue;
-      Hdf5Reader reader(in_memory(contents(path())));
-      const auto left = read_all(reader);
-      EXPECT_EQ(reader.corruption().places, 0U);
+      const Read read(bytes_in(path()));
+      const auto& left = read.contents.events;
+      EXPECT_EQ(read.decoder->corruption().places, 0U);
       EXPECT_GE(left.size(), min_kept(written));
       EXPECT_TRUE(std::ranges::equal(left, std::span(events).first(left.size())));
     }
@@ -231,9 +233,9 @@ Events left_by_a_killed_process(const std::filesystem::path& file, const Setting
   int status = 0;
   waitpid(child, &status, 0);
   EXPECT_TRUE(WIFSIGNALED(status));
-  Hdf5Reader reader(in_memory(contents(file)));
-  EXPECT_EQ(reader.corruption().places, 0U);
-  return read_all(reader);
+  const Read read(bytes_in(file));
+  EXPECT_EQ(read.decoder->corruption().places, 0U);
+  return read.contents.events;
 }
 
 TEST_F(Hdf5, WhatWasCommittedAndMostOfTheRestSurvivesTheProcess) {
@@ -275,17 +277,12 @@ TEST_F(Hdf5, ComesBackWithAndWithoutCommits) {
           rest = rest.subspan(part.size());
         }
       }
-      Hdf5Reader reader(in_memory(contents(path())));
-      EXPECT_EQ(reader.size(), vga);
-      ASSERT_TRUE(reader.time_range());
-      EXPECT_EQ(reader.time_range()->first, events.front().t);
-      EXPECT_EQ(reader.time_range()->last, events.back().t);
-      EXPECT_TRUE(read_all(reader) == events);
-      EXPECT_EQ(reader.corruption().places + reader.corruption().outside, 0U);
-      reader.seek(events[150'000].t);
-      Events found;
-      reader.read(1, found);
-      EXPECT_EQ(found.front().t, events[150'000].t);
+      const Read read(bytes_in(path()));
+      EXPECT_EQ(read.decoder->streams().front().size, vga);
+      EXPECT_EQ(read.decoder->last_time(), events.back().t);
+      EXPECT_TRUE(read.contents.events == events);
+      EXPECT_EQ(read.decoder->corruption().places + read.decoder->corruption().outside, 0U);
+      EXPECT_EQ(read.from(events[150'000].t).events.front().t, events[150'000].t);
     }
   }
 }
@@ -325,12 +322,12 @@ TEST_F(Hdf5, CorruptChunksAreLeftOutAndCounted) {
   ASSERT_NE(at, file.end());
   auto corrupt = file;
   corrupt[static_cast<std::size_t>(at - file.begin()) + 3] = 0xff;
-  Hdf5Reader reader(in_memory(corrupt));
+  const Read read(corrupt);
   auto expected = events;
   expected.erase(expected.begin() + 16384 * 2, expected.begin() + 16384 * 3);
-  EXPECT_TRUE(read_all(reader) == expected);
-  EXPECT_EQ(reader.corruption().places, 1U);
-  EXPECT_EQ(reader.corruption().first_at, static_cast<std::uint64_t>(at - file.begin()));
+  EXPECT_TRUE(read.contents.events == expected);
+  EXPECT_EQ(read.decoder->corruption().places, 1U);
+  EXPECT_EQ(read.decoder->corruption().first_at, static_cast<std::uint64_t>(at - file.begin()));
 }
 
 TEST_F(Hdf5, ASizeThatNoSensorHasIsNone) {
@@ -340,8 +337,7 @@ TEST_F(Hdf5, ASizeThatNoSensorHasIsNone) {
   const auto found = std::search(bytes.begin(), bytes.end(), size.begin(), size.end());
   ASSERT_NE(found, bytes.end());
   std::ranges::copy(none, found);
-  Hdf5Reader reader(in_memory(bytes));
-  EXPECT_EQ(reader.size(), SensorSize{});
+  EXPECT_EQ(Read(bytes).decoder->streams().front().size, SensorSize{});
 }
 
 TEST_F(Hdf5, FiltersAreUndone) {
@@ -381,7 +377,7 @@ TEST_F(Hdf5, FilesAreReadAndWrittenByThreads) {
         for (std::size_t j = 0; j < events.size(); j += 1000)
           writer.append(std::span(events).subspan(j, 1000));
       }
-      equal[i] = read_all(contents(file)) == events;
+      equal[i] = read_all(bytes_in(file)) == events;
     });
   }
   for (auto& thread : threads) thread.join();

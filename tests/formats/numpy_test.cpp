@@ -9,11 +9,11 @@
 #include <filesystem>
 #include <map>
 
-#include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/numpy/npz.hpp"
 #include "src/formats/numpy/zip_archive.hpp"
 #include "src/formats/temporary_file.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/npz_file.hpp"
 #include "tests/formats/recordings.hpp"
 
@@ -47,8 +47,7 @@ TEST(NpyEncoder, ComesBackWithAndWithoutThePatch) {
   auto patched = unpatched;
   apply_patch(encoder, patched);
   for (const auto& bytes : {unpatched, patched})
-    EXPECT_TRUE(events_however_split([] { return std::make_unique<NpyDecoder>(); }, bytes) ==
-                events);
+    EXPECT_TRUE(events_however_split([] { return make_npy_decoder(); }, bytes) == events);
 }
 
 /// Archive as an encoder writes it. Checks that its end comes in pieces.

@@ -12,15 +12,13 @@
 #include <tuple>
 
 #include "src/formats/aedat/aedat4.hpp"
-#include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
-#include "src/formats/aedat/aedat_decoder.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/es/es.hpp"
 #include "src/formats/evt/raw.hpp"
-#include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace eventcamera {
@@ -51,10 +49,6 @@ struct File {
   RecordingReader::MakeDecoder make_decoder;
 };
 
-std::unique_ptr<AedatDecoder> make_aedat_decoder() {
-  return std::make_unique<AedatDecoder>();
-}
-
 File raw_file() {
   const auto encoder = make_prophesee_raw_encoder(EvtFormat::evt3, sensor);
   return {"raw", recordings::encode(*encoder, some_events()),
@@ -64,8 +58,7 @@ File raw_file() {
 /// Without a stated size, and readable only from the start.
 File npy_file() {
   NpyEncoder encoder;
-  return {"npy", recordings::encode(encoder, some_events()),
-          [] { return std::make_unique<NpyDecoder>(); }};
+  return {"npy", recordings::encode(encoder, some_events()), [] { return make_npy_decoder(); }};
 }
 
 /// Encodes a frame whose pixels contain its number.
@@ -97,22 +90,20 @@ File aedat_file(bool has_table) {
   encoder.finish(bytes);
   recordings::apply_patch(encoder, bytes);
   return {has_table ? "aedat_with_a_table" : "aedat_without_a_table", std::move(bytes),
-          make_aedat_decoder};
+          [] { return make_aedat_decoder(); }};
 }
 
 /// As an older DV writes them: the table has the positions of the packets, and zeros.
 File aedat_file_with_a_table_of_zeros() {
   auto file = aedat_file(true);
-  Aedat4Decoder decoder;
-  decoder.push(file.bytes);
-  while (decoder.next()) continue;
-  const auto table_at = static_cast<std::ptrdiff_t>(decoder.table_at().value());
-  auto table = read_aedat4_table(std::span(file.bytes).subspan(*decoder.table_at()),
-                                 decoder.compression(), decoder.packets_at());
+  const auto header = read_aedat4_header(file.bytes).value();
+  const auto table_at = static_cast<std::ptrdiff_t>(header.table_at.value());
+  auto table = read_aedat4_table(std::span(file.bytes).subspan(*header.table_at),
+                                 header.compression, header.packets_at);
   for (auto& entry : table.value()) entry.elements = entry.start = entry.end = 0;
   file.name = "aedat_with_a_table_of_zeros";
   file.bytes.erase(file.bytes.begin() + table_at, file.bytes.end());
-  make_aedat4_compressor(decoder.compression()).compress(aedat4_table_content(*table), file.bytes);
+  make_aedat4_compressor(header.compression).compress(aedat4_table_content(*table), file.bytes);
   return file;
 }
 
@@ -241,7 +232,7 @@ TEST(RecordingReader, ReadsStreamsThatAreWrittenOneAfterTheOther) {
   for (const bool frames_first : {false, true}) {
     const auto bytes = aedat_of_parts(frames_first);
     for (const std::size_t size : {std::size_t{1000}, bytes.size()}) {
-      RecordingReader reader(make_aedat_decoder, chunk_length);
+      RecordingReader reader([] { return make_aedat_decoder(); }, chunk_length);
       Outcome outcome;
       outcome.take_all(reader, bytes, size);
       EXPECT_EQ(outcome.events(reader.origin()), some_events());
@@ -257,7 +248,7 @@ TEST(RecordingReader, ReadsStreamsThatAreWrittenOneAfterTheOther) {
     }
 
     MemoryBytes source(bytes);
-    RecordingReader reader(make_aedat_decoder, chunk_length);
+    RecordingReader reader([] { return make_aedat_decoder(); }, chunk_length);
     reader.open(source);
     reader.seek(200'000, 400'000);
     Outcome part;
@@ -312,7 +303,7 @@ TEST(RecordingReader, DoesNotReadOnWhileAStreamIsSilent) {
     encoder.finish(bytes);
     recordings::apply_patch(encoder, bytes);
     WatchedBytes source(bytes);
-    RecordingReader reader(make_aedat_decoder, chunk_length);
+    RecordingReader reader([] { return make_aedat_decoder(); }, chunk_length);
     reader.open(source);
     reader.seek(0, stop);
     Outcome outcome;
@@ -569,9 +560,7 @@ TEST(RecordingReader, SortsATableOrRefusesIt) {
     std::ranges::stable_sort(expected, {}, &AbsoluteEvent::t);
     const auto first = expected.front().t;
     for (const SensorSize size : {SensorSize{}, sensor}) {
-      const auto make = [size] {
-        return std::make_unique<NpyDecoder>(TableSettings{.size = size});
-      };
+      const auto make = [size] { return make_npy_decoder(TableSettings{.size = size}); };
       MemoryBytes bytes(file);
       RecordingReader pulled(make, chunk_length);
       pulled.open(bytes);
@@ -610,7 +599,7 @@ TEST(RecordingReader, DropsAWrongTimeOfALongTable) {
   events[100].t += Microseconds{1} << 30;
   NpyEncoder encoder;
   MemoryBytes table(recordings::encode(encoder, events));
-  RecordingReader pulled([] { return std::make_unique<NpyDecoder>(); }, chunk_length);
+  RecordingReader pulled([] { return make_npy_decoder(); }, chunk_length);
   pulled.open(table);
   Outcome outcome;
   outcome.take_all(pulled);

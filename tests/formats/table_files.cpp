@@ -3,8 +3,8 @@
 //   table_files write KIND FILE RAW
 //   table_files read KIND FILE RAW [columns=LETTERS] [unit=NUMBER] [path=PATH] [seek=MICROSECONDS]
 // RAW contains AbsoluteEvents in memory layout. Prints what else there is to know of a file that is
-// read: corrupt places, the position of the first, events outside the sensor, width, height and last
-// time, and then the first corruption and the streams that are not read.
+// read: corrupt places, the position of the first, events outside the sensor, width, height and
+// last time, and then the first corruption and the streams that are not read.
 #include <cstring>
 #include <fstream>
 #include <iostream>
@@ -13,13 +13,10 @@
 #include <memory>
 #include <string>
 
-#include "src/formats/hdf5/hdf5_reader.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
-#include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/numpy/npz.hpp"
-#include "src/formats/text/csv_decoder.hpp"
-#include "src/formats/text/csv_encoder.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {
@@ -45,7 +42,7 @@ std::unique_ptr<Encoder> make_encoder(const std::string& kind) {
   if (kind == "npy") return std::make_unique<NpyEncoder>();
   if (kind == "npz") return make_npz_encoder(size);
   for (const auto& [name, description, format] : csv_formats())
-    if (kind == name) return std::make_unique<CsvEncoder>(format, size);
+    if (kind == name) return make_csv_encoder(format, size);
   return nullptr;
 }
 
@@ -75,8 +72,8 @@ std::unique_ptr<Decoder> make_decoder(const std::string& kind, Options& options)
     settings.unit = static_cast<TimeUnit>(std::stoi(unit));
   if (kind == "hdf5") return make_hdf5_decoder({.path = options["path"], .table = settings});
   if (kind == "npz") return make_npz_decoder(settings);
-  if (kind == "npy") return std::make_unique<NpyDecoder>(settings);
-  return std::make_unique<CsvDecoder>(settings);
+  if (kind == "npy") return make_npy_decoder(settings);
+  return make_csv_decoder(settings);
 }
 
 /// Reads a file with random access, and expects the same events in pieces.

@@ -19,9 +19,9 @@
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/numpy/npz.hpp"
 #include "src/formats/ros/mcap_encoder.hpp"
-#include "src/formats/text/csv_encoder.hpp"
 #include "tests/formats/aedat_files.hpp"
 #include "tests/formats/compressed.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/formats.hpp"
 #include "tests/formats/npz_file.hpp"
 #include "tests/formats/recordings.hpp"
@@ -132,9 +132,9 @@ std::vector<Seed> aedat4_seeds() {
 std::vector<Seed> csv_seeds() {
   std::vector<Seed> seeds;
   for (const auto& [name, description, format] : csv_formats()) {
-    CsvEncoder encoder(format, {640, 480});
+    const auto encoder = make_csv_encoder(format, {640, 480});
     seeds.push_back(
-        {std::string(name), recordings::encode(encoder, few_events(1, {640, 480}, 20))});
+        {std::string(name), recordings::encode(*encoder, few_events(1, {640, 480}, 20))});
   }
   seeds.push_back({"index", bytes_of(",t_ns,x,y,p\n0,1500,3,4,1\n1,2500,5,6,0\n")});
   seeds.push_back(
@@ -147,7 +147,7 @@ std::vector<Seed> csv_seeds() {
 
 std::vector<Seed> npy_seeds() {
   NpyEncoder encoder;
-  const auto ours = recordings::encode(encoder, few_events(1, {640, 480}, 20));
+  const auto ours = recordings::encode(*encoder, few_events(1, {640, 480}, 20));
   auto other = bytes_of(std::string("\x93NUMPY\x02\x00\xa0\x00\x00\x00", 12) +
                         "{'descr': [('p', '|b1'), ('', '|V3'), (('a', 't'), '>f8'), ('x', '<f2'), "
                         "('y', '>i4', ), ('z', '<u2', (2, 3))], 'fortran_order': False, "

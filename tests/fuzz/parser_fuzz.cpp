@@ -18,11 +18,7 @@
 #include "src/filter/hot_pixel_filter.hpp"
 #include "src/filter/pixel_mask.hpp"
 #include "src/filter/undistort_filter.hpp"
-#include "src/formats/aedat/aedat2_decoder.hpp"
-#include "src/formats/aedat/aedat3_decoder.hpp"
 #include "src/formats/aedat/aedat4.hpp"
-#include "src/formats/aedat/aedat4_decoder.hpp"
-#include "src/formats/aedat/aedat_decoder.hpp"
 #include "src/formats/atis/atis_bin.hpp"
 #include "src/formats/compressed_file.hpp"
 #include "src/formats/dat/dat.hpp"
@@ -32,13 +28,10 @@
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_filters.hpp"
 #include "src/formats/hdf5/hdf5_handle.hpp"
-#include "src/formats/hdf5/hdf5_reader.hpp"
 #include "src/formats/magic.hpp"
-#include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npz.hpp"
 #include "src/formats/recording_reader.hpp"
-#include "src/formats/ros/bag_decoder.hpp"
-#include "src/formats/text/csv_decoder.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 #include "tests/fuzz/small_hdf5.hpp"
 
@@ -56,11 +49,6 @@ std::string_view text_of(Input bytes) {
 template <class Make>
 Parser decoder_of(const Make& make, std::size_t events_per_byte = 1) {
   return [make, events_per_byte](Input bytes) { check_decoder(make, bytes, events_per_byte); };
-}
-
-template <class Decoder>
-Parser decoder_class() {
-  return decoder_of([] { return std::make_unique<Decoder>(); });
 }
 
 Parser words(EvtFormat format) {
@@ -157,20 +145,16 @@ void aedat2(Input bytes) {
   constexpr std::size_t version_at = 9;
   const bool is_first = bytes.size() > version_at && bytes[version_at] == '1';
   const auto version = is_first ? Aedat2Version::one : Aedat2Version::two;
-  check_decoder([version] { return std::make_unique<Aedat2Decoder>(SensorSize{}, version); }, bytes,
-                1);
+  check_decoder([version] { return make_aedat2_decoder(SensorSize{}, version); }, bytes, 1);
 }
 
 /// Seeks to the last events according to the table, or back to the start.
-void seek_by_table(AedatDecoder& reader, std::span<const std::uint8_t> bytes) {
-  Aedat4Decoder decoder;
-  decoder.push(bytes);
-  decoder.next();
-  auto position = decoder.packets_at();
-  if (decoder.table_at() && *decoder.table_at() < bytes.size()) {
-    const auto at = static_cast<std::size_t>(*decoder.table_at());
-    const auto table =
-        read_aedat4_table(bytes.subspan(at), decoder.compression(), decoder.packets_at());
+void seek_by_table(Decoder& reader, std::span<const std::uint8_t> bytes) {
+  const auto header = read_aedat4_header(bytes).value();
+  auto position = header.packets_at;
+  if (header.table_at && *header.table_at < bytes.size()) {
+    const auto at = static_cast<std::size_t>(*header.table_at);
+    const auto table = read_aedat4_table(bytes.subspan(at), header.compression, header.packets_at);
     if (table && !table->empty())
       position = aedat4_position_of(*table, table->back().end).value_or(position);
   }
@@ -185,10 +169,10 @@ void seek_by_table(AedatDecoder& reader, std::span<const std::uint8_t> bytes) {
 /// AEDAT 4, through the decoder of all versions, and its packet table.
 void aedat4(Input bytes) {
   require_same_however_cut(bytes, [&](Pieces pieces) {
-    AedatDecoder reader;
-    const auto sums = sums_of(reader, bytes, pieces);
-    const bool is_read = !reader.streams().empty() && reader.format_name() == "AEDAT 4.0";
-    if (is_read && pieces.max_size == 0) seek_by_table(reader, bytes);
+    const auto reader = make_aedat_decoder();
+    const auto sums = sums_of(*reader, bytes, pieces);
+    const bool is_read = !reader->streams().empty() && reader->format_name() == "AEDAT 4.0";
+    if (is_read && pieces.max_size == 0) seek_by_table(*reader, bytes);
     return sums;
   });
 }
@@ -207,21 +191,21 @@ void seek(Decoder& reader, std::span<const std::uint8_t> bytes, Microseconds t) 
 }
 
 void read_with_index(std::span<const std::uint8_t> bytes) {
-  BagDecoder reader("");
+  const auto reader = make_bag_decoder("");
   MemoryBytes source({bytes.begin(), bytes.end()});
   Sums sums;
   try {
-    const bool reads_itself = reader.open(source);
+    const bool reads_itself = reader->open(source);
     if (!reads_itself) {
-      reader.push(bytes);
-      take(reader, sums);
-      reader.drain();
+      reader->push(bytes);
+      take(*reader, sums);
+      reader->drain();
     }
-    take(reader, sums);
-    const auto last = reader.last_time();
+    take(*reader, sums);
+    const auto last = reader->last_time();
     if (reads_itself) bytes = {};
-    seek(reader, bytes, last.value_or(1'000'000));
-    seek(reader, bytes, std::numeric_limits<Microseconds>::min());
+    seek(*reader, bytes, last.value_or(1'000'000));
+    seek(*reader, bytes, std::numeric_limits<Microseconds>::min());
   } catch (const UnsupportedFormat&) {
   }
 }
@@ -230,7 +214,7 @@ void read_with_index(std::span<const std::uint8_t> bytes) {
 void play(std::span<const std::uint8_t> bytes) {
   constexpr Microseconds chunk_length = 10'000;
   MemoryBytes source({bytes.begin(), bytes.end()});
-  RecordingReader recording([] { return std::make_unique<BagDecoder>(""); }, chunk_length);
+  RecordingReader recording([] { return make_bag_decoder(""); }, chunk_length);
   recording.open(source);
   const auto play_on = [&] {
     while (const auto output = recording.next()) {
@@ -252,8 +236,8 @@ void play(std::span<const std::uint8_t> bytes) {
 /// Bags: pushed in pieces, with random access, and played.
 void bag(Input bytes) {
   const auto outcome = [&](Pieces pieces) {
-    BagDecoder reader("");
-    return sums_of(reader, bytes, pieces);
+    const auto reader = make_bag_decoder("");
+    return sums_of(*reader, bytes, pieces);
   };
   // Of a corrupt page, SQLite at times gives what its memory held before.
   if (has_at(0, sqlite_magic, bytes))
@@ -335,18 +319,21 @@ void ecf(Input bytes) {
 void hdf5(Input bytes) {
   try {
     MemoryBytes source({bytes.begin(), bytes.end()});
-    Hdf5Reader reader(source);
+    const auto decoder = make_hdf5_decoder();
+    decoder->open(source);
     // A few compressed bytes can be many events.
     constexpr std::size_t max_events = 100'000;
     std::vector<AbsoluteEvent> events;
-    std::vector<Trigger> triggers;
-    while (events.size() < max_events && reader.read(10'000, events) > 0) {
-    }
-    require(events.size() <= max_events + 10'000, "no more is read than is asked for");
-    reader.read_triggers(10'000, triggers);
-    if (const auto range = reader.time_range()) reader.seek(range->first / 2 + range->last / 2);
-    reader.read(1, events);
-    require_within(reader.size(), events);
+    const auto read = [&] {
+      const auto item = decoder->next();
+      if (const auto* const some = item ? std::get_if<EventItem>(&*item) : nullptr)
+        events.insert(events.end(), some->events.begin(), some->events.end());
+      return item.has_value();
+    };
+    while (events.size() < max_events && read()) continue;
+    if (const auto last = decoder->last_time()) decoder->restart({.t = *last / 2});
+    read();
+    require_within(decoder->streams().front().size, events);
   } catch (const std::runtime_error&) {
     // Invalid files must be reported.
   }
@@ -474,7 +461,7 @@ void recognition(Input bytes) {
 const Parser& parser() {
   static const std::map<std::string, Parser> parsers = {
       {"aedat2", aedat2},
-      {"aedat3", decoder_class<Aedat3Decoder>()},
+      {"aedat3", decoder_of([] { return make_aedat3_decoder(); })},
       {"aedat4", aedat4},
       {"atis", decoder_of([] {
          return make_atis_bin_decoder({34, 34});
@@ -483,7 +470,7 @@ const Parser& parser() {
       {"calibration", calibration},
       {"camera_profile", camera_profile},
       {"compressed", compressed},
-      {"csv", decoder_class<CsvDecoder>()},
+      {"csv", decoder_of([] { return make_csv_decoder(); })},
       {"dat", decoder_of([] { return make_dat_decoder(); })},
       {"ecf", ecf},
       {"es", decoder_of([] { return make_event_stream_decoder(); })},
@@ -496,7 +483,7 @@ const Parser& parser() {
       {"hdf5_chunk", hdf5_chunk},
       {"hdf5_filters", hdf5_filters},
       {"mask", mask},
-      {"npy", decoder_class<NpyDecoder>()},
+      {"npy", decoder_of([] { return make_npy_decoder(); })},
       {"npz", npz},
       {"pixel_list", pixel_list},
       {"raw", decoder_of([] { return make_prophesee_raw_decoder(); }, 6)},
