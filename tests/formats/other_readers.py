@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Holds our tables of events against NumPy and h5py: what we write they read, what they write we
-read. other_readers.py TABLE_FILES"""
+read. What we write as AEDAT 4 is read by Python's libraries of LZ4, Zstandard, FlatBuffers and XML.
+other_readers.py TABLE_FILES"""
 import collections
 import io
 import pathlib
@@ -11,11 +12,18 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import xml.etree.ElementTree
 import zipfile
 import zlib
 
+import flatbuffers.encode
+import flatbuffers.number_types as flags
+import flatbuffers.packer
+import flatbuffers.table
 import h5py
+import lz4.frame
 import numpy as np
+import zstandard
 
 RAW = np.dtype({'names': ['t', 'x', 'y_p'], 'formats': ['<i8', '<u2', '<u2'],
                 'offsets': [0, 8, 10], 'itemsize': 16})
@@ -463,6 +471,76 @@ class OtherReaders(TableTest):
             with h5py.File(self.file, 'w') as file:
                 file.create_dataset('CD/events', data=rows, **options)
             self.assert_read('hdf5', events)
+
+
+class Aedat4(TableTest):
+    """A packet is a FlatBuffer, whose fields have the numbers of src/formats/aedat/aedat4.fbs."""
+
+    def root(self, content, identifier):
+        self.assertEqual(struct.unpack_from('<I', content)[0], len(content) - 4)
+        self.assertEqual(content[8:12], identifier)
+        return flatbuffers.table.Table(content, 4 + flatbuffers.encode.Get(flatbuffers.packer.uoffset, content, 4))
+
+    def scalar(self, table, number, kind):
+        offset = table.Offset(4 + 2 * number)
+        return table.Get(kind, offset + table.Pos) if offset else 0
+
+    def vector(self, table, number):
+        """The position and the length of a vector."""
+        field = table.Offset(4 + 2 * number)
+        return table.Vector(field), table.VectorLen(field)
+
+    def tables(self, packet):
+        start, count = self.vector(packet, 0)
+        return [flatbuffers.table.Table(packet.Bytes, packet.Indirect(start + 4 * i)) for i in range(count)]
+
+    def test_packets(self):
+        unpack = {0: bytes, 1: lz4.frame.decompress, 2: lz4.frame.decompress}
+        zstd = lambda data: zstandard.ZstdDecompressor().decompress(data, max_output_size=1 << 26)
+        events = random_events(9000, 14, first=1000)
+        for compression in range(5):
+            for has_table in False, True:
+                self.write(f'aedat4{compression}' + '-table' * has_table, events)
+                self.check(self.file.read_bytes(), unpack.get(compression, zstd), events, compression, has_table)
+
+    def check(self, data, unpack, events, compression, has_table):
+        self.assertEqual(data[:14], b'#!AER-DAT4.0\r\n')
+        at = 18 + struct.unpack_from('<I', data, 14)[0]
+        header = self.root(data[14:at], b'IOHE')
+        self.assertEqual(self.scalar(header, 0, flags.Int32Flags), compression)
+        table_at = self.scalar(header, 1, flags.Int64Flags)
+        self.assertEqual(table_at > 0, has_table)
+        info = xml.etree.ElementTree.fromstring(header.String(header.Pos + header.Offset(8)))
+        kinds = {}
+        for stream in info.find("node[@name='outInfo']"):
+            self.assertTrue(stream.get('path').endswith('/outInfo/%s/' % stream.get('name')))
+            kinds[int(stream.get('name'))] = stream.find("attr[@key='typeIdentifier']").text.encode()
+            self.assertEqual(stream.find("node[@name='info']/attr[@key='sizeX']").text, str(WIDTH))
+        found, edges, samples, frames, packets = [], [], [], [], 0
+        while at < (table_at if has_table else len(data)):
+            stream, size = struct.unpack_from('<ii', data, at)
+            packet = self.root(unpack(data[at + 8:at + 8 + size]), kinds[stream])
+            at, packets = at + 8 + size, packets + 1
+            if kinds[stream] == b'EVTS':
+                start, count = self.vector(packet, 0)
+                found += struct.iter_unpack('<qhh?3x', packet.Bytes[start:start + 16 * count])
+            elif kinds[stream] == b'TRIG':
+                edges += [(self.scalar(edge, 0, flags.Int64Flags), self.scalar(edge, 1, flags.Int8Flags))
+                          for edge in self.tables(packet)]
+            elif kinds[stream] == b'IMUS':
+                samples += [(self.scalar(sample, 0, flags.Int64Flags),
+                             *(self.scalar(sample, i, flags.Float32Flags) for i in range(1, 11)))
+                            for sample in self.tables(packet)]
+            else:
+                start, count = self.vector(packet, 10)
+                frames.append((self.scalar(packet, 0, flags.Int64Flags), packet.Bytes[start:start + count]))
+        self.assert_equal(dict(zip('txyp', np.array(found).T)), events)
+        self.assertEqual(edges, [(1001, 2), (1002, 3), (1003, 6)])
+        self.assertEqual(samples, [(1004, 40, *range(1, 10)), (1005, 39, *range(-1, -10, -1))])
+        self.assertEqual(frames, [(events['t'][-1], bytes([3]) * (WIDTH * HEIGHT))])
+        if has_table:
+            table = self.root(unpack(data[at:]), b'FTAB')
+            self.assertEqual(self.vector(table, 0)[1], packets)
 
 
 class Corrupt(TableTest):

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Writes and reads tables of events for scripts:
+// Writes and reads files of events for scripts:
 //   table_files write KIND FILE RAW
 //   table_files read KIND FILE RAW [columns=LETTERS] [unit=NUMBER] [path=PATH] [seek=MICROSECONDS]
 // RAW contains AbsoluteEvents in memory layout. Prints what else there is to know of a file that is
 // read: corrupt places, the position of the first, events outside the sensor, width, height and
 // last time, and then the first corruption and the streams that are not read.
+#include <array>
 #include <cstring>
 #include <fstream>
 #include <iostream>
@@ -13,6 +14,7 @@
 #include <memory>
 #include <string>
 
+#include "src/formats/aedat/aedat4_encoder.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/numpy/npz.hpp"
@@ -46,6 +48,27 @@ std::unique_ptr<Encoder> make_encoder(const std::string& kind) {
   return nullptr;
 }
 
+/// Edges, samples, events and a frame of threes.
+Bytes aedat4_of(const Events& events, int compression, bool has_table) {
+  constexpr std::array<Trigger, 3> edges{{{1001, 0, true}, {1002, 0, false}, {1003, 3, true}}};
+  constexpr std::array<ImuSample, 2> samples{
+      {{1004, 40, {1, 2, 3}, {4, 5, 6}, {7, 8, 9}},
+       {1005, 39, {-1, -2, -3}, {-4, -5, -6}, {-7, -8, -9}}}};
+  const Bytes pixels(static_cast<std::size_t>(size.width * size.height), 3);
+  Aedat4Encoder encoder({size, "a <b> & c", static_cast<Aedat4Compression>(compression), true,
+                         has_table, true, true});
+  Bytes bytes;
+  encoder.encode(std::span<const Trigger>(edges), bytes);
+  encoder.encode(std::span<const ImuSample>(samples), bytes);
+  encoder.encode(events, bytes);
+  encoder.encode({events.back().t, 0, 0, 0, 0, PixelFormat::grey8, size.width, size.height, 0, 0,
+                  pixels.data(), size.width},
+                 bytes);
+  encoder.finish(bytes);
+  apply_patch(encoder, bytes);
+  return bytes;
+}
+
 void write_file(const std::string& kind, const std::string& file, const std::string& raw) {
   const auto memory = load(raw);
   Events events(memory.size() / sizeof(AbsoluteEvent));
@@ -53,6 +76,11 @@ void write_file(const std::string& kind, const std::string& file, const std::str
   if (const auto encoder = make_encoder(kind)) {
     auto bytes = encode(*encoder, events);
     apply_patch(*encoder, bytes);
+    save(file, bytes.data(), bytes.size());
+    return;
+  }
+  if (kind.starts_with("aedat4")) {
+    const auto bytes = aedat4_of(events, kind[6] - '0', kind.ends_with("table"));
     save(file, bytes.data(), bytes.size());
     return;
   }
