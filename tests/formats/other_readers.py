@@ -535,7 +535,7 @@ class Aedat4(TableTest):
                 start, count = self.vector(packet, 10)
                 frames.append((self.scalar(packet, 0, flags.Int64Flags), packet.Bytes[start:start + count]))
         self.assert_equal(dict(zip('txyp', np.array(found).T)), events)
-        self.assertEqual(edges, [(1001, 2), (1002, 3), (1003, 6)])
+        self.assertEqual(edges, [(1001, 1), (1002, 2), (1003, 8)])
         self.assertEqual(samples, [(1004, 40, *range(1, 10)), (1005, 39, *range(-1, -10, -1))])
         self.assertEqual(frames, [(events['t'][-1], bytes([3]) * (WIDTH * HEIGHT))])
         if has_table:
