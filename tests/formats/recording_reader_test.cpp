@@ -352,41 +352,6 @@ TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
   }
 }
 
-/// Of a file that does not state its size. It has more rows than the decoder samples, whose events
-/// move out of the size that the first ones fit into.
-TEST(RecordingReader, GrowsAnAssumedSensorBeforeTheEventsThatNeedIt) {
-  Events growing;
-  for (int i = 0; i < 60'000; ++i)
-    growing.push_back(AbsoluteEvent::at(i / 60, i / 100, Microseconds{50} * i, Polarity::off));
-  NpyEncoder encoder;
-  const auto file = recordings::encode(encoder, growing);
-  RecordingReader reader(npy_file().make_decoder, chunk_length);
-  std::vector<SensorSize> sizes;
-  std::size_t events = 0;
-  for (const auto piece : recordings::pieces_of(file, 500)) {
-    reader.push(piece);
-    while (const auto output = reader.next()) {
-      const auto* const chunk = std::get_if<RecordingReader::Chunk>(&*output);
-      if (chunk == nullptr) continue;
-      const auto size = reader.streams().front().info.size;
-      if (sizes.empty() || sizes.back() != size) sizes.push_back(size);
-      for (const auto& event : chunk->events) {
-        EXPECT_LT(event.x, size.width);
-        EXPECT_LT(event.y(), size.height);
-      }
-      events += chunk->events.size();
-    }
-  }
-  reader.finish();
-  Outcome rest;
-  rest.take_all(reader);
-  EXPECT_EQ(events + rest.events(0).size(), 60'000U);
-  EXPECT_EQ(reader.counts().outside, 0U);
-  ASSERT_GE(sizes.size(), 3U);
-  EXPECT_EQ(sizes.front(), (SensorSize{128, 128}));
-  EXPECT_EQ(sizes.back(), (SensorSize{1280, 720}));
-}
-
 TEST(RecordingReader, GuessesTheSizeOfASensorFromMostEvents) {
   constexpr int count = 8000;
   // Some beyond any sensor, and others within one that no other event needs.
@@ -485,29 +450,6 @@ TEST(RecordingReader, FindsTheFirstEventsAfterALongSilence) {
     EXPECT_GT(reader.duration(), 0);
     EXPECT_EQ(outcome.events(0).size(), std::size_t{count});
   }
-}
-
-/// Words of a stream have stream time, starting with their first event.
-TEST(RecordingReader, MovesWordsToTheTimeOfTheirStream) {
-  const Events events{AbsoluteEvent::at(1, 2, 12'000, Polarity::on),
-                      AbsoluteEvent::at(3, 4, 19'000, Polarity::off)};
-  const auto encoder = make_evt_encoder(EvtFormat::evt3, sensor);
-  const auto bytes = recordings::encode(*encoder, events);
-  RecordingReader reader([] { return make_evt_decoder(EvtFormat::evt3, sensor); }, chunk_length,
-                         RecordingReader::Clock::stream);
-  reader.advance_to(5'000'000);
-  EXPECT_FALSE(reader.has_events());
-  const Microseconds hours = Microseconds{5} * 3600 * 1'000'000;
-  reader.push(bytes, RecordingReader::Interval{hours, 10'000});
-  Outcome outcome;
-  outcome.take_all(reader);
-  EXPECT_TRUE(outcome.chunks.empty());
-  reader.advance_to(hours + 60'000'000);
-  EXPECT_TRUE(reader.has_events());
-  outcome.take_all(reader);
-  EXPECT_EQ(outcome.events(0).size(), 2U);
-  EXPECT_EQ(std::get<1>(outcome.chunks.front()), hours);
-  EXPECT_TRUE(std::get<3>(outcome.chunks.back()).empty());
 }
 
 /// EVT3 words, of which the last is incomplete.

@@ -252,15 +252,6 @@ TEST(EventStream, IsWrittenByteByByte) {
   EXPECT_THROW(make_event_stream_encoder({16385, 1}), std::invalid_argument);
 }
 
-TEST(EventStream, CountsRowsFromTheTopWhereItIsTold) {
-  const std::vector events{AbsoluteEvent::at(319, 239, 5, Polarity::on),
-                           AbsoluteEvent::at(0, 0, 6, Polarity::off)};
-  const auto encoder = make_event_stream_encoder({320, 240}, EsOrigin::top_left);
-  const auto bytes = recordings::encode(*encoder, events);
-  EXPECT_EQ(bytes, es_file(1, {5 << 1 | 1, 0x3f, 0x01, 239, 0, 1 << 1, 0, 0, 0, 0}));
-  EXPECT_EQ(decode(*make_event_stream_decoder(EsOrigin::top_left), bytes).events, events);
-}
-
 TEST(EventStream, LeavesNothingOutOfALongRecordingWithoutPauses) {
   Events events;
   const auto step = Microseconds{11} * 3'600'000'000;
