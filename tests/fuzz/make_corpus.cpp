@@ -15,7 +15,6 @@
 
 #include "src/formats/aedat/aedat4_encoder.hpp"
 #include "src/formats/hdf5/ecf.hpp"
-#include "src/formats/hdf5/hdf5_handle.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/numpy/npz.hpp"
 #include "src/formats/ros/mcap_encoder.hpp"
@@ -26,7 +25,6 @@
 #include "tests/formats/npz_file.hpp"
 #include "tests/formats/recordings.hpp"
 #include "tests/formats/rosbags.hpp"
-#include "tests/fuzz/small_hdf5.hpp"
 #include "tests/wire/datagrams.hpp"
 #include "tests/wire/rtp_packets.hpp"
 
@@ -185,50 +183,6 @@ std::vector<Seed> ecf_seeds() {
       seeds.push_back({std::to_string(size.width) + "-" + std::to_string(seed), chunk});
     }
   }
-  return seeds;
-}
-
-std::vector<Seed> hdf5_seeds() {
-  constexpr hsize_t count = 8;
-  const std::uint32_t t[count] = {0, 10, 20, 900, 1000, 1100, 3000, 3000};
-  const std::uint16_t x[count] = {1, 2, 3, 4, 5, 6, 7, 8};
-  const std::uint8_t p[count] = {0, 1, 0, 1, 0, 1, 0, 1};
-  const std::uint64_t index[] = {0, 4, 6, 6};
-  const std::int64_t offset = 123456;
-  std::vector<Seed> seeds;
-  for (const int filter : {0, H5Z_FILTER_DEFLATE, H5Z_FILTER_SHUFFLE, H5Z_FILTER_FLETCHER32}) {
-    SmallHdf5 file("dsec");
-    file.group("events");
-    file.packed_dataset("events/t", H5T_NATIVE_UINT32, {count}, t, 4, filter);
-    file.packed_dataset("events/x", H5T_NATIVE_UINT16, {count}, x, 4, filter);
-    file.dataset("events/y", H5T_NATIVE_UINT16, {count}, x);
-    file.dataset("events/p", H5T_NATIVE_UINT8, {count}, p);
-    file.dataset("ms_to_idx", H5T_NATIVE_UINT64, {4}, index);
-    file.dataset("t_offset", H5T_NATIVE_INT64, {}, &offset);
-    seeds.push_back({"dsec-" + std::to_string(filter), file.bytes()});
-
-    const std::uint32_t rows[count][4] = {{0, 1, 2, 0}, {5, 3, 4, 1}};
-    SmallHdf5 v2e("v2e");
-    v2e.packed_dataset("events", H5T_NATIVE_UINT32, {count, 4}, rows, 4, filter);
-    seeds.push_back({"v2e-" + std::to_string(filter), v2e.bytes()});
-  }
-
-  const auto event_type = metavision_event_type();
-  const auto events = few_events(1, {640, 480}, count);
-  Bytes chunk;
-  encode_ecf(events, chunk);
-  SmallHdf5 file("metavision");
-  file.group("CD");
-  file.group("EXT_TRIGGER");
-  file.stored_dataset("CD/events", event_type.get(), {count}, count, {ecf_filter}, {chunk});
-  const Hdf5Handle trigger_type(H5Tcreate(H5T_COMPOUND, 24), H5Tclose);
-  H5Tinsert(trigger_type.get(), "p", 0, H5T_NATIVE_INT16);
-  H5Tinsert(trigger_type.get(), "t", 8, H5T_NATIVE_INT64);
-  H5Tinsert(trigger_type.get(), "id", 16, H5T_NATIVE_INT16);
-  const Bytes triggers(std::size_t{24} * 2);
-  file.dataset("EXT_TRIGGER/events", trigger_type.get(), {2}, triggers.data());
-  write_text_attribute(file.id(), "geometry", "640x480");
-  seeds.push_back({"metavision", file.bytes()});
   return seeds;
 }
 
@@ -453,8 +407,8 @@ int main(int argc, char** argv) {
   const std::filesystem::path corpus = argv[1];
   std::map<std::string, std::vector<Seed>> files = {
       {"aedat2", aedat2_seeds()}, {"aedat3", aedat3_seeds()}, {"aedat4", aedat4_seeds()},
-      {"csv", csv_seeds()},       {"hdf5", hdf5_seeds()},     {"npy", npy_seeds()},
-      {"npz", npz_seeds()},       {"bag", bag_seeds()}};
+      {"csv", csv_seeds()},       {"npy", npy_seeds()},       {"npz", npz_seeds()},
+      {"bag", bag_seeds()}};
   std::map<std::string, std::vector<Seed>> others = {{"atis", atis_seeds()},
                                                      {"calibration", calibration_seeds()},
                                                      {"camera_profile", camera_profile_seeds()},
