@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -23,7 +24,6 @@
 #include "src/formats/ros/mcap_encoder.hpp"
 #include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
-#include "tests/formats/rosbags.hpp"
 
 namespace {
 
@@ -73,7 +73,8 @@ class Bags : public testing::Test {
   static void SetUpTestSuite() {
     folder = std::filesystem::temp_directory_path() / ("bags-" + std::to_string(getpid()));
     std::filesystem::create_directory(folder);
-    const auto command = std::string("/usr/bin/python3 '" BAG_FILES "' '") + folder.string() + "'";
+    const auto command =
+        std::string("/usr/bin/python3 '" BAG_FILES "' '") + folder.string() + "' many";
     ASSERT_EQ(std::system(command.c_str()), 0);  // NOLINT(cert-env33-c)
     std::ifstream event_lines(folder / "events.lines");
     Microseconds t = 0;
@@ -91,7 +92,8 @@ class Bags : public testing::Test {
   static std::vector<std::string> names() {
     std::vector<std::string> found;
     for (const auto& file : std::filesystem::directory_iterator(folder))
-      if (file.path().extension() != ".lines") found.push_back(file.path().filename());
+      if (file.path().extension() != ".lines" && file.path().stem() != "many")
+        found.push_back(file.path().filename());
     return found;
   }
 
@@ -276,16 +278,12 @@ TEST_F(Bags, OfDatabasesSurviveCorruptPages) {
 }
 
 /// SQLite counts its steps from the first row of a query.
-TEST(Databases, OfManyMessagesAreReadWhole) {
-  constexpr SensorSize size{346, 260};
-  const auto events = recordings::random_events(size, 200'000, 3, 1'700'000'000'000'000, 1000);
-  const auto bytes = rosbags::db3_of_events(size, events, 1);
-  MemoryBytes source(bytes);
+TEST_F(Bags, OfManyMessagesAreReadWhole) {
+  MemoryBytes source(bytes_of(folder / "many.db3"));
   const auto decoder = make_bag_decoder("");
   decoder->open(source);
-  EXPECT_EQ(decode(*decoder, {}).events, events);
+  EXPECT_EQ(decode(*decoder, {}).events.size(), 200'000U);
   EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
-  EXPECT_EQ(decoder->last_time(), events.back().t);
 }
 
 /// A database made by statements of SQL.
@@ -378,14 +376,19 @@ TEST_F(Bags, HaveTheSensorSizeOfTheirFirstPacket) {
 }
 
 TEST_F(Bags, KeepNoOverlongNames) {
-  const rosbags::Text name(2000, 'a');
-  const auto mcap_record = [](char opcode, const rosbags::Text& content) {
-    return opcode + rosbags::binary(std::uint64_t{content.size()}) + content;
+  const std::string name(2000, 'a');
+  const auto number = [](std::uint64_t value, std::size_t size) {
+    std::string bytes(size, '\0');
+    std::memcpy(bytes.data(), &value, size);
+    return bytes;
   };
-  const auto number = rosbags::binary(std::uint16_t{999});
-  const auto records = mcap_record(3, number + rosbags::sized(name)) +
-                       mcap_record(4, number + number + rosbags::sized(name) +
-                                          rosbags::sized("cdr") + rosbags::sized(""));
+  const auto sized = [&](const std::string& text) { return number(text.size(), 4) + text; };
+  const auto mcap_record = [&](char opcode, const std::string& content) {
+    return opcode + number(content.size(), 8) + content;
+  };
+  const auto id = number(999, 2);
+  const auto records = mcap_record(3, id + sized(name)) +
+                       mcap_record(4, id + id + sized(name) + sized("cdr") + sized(""));
   auto bytes = bytes_of(folder / "evt3-no-chunks.mcap");
   bytes.insert(bytes.begin() + 8, records.begin(), records.end());
   const auto decoder = make_bag_decoder("");

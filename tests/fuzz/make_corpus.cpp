@@ -24,7 +24,6 @@
 #include "tests/formats/formats.hpp"
 #include "tests/formats/npz_file.hpp"
 #include "tests/formats/recordings.hpp"
-#include "tests/formats/rosbags.hpp"
 #include "tests/wire/datagrams.hpp"
 #include "tests/wire/rtp_packets.hpp"
 
@@ -221,7 +220,7 @@ std::vector<Seed> hdf5_filters_seeds() {
   return {{"empty", {1, 1, 1, 6, 3}}, {"shuffled", shuffled}, {"packed", packed}};
 }
 
-/// For bags: one topic, and small pages of a database.
+/// For bags; tests/fuzz/run adds those of other programs.
 std::vector<Seed> bag_seeds() {
   constexpr SensorSize size{346, 260};
   const auto events = few_events(1, size, 24);
@@ -230,8 +229,6 @@ std::vector<Seed> bag_seeds() {
     for (const auto compression : {BagCompression::none, BagCompression::lz4, BagCompression::zstd})
       seeds.push_back({"mcap-" + std::to_string(seeds.size()),
                        recordings::encode(*make_mcap_encoder({size, kind, compression}), events)});
-  seeds.push_back({"rosbag", rosbags::of_events(size, events, 12)});
-  seeds.push_back({"db3", rosbags::db3_of_events(size, events, 1, 512)});
   return seeds;
 }
 
