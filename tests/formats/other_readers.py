@@ -473,6 +473,203 @@ class OtherReaders(TableTest):
             self.assert_read('hdf5', events)
 
 
+class Text(TableTest):
+    """Lines of any tool."""
+
+    TWO = [(10, 3, 4, 1), (12, 5, 6, 0)]
+
+    def read_text(self, text, **options):
+        self.file.write_bytes(text if isinstance(text, bytes) else text.encode())
+        found, report = self.read('csv', **options)
+        return list(zip(*(found[name].tolist() for name in 'txyp'))), report
+
+    def assert_events(self, events, *texts, **options):
+        for text in texts:
+            found, report = self.read_text(text, **options)
+            self.assertEqual((found, report.places), (events, 0), text)
+
+    def refused_text(self, text):
+        self.file.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return self.refused('csv')
+
+    def test_columns_by_names(self):
+        self.assert_events(
+            self.TWO, 't,x,y,p\n10,3,4,1\n12,5,6,0\n', 'x;y;polarity;timestamp\n3;4;1;10\n5;6;-1;12\n',
+            '"X", "Y", "Pol", "Time"\r\n3, 4, True, 10\r\n5, 6, False, 12', 'id t   x y p note\n1 10 3  4 1 a\n2 12 5 6 0 b\n',
+            '\ufefft,x,y,p\n10,3,4,1\n12,5,6,0\n', 't,x@640,y@480,on\r\n10,3,4,1\r\n12,5,6,0\r\n')
+        self.assert_events(
+            self.TWO, 'event_timestamp,x,y,polarity\n10,3,4,1\n12,5,6,0\n', 'row,col,t,p\n4,3,10,1\n6,5,12,0\n',
+            'x_coords,y_coords,timestamps,polarities\n3,4,10,1\n5,6,12,0\n',
+            'timestamp_microseconds,x,y,p\n10,3,4,1\n12,5,6,0\n', 't_\u03bcs,x,y,p\n10,3,4,1\n12,5,6,0\n',
+            'TD.x TD.y TD.p TD.ts\n3 4 1 10\n5 6 0 12\n', "'t','x','y','p'\n10,3,4,1\n12,5,6,0\n",
+            '# y x p t\n4 3 1 10\n6 5 0 12\n', '#y,x,p,t\n4,3,1,10\n6,5,0,12\n',
+            '# y [px] x [px] p t [us]\n4 3 1 10\n6 5 0 12\n', '% columns: y, x, p, t\n4,3,1,10\n6,5,0,12\n', unit=2)
+        # The last two: names that do not fit the lines, and comments with other words.
+        self.assert_events(self.TWO, '# t [ns] y x p\n10000 4 3 1\n12000 6 5 0\n',
+                           '# t x y p label\n10,3,4,1\n12,5,6,0\n', '# the events: t, x, y and p\n3,4,1,10\n5,6,0,12\n')
+
+    def test_columns_by_the_first_lines(self):
+        self.assert_events(
+            self.TWO, '10,3,4,1\n12,5,6,0\n', '3,4,1,10\n5,6,0,12\n', '3,4,1,10\n5,6,-1,12\n',
+            '0.000010 3 4 1\n0.000012 5 6 0\n', '3\t4\t1e-5\t1\n5\t6\t1.2e-5\t-1\n',
+            '# t x y p\n\n10 3 4 true\n# more\n12 5 6 FALSE', '%geometry:640,480\n3,4,1,10\n5,6,0,12\n',
+            '240 180\n0.00001 3 4 1\n0.000012 5 6 0\n', '1.0e-05 3.00e+00 4.00e+00 1.00e+00\n1.2e-05 5.00e+00 6.00e+00 0.00e+00\n')
+        for text, size in (('t,x@640,y@480,on\r\n10,3,4,1\r\n', (640, 480)), ('%geometry:640,480\n3,4,1,10\n', (640, 480)),
+                           ('240 180\n0.00001 3 4 1\n', (240, 180))):
+            self.assertEqual(self.read_text(text)[1].size, size)
+        self.assert_events([(0, 5, 3, 1)], '%geometry:640,480\n5,3,1,0\n')  # the only events that could be txyp as well
+        # Out of order, but with one column of seconds.
+        self.assert_events([(10, 3, 4, 1), (2, 5, 6, 0)], '3 4 0.00001 1\n5 6 0.000002 0\n')
+
+    def test_order_and_unit_as_set(self):
+        self.assert_events([(10, 3, 4, 1), (2, 5, 6, 0)], '1,4,3,10\n0,6,5,2\n', columns='pyxt')
+        self.assert_events([(10, 3, 4, 1)], 'a,b,c,d\n1,4,3,10\n', columns='pyxt')
+        self.assert_events([(10, 3, 4, 1), (10, 5, 6, 0)], '10499 3 4 1\n10500 5 6 0\n', columns='txyp', unit=NANOSECONDS)
+        self.assert_events([(10_000_000, 3, 4, 1)], '10 3 4 1\n', columns='txyp', unit=SECONDS)
+        self.assert_events(self.TWO, '7,10,a,3,4,1\n7,12,b,5,6,0\n', columns='-t-xyp')
+        for letters in 'txy', 'txyy', 'txyq', 'txypt', 'TXYP':
+            self.refused('csv', columns=letters)
+
+    def test_unit_by_the_name_of_the_column(self):
+        self.assert_events(
+            self.TWO, 't_ns,x,y,p\n10000,3,4,1\n12000,5,6,0\n', 'x y p Timestamp_NS\n3 4 1 10999\n5 6 0 12000\n',
+            't_us,x,y,p\n10.0,3,4,1\n12.0,5,6,0\n', 'time [us];x;y;p\n10;3;4;1\n12;5;6;0\n',
+            't(s),x,y,p\n0.00001,3,4,1\n0.000012,5,6,0\n', 'time_ms,x,y,p\n0.01,3,4,1\n0.012,5,6,0\n',
+            't_\xb5s,x,y,p\n10,3,4,1\n12,5,6,0\n', 't (events),x,y,p\n10,3,4,1\n12,5,6,0\n')
+        self.assert_events([(1_000_000, 3, 4, 1), (2_000_000, 5, 6, 0)], 't_s,x,y,p\n1,3,4,1\n2,5,6,0\n')
+        self.assert_events([(1000, 3, 4, 1), (2000, 5, 6, 0)], 't_ms,x,y,p\n1,3,4,1\n2,5,6,0\n' + '#' * 200)
+        self.assert_events([(10, 3, 4, 1)], 't_us,x,y,p\n10000,3,4,1\n', unit=NANOSECONDS)  # settings take precedence
+        self.refused_text('t_kg,x,y,p\n10,3,4,1\n')
+
+    def test_whole_numbers_tell_their_unit_or_are_refused(self):
+        def lines(first, step, gap, separator):
+            """Times that are multiples of `step`, with gaps of up to `gap` steps."""
+            gaps = np.random.default_rng(1).integers(0, gap + 1, 300) * step
+            times = first + np.append(0, np.cumsum(gaps)[:-1])
+            return ''.join(separator.join([str(t), str(i % 200), '7', '1']) + '\n' for i, t in enumerate(times))
+        epoch = 1_468_939_993_067_416
+        for text, first in ((lines(5000, 1000, 100, ' '), 5),  # esim, of a camera with microseconds
+                            (lines(5001, 1, 10, ' '), 5001),   # DVS-Voltmeter
+                            # Only one of the units gives a plausible date.
+                            (lines(1000 * epoch + 19, 7, 100, ' '), epoch), (lines(epoch, 7, 100, ' '), epoch),
+                            (lines(1000 * epoch + 19, 7, 100, ','), epoch),
+                            (lines(5001, 7, 100, ','), 5001)):  # between commas, close times are microseconds
+            self.assertEqual(self.read_text(text)[0][0][0], first, text[:40])
+        for text in (lines(5001, 7, 100, ' '), lines(5000, 0, 1, ' '), lines(5000, 1000, 100, ','),
+                     lines(5001, 0, 1, '\t'), '1000 3 4 1\n2000 3 4 1\n'):
+            self.assertIn('time-unit', self.refused_text(text))
+            self.assertEqual(self.read_text(text, unit=NANOSECONDS)[0][0][0], int(text[0]))
+
+    def test_implausible_times(self):
+        def table(time):
+            return 't,x,y,p\n' + ''.join(f'{time(i)},3,4,{1 - 2 * (i % 2)}\n' for i in range(1000))
+        # Nanoseconds, microseconds with fractions, frame numbers, nanoseconds since boot, milliseconds since 1970.
+        for text in (table(lambda i: 5000 + i * 1234), table(lambda i: f'{i * 10}.25'), table(lambda i: i // 100),
+                     table(lambda i: 5_000_000_000_000 + i * 200), table(lambda i: 1_600_000_000_000 + i // 10),
+                     't,x,y,p\n100007,1,1,1\n200007,1,1,-1\n1300007,1,1,1\n1000400007,1,1,1\n',
+                     't,x,y,p\n100.5,1,1,1\n200.5,1,1,-1\n20000.5,1,1,1\n1000400.5,1,1,1\n'):
+            self.assertIn('time-unit', self.refused_text(text))
+            self.assertTrue(self.read_text(text, unit=NANOSECONDS)[0])
+        # A day's pause, and frames at their times, are plausible.
+        for time in lambda i: i * 50 + i // 500 * 86_400_000_000, lambda i: i // 50 * 33_333:
+            self.assertEqual(len(self.read_text(table(time))[0]), 1000)
+
+    def test_floating_point_microseconds(self):
+        self.assert_events(
+            self.TWO, '1.000e+01 3.0e+00 4.0e+00 1.0e+00\n1.200e+01 5.0e+00 6.0e+00 0.0e+00\n',
+            '10.000000 3.000000 4.000000 1.000000\n12.000000 5.000000 6.000000 0.000000\n', 't,x,y,p\n10.0,3,4,1\n12.0,5,6,0\n')
+        # Full seconds with all decimals.
+        self.assert_events([(1_000_000, 3, 4, 1), (2_000_000, 5, 6, 0)], '1.000000 3 4 1\n2.000000 5 6 0\n')
+        self.refused_text('1.0e+01 3.0e+00 4.0e+00 1.0e+00\n')
+
+    def test_index_of_pandas(self):
+        self.assert_events(
+            self.TWO, ',t,x,y,p\n0,10,3,4,1\n1,12,5,6,0\n', '"","t","x","y","p"\n"0",10,3,4,1\n"1",12,5,6,0\n',
+            ' t x y p\n0 10 3 4 1\n1 12 5 6 0\n', '0,10,3,4,1\n1,12,5,6,0\n', '0,3,4,1,10\n1,5,6,0,12\n')
+        self.refused_text('5,10,3,4,1\n9,12,5,6,0\n')
+
+    def test_seconds_are_exact(self):
+        # Also in long files, which take the fast path.
+        rows = [(i * 991 % 1_000_000, i % 1000, i % 100) for i in range(1000)]
+        self.assert_events([(1_468_939_993_000_000 + us + (ns >= 750), x, 2, 1) for us, ns, x in rows],
+                           ''.join(f'1468939993.{us:06}{ns:03} {x} 2 1\n' for us, ns, x in rows))
+        for text, times in (('0.0 1 1 1\n0.12345678949999 1 1 1\n0.1234565 1 1 1\n1 1 1 1\n2.5 1 1 1\n',
+                             (0, 123_457, 123_456, 1_000_000, 2_500_000)),
+                            # A double that is just below its microsecond, printed with all its digits.
+                            ('1.00000299999999995 1 1 1\n1.99999999999999978 1 1 1\n2.5 1 1 1\n', (1_000_003, 2_000_000, 2_500_000)),
+                            ('t_ns,x,y,p\n999,1,1,1\n1999,1,1,1\n2000,1,1,1\n', (0, 1, 2))):
+            self.assert_events([(t, 1, 1, 1) for t in times], text + '#' * 200)
+
+    def test_corruption_is_skipped_and_counted(self):
+        good = '10,10,10,1\n' * 250
+        found, report = self.read_text(
+            't,x,y,p\n1,1,1,1\n2,2,2\n6,70000,6,1\n7,7,40000,1\n8,-1,8,1\n3,9,9,0\n' + good + '3,3,3,1,1\n' + good +
+            'four,4,4,1\n' + good + '5,5,5,2\n' + good + '99999999999999999999,1,1,1\n')
+        self.assertEqual(found, [(1, 1, 1, 1), (3, 9, 9, 0)] + [(10, 10, 10, 1)] * 1000)
+        self.assertEqual((report.places, report.first_at, report.outside), (5, 16, 3))
+        found, report = self.read_text('t,x@10,y@8,p\n1,9,7,1\n1,10,7,1\n1,9,8,1\n')
+        self.assertEqual((len(found), report.outside), (1, 2))
+
+    def test_more_than_one_bad_line_in_a_hundred_is_refused(self):
+        def lines(good, bad):
+            return 't,x,y,p\n' + ''.join(f'{i},1,1,1\n' for i in range(good)) + 'bad,1,1,1\n' * bad + '5000,1,1,1\n'
+        for good, bad in (100, 1), (10_000, 100):
+            self.assertEqual(self.read_text(lines(good, bad))[1].places, bad)
+        # Separators of thousands, a decimal comma between commas, and rows with more fields than names.
+        for text, words in (
+                (lines(3, 1), 'line 5: "bad,1,1,1"'), (lines(1000, 15), 'line 1002: '), (lines(10_000, 150), 'line 10002: '),
+                ('t,x,y,p\n100,10,20,1\n1,300,11,21,0\n1,000,400,12,22,1\n', 'line 3: "1,300,11,21,0" (fields: 5, expected: 4)'),
+                ('t,x,y,p\n0,000100,10,20,1\n0,001300,11,21,0\n', ''), ('t,x,y,p\n100,10,20,1,5\n200,11,21,0,5\n', '')):
+            self.assertIn(words, self.refused_text(text))
+        self.assertEqual(len(self.read_text('t,x,y,p\n1,1,1,1\n2,1,')[0]), 1)  # a last line may be cut off
+
+    def test_numbers_as_spreadsheets_write_them(self):
+        self.assert_events(
+            [(100, 10, 20, 1), (200, 11, 21, 0), (1300, 12, 22, 1), (1_000_400, 13, 23, 1)],
+            't;x;y;p\n0,000100;10;20;1\n0,000200;11;21;0\n0,001300;12;22;1\n1,000400;13;23;1\n',
+            't\tx\ty\tp\n0,0001\t10\t20\t1\n0,0002\t11\t21\t0\n0,0013\t12\t22\t1\n1,0004\t13\t23\t1\n',
+            '0,0001 10 20 1\n0,0002 11 21 0\n0,0013 12 22 1\n1,0004 13 23 1\n',
+            't,x,y,p\n"0,0001",10,20,1\n"0,0002",11,21,0\n"0,0013",12,22,1\n"1,0004",13,23,1\n',
+            't;x;y;p\n100,0;10,0;20,0;1,0\n200,0;11,0;21,0;0,0\n1.300,0;12,0;22,0;1,0\n1.000.400,0;13,0;23,0;1,0\n',
+            't;x;y;p\n100;10;20;1\n200;11;21;0\n1,300;12;22;1\n1,000,400;13;23;1\n',
+            't,x,y,p\n100,10,20,1\n200,11,21,0\n"1,300",12,22,1\n"1,000,400",13,23,1\n',
+            "t;x;y;p\n100;10;20;1\n200;11;21;0\n1'300;12;22;1\n1'000'400;13;23;1\n",
+            '"t","x","y","p"\n"100","10","20","1"\n"200","11","21","0"\n"1300","12","22","1"\n"1000400","13","23","1"\n',
+            't,x,y,p,\n100,10,20,1,\n200,11,21,0,\n1300,12,22,1,\n1000400,13,23,1,\n')
+        self.assertIn('decimal point', self.refused_text('t;x;y;p\n1,300;12;22;1\n1,400;13;23;1\n'))
+        self.refused_text('t;x;y;p\n1.300;12;22;1\n1.000.400;13;23;1\n')
+
+    def test_polarities_of_any_tool(self):
+        self.assert_events(
+            self.TWO, 't,x,y,p\n10,3,4,2\n12,5,6,1\n', '10,3,4,2\n12,5,6,1\n', 't,x,y,p\n10,3,4,ON\n12,5,6,OFF\n',
+            't,x,y,p\n10,3,4,pos\n12,5,6,neg\n', 't,x,y,p\n10,3,4,1\n12,5,6,4294967295\n',
+            't,x,y,p\n10,3,4,1.0\n12,5,6,-1.0\n', '10 3 4 on\n12 5 6 off\n# end\n', unit=2)
+        # Also in long files, where 1 is read fast elsewhere.
+        found, _ = self.read_text('t,x,y,p\n' + ''.join(f'{i},3,4,{1 + (i % 4 == 0)}\n' for i in range(1000)))
+        self.assertEqual(sum(p for *_, p in found), 250)
+        self.assertIn('are 0 1 2 3;', self.refused_text('t,x,y,p\n1,1,1,0\n2,1,1,1\n3,1,1,2\n4,1,1,3\n'))
+        self.assertIn('unsigned', self.refused_text('t,x,y,p\n1,1,1,0\n2,1,1,255\n'))
+
+    def test_utf_16(self):
+        for encoding in 'utf-16-le', 'utf-16-be':
+            self.assert_events(
+                self.TWO, '\ufefft_\u03bcs;x;y;p;\U0001f600\r\n10;3;4;1;a\r\n12;5;6;0;b\r\n'.encode(encoding))
+
+    def test_a_long_line_is_skipped(self):
+        start = 't,x,y,p\n1,1,1,1\n' + '2,1,1,1\n' * 300
+        found, report = self.read_text(
+            start + '3,1,1,' + '1' * 1_000_000 + '\n4,1,1,1\n5,1,1,1' + ' ' * 4089 + '\n'  # the maximum length
+            '6,1,1,1' + ' ' * 4090 + '\n7,1,1,1\n')
+        self.assertEqual((len(found), report.places, report.first_at), (304, 2, len(start)))
+
+    def test_other_texts(self):
+        for text in ('5', 'hello\n', '{"a": 1}\n', '1 2 3\n4 5 6\n7 8 9\n', '% evt 3.0\n% end\n\1\2\3\n', '1' * 100_000,
+                     '\0' * 100_000, np.random.default_rng(3).bytes(200_000), '5,6,7,8\n9,10,11,12\n', '5,6,7,1\n3,6,6,1\n'):
+            self.refused_text(text)
+        # Without events.
+        self.assert_events([], 't,x,y,p\n', 't,x,y,p', '# t,x,y,p\n', '%geometry:640,480\n', '\n', '')
+
+
 class Aedat4(TableTest):
     """A packet is a FlatBuffer, whose fields have the numbers of src/formats/aedat/aedat4.fbs."""
 
