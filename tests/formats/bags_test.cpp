@@ -88,7 +88,6 @@ class Bags : public testing::Test {
 
   static void TearDownTestSuite() { std::filesystem::remove_all(folder); }
 
-  /// The names of all bags.
   static std::vector<std::string> names() {
     std::vector<std::string> found;
     for (const auto& file : std::filesystem::directory_iterator(folder))

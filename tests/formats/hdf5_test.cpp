@@ -65,14 +65,12 @@ std::vector<Settings> all_settings() {
           metavision};
 }
 
-/// A file in memory, and its content.
 struct Read {
   explicit Read(Bytes file) : bytes(std::move(file)) {
     decoder->open(bytes);
     contents.take_all(*decoder);
   }
 
-  /// Content from this time on.
   Contents from(Microseconds t) const {
     Contents rest;
     decoder->restart({.t = t});
@@ -89,7 +87,6 @@ Events read_all(const Bytes& file) {
   return Read(file).contents.events;
 }
 
-/// All numbers of a dataset.
 std::vector<std::uint16_t> numbers_in(const std::filesystem::path& file, const char* dataset) {
   const hid_t opened = H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   const hid_t data = H5Dopen2(opened, dataset, H5P_DEFAULT);

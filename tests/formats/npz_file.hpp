@@ -14,7 +14,6 @@ namespace npz_file {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// File in an archive: name and content.
 using Member = std::pair<std::string, Bytes>;
 
 /// NumPy array of `type`, such as <u2, with this shape.

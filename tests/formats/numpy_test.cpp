@@ -22,7 +22,6 @@ namespace {
 using namespace recordings;
 using npz_file::archive;
 
-/// Contents of an archive, and its decoder.
 struct Read {
   explicit Read(const Bytes& bytes) : contents(decode(*decoder, bytes)) {}
 

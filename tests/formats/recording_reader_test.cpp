@@ -42,7 +42,6 @@ Events some_events() {
   return events;
 }
 
-/// File, and how to read it.
 struct File {
   std::string name;
   Bytes bytes;
@@ -107,7 +106,6 @@ File aedat_file_with_a_table_of_zeros() {
   return file;
 }
 
-/// Complete output.
 struct Outcome {
   using Chunk = std::tuple<std::size_t, Microseconds, Microseconds, std::vector<Event>>;
   using Picture = std::tuple<std::size_t, Microseconds, std::uint8_t>;

@@ -33,7 +33,6 @@ using namespace fuzz;
 using recordings::Bytes;
 using recordings::bytes_of;
 
-/// Seed file for a fuzzer.
 struct Seed {
   std::string name;
   std::vector<std::uint8_t> bytes;
@@ -316,7 +315,6 @@ std::vector<Seed> pixel_list_seeds() {
   return {seed_of("list", "# Hot pixels\n1 2\n\n 300, 16383\r\n")};
 }
 
-/// For rtp_fuzz: streams of both formats.
 std::vector<Seed> rtp_seeds() {
   constexpr SensorSize size{640, 480};
   std::vector<Seed> seeds;
@@ -388,7 +386,6 @@ std::vector<Seed> mask_seeds() {
   return seeds;
 }
 
-/// A file of text, compressed.
 std::vector<Seed> compressed_seeds() {
   const auto text = recordings::bytes_of("t,x,y,p\n100,10,20,1\n200,11,21,0\n1300,12,22,1\n");
   return {{"gzip", compressed::gzip(text)}, {"zstd", compressed::zstd(text)}};

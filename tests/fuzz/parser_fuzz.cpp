@@ -232,7 +232,6 @@ void play(std::span<const std::uint8_t> bytes) {
   }
 }
 
-/// Bags: pushed in pieces, with random access, and played.
 void bag(Input bytes) {
   const auto outcome = [&](Pieces pieces) {
     const auto reader = make_bag_decoder("");
@@ -336,7 +335,6 @@ void hdf5(Input bytes) {
   }
 }
 
-/// Builder of an HDF5 file in memory.
 class SmallHdf5 {
  public:
   explicit SmallHdf5(const std::string& name) {

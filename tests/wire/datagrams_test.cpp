@@ -23,7 +23,6 @@ void operator+=(Bytes& bytes, const Bytes& more) {
   bytes.insert(bytes.end(), more.begin(), more.end());
 }
 
-/// A receiver, and what it got.
 struct Receiver {
   explicit Receiver(const DatagramSettings& settings)
       : unpacker(make_datagram_unpacker(settings)) {}
@@ -297,7 +296,6 @@ TEST(Datagrams, WithImpossibleTimesAreRejected) {
   EXPECT_NE(t32.take(leaps).fault, nullptr);
 }
 
-/// A datagram of jAER with an event at `t`.
 Bytes jaer_packet(std::uint32_t number, std::uint32_t t) {
   Bytes bytes(12);
   store(number, bytes.data(), std::endian::big);
