@@ -330,7 +330,7 @@ class OtherReaders(TableTest):
                 file[name] = data
 
     def test_columns_are_found_by_their_names(self):
-        events = random_events(1000, 3)
+        events = random_events(1000, 3, 100_000)
         for names in (['t', 'x', 'y', 'p'], ['events/ts', 'events/xs', 'events/ys', 'events/ps'],
                       ['raw_events/t', 'raw_events/x', 'raw_events/y', 'raw_events/p'],
                       ['events/timestamp', 'events/x', 'events/y', 'events/polarity'],
@@ -346,7 +346,7 @@ class OtherReaders(TableTest):
         self.assert_read('hdf5', events)
 
     def test_a_path_selects_a_camera(self):
-        left, right = random_events(100, 1), random_events(100, 2)
+        left, right = random_events(100, 1, 10_000), random_events(100, 2, 10_000)
         rows = np.stack([left[name] for name in 'txyp'], axis=1)
         self.columns(['left/t', 'left/x', 'left/y', 'left/p'], left,
                      {**{'right/' + name: right[name] for name in 'txyp'}, 'other/events': rows[:2],
@@ -359,7 +359,7 @@ class OtherReaders(TableTest):
         self.assertIn('/left, /other/events, /right', self.refused(path='middle'))
 
     def test_unit_and_columns_may_be_set(self):
-        events = random_events(1000, 4)
+        events = random_events(1000, 4, 100_000)
         nanoseconds = {**events, 't': events['t'] * 1000 + 7}
         self.columns('txyp', nanoseconds)
         self.assertIn('time-unit', self.refused())
@@ -369,7 +369,7 @@ class OtherReaders(TableTest):
         self.assert_read('hdf5', events, columns='pyxt', unit=NANOSECONDS)
 
     def test_rows_are_records_or_numbers(self):
-        events = random_events(1000, 5)
+        events = random_events(1000, 5, 100_000)
         signs = {**events, 't': events['t'] / 1e6, 'p': 2 * events['p'] - 1}
         records = np.zeros(1000, [('x', 'u2'), ('y', 'u2'), ('polarity', 'i2'), ('timestamp', 'i8')])
         for name, column in zip(records.dtype.names, 'xypt'):
@@ -386,7 +386,7 @@ class OtherReaders(TableTest):
             self.assert_equal(found, {name: events[name][kept] for name in 'txyp'})
 
     def test_the_size_may_be_an_attribute(self):
-        self.columns('txyp', random_events(100, 6))
+        self.columns('txyp', random_events(100, 6, 10_000))
         with h5py.File(self.file, 'a') as file:
             file.attrs['sensor_resolution'] = [720, 1280]
         self.assertEqual(self.read('hdf5')[1].size, (1280, 720))
