@@ -9,6 +9,7 @@
 #include <random>
 #include <span>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "src/core/event.hpp"
@@ -126,27 +127,20 @@ TEST(TimeSlices, AreSortedByAnyNumberOfThreads) {
   }
 }
 
-TEST(StepTimes, ShareOutTheInterval) {
-  const StepTimes steps(33'333'333, 11);
-  EXPECT_EQ(steps.count(), 11);
-  EXPECT_EQ(steps.microseconds(1), 3030U);
-  EXPECT_EQ(steps.microseconds(11), 33'333U);
-}
-
-TEST(StepTimes, HaveAMicrosecondEach) {
-  EXPECT_EQ(StepTimes(5'000, 11).count(), 5);
-  EXPECT_EQ(StepTimes(5'999, 11).count(), 5);
-  EXPECT_EQ(StepTimes(1, 11).count(), 1);
+TEST(StepTimes, ShareOutTheIntervalAndHaveAMicrosecondEach) {
+  const StepTimes shared(33'333'333, 11);
+  EXPECT_EQ(shared.count(), 11);
+  EXPECT_EQ(shared.microseconds(1), 3030U);
+  EXPECT_EQ(shared.microseconds(11), 33'333U);
+  for (const auto& [duration, count] : {std::pair{5'000, 5}, {5'999, 5}, {1, 1}})
+    EXPECT_EQ(StepTimes(duration, 11).count(), count);
   EXPECT_EQ(StepTimes(1, 11).microseconds(1), 0U);
   const StepTimes steps(5'500, 11);
   for (int j = 2; j <= steps.count(); ++j)
     EXPECT_GT(steps.microseconds(j), steps.microseconds(j - 1));
-}
-
-TEST(StepTimes, ReachOverTheLongestInterval) {
-  const StepTimes steps(max_interval, 256);
-  EXPECT_EQ(steps.microseconds(256), 0xffffffffU);
-  EXPECT_EQ(steps.microseconds(128), 0x7fffffffU);
+  const StepTimes longest(max_interval, 256);
+  EXPECT_EQ(longest.microseconds(256), 0xffffffffU);
+  EXPECT_EQ(longest.microseconds(128), 0x7fffffffU);
 }
 
 TEST(Label, LiesInMemoryAsTheMetaHasIt) {

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -91,20 +90,6 @@ TEST(NpzEncoder, LeavesNoFiles) {
   std::filesystem::remove(folder);
   EXPECT_THROW(make_npz_encoder({640, 480}), TemporaryFileError);
   unsetenv("TMPDIR");
-}
-
-TEST(NpzEncoder, FailsOnAFullDisk) {
-  const auto events = events_of(20'000);
-  Bytes bytes;
-  const auto encoder = make_npz_encoder({640, 480});
-  rlimit before = {};
-  getrlimit(RLIMIT_FSIZE, &before);
-  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit small = {.rlim_cur = 100'000, .rlim_max = before.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &small);
-  EXPECT_THROW(encoder->encode(events, bytes), TemporaryFileError);
-  setrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, handler);
 }
 
 /// A flipped bit in the size is not another size.

@@ -193,6 +193,8 @@ struct TimedEvent {
   int y;
   Polarity polarity;
   Cause cause = Cause::unknown;
+
+  friend bool operator==(const TimedEvent&, const TimedEvent&) = default;
 };
 
 /// One pixel, with the simulator's random numbers, evaluated every microsecond.
