@@ -29,7 +29,7 @@
 
 namespace {
 
-using namespace fuzz;
+using namespace eventcamera;
 using recordings::Bytes;
 using recordings::bytes_of;
 
