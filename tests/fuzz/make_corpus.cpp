@@ -143,7 +143,7 @@ std::vector<Seed> csv_seeds() {
 
 std::vector<Seed> npy_seeds() {
   NpyEncoder encoder;
-  const auto ours = recordings::encode(*encoder, few_events(1, {640, 480}, 20));
+  const auto ours = recordings::encode(encoder, few_events(1, {640, 480}, 20));
   auto other = bytes_of(std::string("\x93NUMPY\x02\x00\xa0\x00\x00\x00", 12) +
                         "{'descr': [('p', '|b1'), ('', '|V3'), (('a', 't'), '>f8'), ('x', '<f2'), "
                         "('y', '>i4', ), ('z', '<u2', (2, 3))], 'fortran_order': False, "
