@@ -19,8 +19,7 @@
 #include "bench/scenes.hpp"
 #include "src/dvs/dvs_simulator.hpp"
 #include "src/render/accumulator.hpp"
-#include "src/simulate/dense_simulator.hpp"
-#include "src/simulate/frame_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 #include "tests/simulate/scene.hpp"
 
 namespace {

@@ -207,8 +207,7 @@ Costs costs_of(gl::Context& context, const Method& method, const Clip& clip,
     }));
     kernels.push_back(gpu.time_of([&] {
       call.push_back(time_of([&] {
-        simulator->queue(texture.frame({LumaWeights::one, 0, 0, 0}), i * bench::frame_time,
-                         settings);
+        simulator->queue(texture.frame(), i * bench::frame_time, settings);
       }));
     }));
     const EventBuckets* made = nullptr;

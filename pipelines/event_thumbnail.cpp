@@ -17,8 +17,7 @@
 #include <system_error>
 #include <utility>
 
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
+#include "gst/base/pads.hpp"
 #include "gst/base/named_file.hpp"
 #include "src/render/thumbnail.hpp"
 
