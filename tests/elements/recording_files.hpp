@@ -15,7 +15,6 @@
 #include "src/formats/evt/raw.hpp"
 #include "tests/elements/pipeline.hpp"
 #include "tests/formats/aedat_files.hpp"
-#include "tests/formats/rosbags.hpp"
 
 /// A recording of five seconds, in files of every format.
 namespace recording_files {
@@ -88,8 +87,6 @@ class Folder {
     save("aedat2.aedat", eventcamera::aedat_files::aedat2_davis(events, sensor, "DAVIS346"));
     save("aedat3.aedat", eventcamera::aedat_files::aedat3(events, "DAVIS346", 4096));
     save("atis.bin", atis_bin(events));
-    save("ros1.bag", eventcamera::rosbags::of_events(sensor, events, 1000));
-    save("ros2.db3", eventcamera::rosbags::db3_of_events(sensor, events, 1000));
     for (const auto& [extension, writer] : elements_with("output-extensions")) {
       Pipeline pipeline("filesrc location=" + in_quotes(path_ / "evt3.raw") + " ! evtdec ! " +
                         writer + (writer.starts_with("eventhdf5sink") ? "" : " ! filesink") +
@@ -131,10 +128,11 @@ struct File {
 
 inline const std::vector<File>& files() {
   static const auto files = [] {
-    std::vector<File> made = {{"evt2.raw", "evtdec"},         {"evt21.raw", "evtdec"},
-                              {"evt4.raw", "evtdec"},         {"aedat2.aedat", "aedatdemux"},
-                              {"aedat3.aedat", "aedatdemux"}, {"ros1.bag", "eventbagdemux"},
-                              {"ros2.db3", "eventbagdemux"}};
+    std::vector<File> made = {{"evt2.raw", "evtdec"},
+                              {"evt21.raw", "evtdec"},
+                              {"evt4.raw", "evtdec"},
+                              {"aedat2.aedat", "aedatdemux"},
+                              {"aedat3.aedat", "aedatdemux"}};
     auto readers = elements_with("input-extensions");
     for (const auto& [extension, writer] : elements_with("output-extensions"))
       made.push_back({"a." + extension, readers.at(extension)});

@@ -13,8 +13,8 @@
 #include "src/gl/farneback.hpp"
 #include "src/gl/kernels.hpp"
 #include "src/gl/simulator.hpp"
-#include "src/simulate/dense_simulator.hpp"
 #include "src/simulate/interpolation.hpp"
+#include "src/simulate/simulators.hpp"
 #include "tests/gl/every_api.hpp"
 #include "tests/simulate/scene.hpp"
 

@@ -11,7 +11,7 @@
 
 #include "src/core/rgb_luma.hpp"
 #include "src/gl/context.hpp"
-#include "src/gl/grey_frame.hpp"
+#include "src/gl/objects.hpp"
 
 namespace gl_test {
 

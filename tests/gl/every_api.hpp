@@ -12,8 +12,8 @@
 
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
-#include "src/gl/grey_frame.hpp"
 #include "src/gl/kernels.hpp"
+#include "src/gl/objects.hpp"
 #include "src/gl/simulator.hpp"
 #include "tests/gl/egl_context.hpp"
 

@@ -16,9 +16,7 @@
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/simulator.hpp"
 #include "src/render/accumulator.hpp"
-#include "src/simulate/diff_simulator.hpp"
-#include "src/simulate/frame_simulator.hpp"
-#include "src/simulate/sparse_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 #include "tests/gl/every_api.hpp"
 #include "tests/simulate/scene.hpp"
 
