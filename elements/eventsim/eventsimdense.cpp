@@ -28,9 +28,8 @@
  */
 #include "features.hpp"
 #include "gst/simulator/dense_properties.hpp"
-#include "gst/simulator/eventsimulator.hpp"
 #include "gst/simulator/luma_video_simulator.hpp"
-#include "src/simulate/dense_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 
 using eventcamera::DenseSimulator;
 using eventcamera::FlowMethod;

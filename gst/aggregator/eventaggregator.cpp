@@ -1,21 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/aggregator/eventaggregator.hpp"
 
-#include <algorithm>
-#include <memory>
-#include <new>
-#include <utility>
-
-#include "gst/base/errors.hpp"
-#include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-
 GST_DEBUG_CATEGORY_STATIC(event_aggregator_debug);
 #define GST_CAT_DEFAULT event_aggregator_debug
 
-struct GstEventAggregatorPrivate {
-  std::unique_ptr<EventAggregator> impl;
-};
+using GstEventAggregatorPrivate = std::unique_ptr<EventAggregator>;
 
 G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventAggregator, gst_event_aggregator, GST_TYPE_AGGREGATOR,
                                  G_ADD_PRIVATE(GstEventAggregator)
@@ -50,6 +39,8 @@ void EventAggregator::set_segment(const GstSegment& segment) {
 }
 
 GstFlowReturn EventAggregator::push(OwnedBuffer buffer) {
+  if (is_gap(buffer.get()))
+    return push_gap(GST_BUFFER_PTS(buffer.get()), GST_BUFFER_DURATION(buffer.get()));
   segment_sent_ = true;
   return gst_aggregator_finish_buffer(element_, buffer.release());
 }
@@ -57,13 +48,15 @@ GstFlowReturn EventAggregator::push(OwnedBuffer buffer) {
 GstFlowReturn EventAggregator::push_gap(GstClockTime start, GstClockTime duration) {
   GstPad* const src = GST_AGGREGATOR_SRC_PAD(element_);
   if (segment_sent_) return push_event(src, gst_event_new_gap(start, duration));
-  if (!gst_pad_has_current_caps(src)) return GST_FLOW_OK;
+  const OwnedCaps caps(gst_pad_get_current_caps(src));
+  if (!caps || !sensor_of(caps.get())) return GST_FLOW_OK;
   // gst_aggregator_push_mandatory_events() sends the segment only before a buffer or EOS.
   OwnedBuffer empty(gst_buffer_new());
   GST_BUFFER_PTS(empty.get()) = start;
   GST_BUFFER_DURATION(empty.get()) = duration;
   GST_BUFFER_FLAG_SET(empty.get(), GST_BUFFER_FLAG_GAP | GST_BUFFER_FLAG_DISCONT);
-  return push(std::move(empty));
+  segment_sent_ = true;
+  return gst_aggregator_finish_buffer(element_, empty.release());
 }
 
 std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime time) {
@@ -73,7 +66,7 @@ std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime tim
   return running;
 }
 
-GstClockTime EventAggregator::next_main_time() const {
+GstClockTime EventAggregator::next_time() {
   const auto buffer = next_buffer(main_pad_);
   if (!buffer) return has_ended(main_pad_) ? 0 : GST_CLOCK_TIME_NONE;
   if (!GST_BUFFER_PTS_IS_VALID(buffer.get())) return 0;
@@ -104,11 +97,8 @@ static void answer_caps_of_passed(EventAggregator& self, GstAggregator* aggregat
   gst_query_set_caps_result(query, result.get());
 }
 
-/// Virtual functions of GstAggregator.
 struct EventAggregatorFunctions {
-  static EventAggregator& of(GstAggregator* element) {
-    return gst_event_aggregator_impl(GST_EVENT_AGGREGATOR(element));
-  }
+  static EventAggregator& of(GstAggregator* element) { return *gst_event_aggregator_impl(element); }
 
   /// True if the buffers of a pad pass through.
   static bool is_passed(const EventAggregator& self, GstAggregatorPad* pad) {
@@ -155,7 +145,6 @@ struct EventAggregatorFunctions {
     return TRUE;
   }
 
-  /// Sends the events that wait for the segment.
   static void send_waiting(EventAggregator& self) {
     for (auto& event : std::exchange(self.waiting_, {}))
       gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self.element_), event.release());
@@ -226,8 +215,7 @@ struct EventAggregatorFunctions {
   }
 
   static bool handle_caps(EventAggregator& self, GstAggregatorPad* pad, GstEvent* event) {
-    GstCaps* caps = nullptr;
-    gst_event_parse_caps(event, &caps);
+    GstCaps* const caps = caps_of(event);
     if (!self.handle_caps(pad, caps)) {
       GST_ERROR_OBJECT(pad, "cannot %s %" GST_PTR_FORMAT, self.role_.verb, caps);
       return false;
@@ -390,18 +378,9 @@ struct EventAggregatorFunctions {
   }
 };
 
-static GstEventAggregatorPrivate& priv_of(gpointer self) {
+std::unique_ptr<EventAggregator>& gst_event_aggregator_impl(gpointer element) {
   return *static_cast<GstEventAggregatorPrivate*>(
-      gst_event_aggregator_get_instance_private(GST_EVENT_AGGREGATOR(self)));
-}
-
-void gst_event_aggregator_set_impl(GstEventAggregator* self,
-                                   std::unique_ptr<EventAggregator> impl) {
-  priv_of(self).impl = std::move(impl);
-}
-
-EventAggregator& gst_event_aggregator_impl(GstEventAggregator* self) {
-  return *priv_of(self).impl;
+      gst_event_aggregator_get_instance_private(GST_EVENT_AGGREGATOR(element)));
 }
 
 void gst_event_aggregator_add_pads(GstEventAggregator* self) {
@@ -420,12 +399,12 @@ void gst_event_aggregator_add_pads(GstEventAggregator* self) {
 }
 
 static void finalize(GObject* object) {
-  std::destroy_at(&priv_of(object));
+  std::destroy_at(&gst_event_aggregator_impl(object));
   G_OBJECT_CLASS(gst_event_aggregator_parent_class)->finalize(object);
 }
 
 static void gst_event_aggregator_init(GstEventAggregator* self) {
-  new (&priv_of(self)) GstEventAggregatorPrivate;
+  std::construct_at(&gst_event_aggregator_impl(self));
   GstPad* const src = GST_AGGREGATOR_SRC_PAD(self);
   gst_pad_add_probe(
       src,

@@ -8,9 +8,8 @@
 #include <vector>
 
 #include "gst/aggregator/sink_pads.hpp"
-#include "gst/base/event_faults.hpp"
-#include "gst/base/owned.hpp"
-#include "gst/base/pads.hpp"
+#include "gst/base/element.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/seek_request.hpp"
 
 /// Implementation of an element that combines event streams and video. Each subclass of
@@ -40,12 +39,11 @@ class EventAggregator {
 
   /// False, after reporting why, if the element cannot start.
   virtual bool start() { return true; }
-  /// Drops all state.
   virtual void stop() = 0;
   /// Drops all pending events, because the next input is discontinuous.
   virtual void flush() = 0;
   /// Frees as much memory as possible, after an allocation failed.
-  virtual void release_memory() noexcept = 0;
+  virtual void release_memory() noexcept { flush(); }
 
   /// Returns false to reject `caps`.
   virtual bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) = 0;
@@ -59,33 +57,29 @@ class EventAggregator {
   /// pad has_ended().
   virtual GstFlowReturn aggregate(bool timed_out) = 0;
   /// Like GstAggregatorClass::get_next_time: when to continue without further input from live
-  /// sources.
-  virtual GstClockTime next_time() { return GST_CLOCK_TIME_NONE; }
+  /// sources. By default when the next buffer of the main pad is due: at once if it has no time,
+  /// and at the end of the stream.
+  virtual GstClockTime next_time();
 
   /// Prepares for a seek that GstAggregator forwards next. Called from any thread.
   virtual void prepare_seek(const SeekRequest&) {}
 
  protected:
   GstAggregator* element() const { return element_; }
-  /// Returns a sink pad by name.
   GstAggregatorPad* pad(const char* name) const;
   /// The main pad; null if pads are requested.
   GstAggregatorPad* main_pad() const { return main_pad_; }
-  /// A next_time() that passes the next live buffer of the main pad on time: at once if it has no
-  /// time, and at the end of the stream.
-  GstClockTime next_main_time() const;
 
   /// Sets the segment of the output. GstAggregator sends it with the next buffer.
   void set_segment(const GstSegment& segment);
   /// True once the segment of the output was sent. Without it, a gap has no meaning.
   bool is_segment_sent() const { return segment_sent_; }
 
-  /// Pushes a buffer of the output.
+  /// Pushes a buffer of the output, or the GAP event that it stands for.
   GstFlowReturn push(OwnedBuffer buffer);
-  /// Pushes a GAP event; before the segment, an empty buffer of events.
+  /// Pushes a GAP event; before the segment, an empty buffer of events, or no video.
   GstFlowReturn push_gap(GstClockTime start, GstClockTime duration);
 
-  /// Warns about skipped events.
   template <class Fault>
   void warn(const Fault& fault, GstBuffer* buffer) {
     faults_.warn(element_, fault, buffer);
@@ -108,13 +102,13 @@ class EventAggregator {
 /// buffer.
 GstSegment segment_of(GstAggregatorPad* pad);
 
+/// Running time of `time` on a pad; none outside its segment.
+std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime time);
+
 /// True for the buffer that GstAggregator queues for a GAP event.
 inline bool is_gap(GstBuffer* buffer) {
   return GST_BUFFER_FLAG_IS_SET(buffer, GST_BUFFER_FLAG_GAP) && gst_buffer_get_size(buffer) == 0;
 }
-
-/// Running time of `time` on a pad; none outside its segment.
-std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime time);
 
 /// Abstract base class of elements that combine event streams: a wrapper around an EventAggregator.
 #define GST_TYPE_EVENT_AGGREGATOR (gst_event_aggregator_get_type())
@@ -128,20 +122,18 @@ struct _GstEventAggregatorClass {
 /// Adds a sink pad per template of an always pad.
 void gst_event_aggregator_add_pads(GstEventAggregator* self);
 
-void gst_event_aggregator_set_impl(GstEventAggregator* self, std::unique_ptr<EventAggregator> impl);
-EventAggregator& gst_event_aggregator_impl(GstEventAggregator* self);
+std::unique_ptr<EventAggregator>& gst_event_aggregator_impl(gpointer element);
 
 /// For the init function of a subclass: creates its pads, then its EventAggregator.
 template <class Impl>
 void gst_event_aggregator_make(GstEventAggregator* self) {
   gst_event_aggregator_add_pads(self);
-  gst_event_aggregator_set_impl(self, std::make_unique<Impl>(GST_AGGREGATOR(self)));
+  gst_event_aggregator_impl(self) = std::make_unique<Impl>(GST_AGGREGATOR(self));
 }
 
-/// Returns the EventAggregator of an element, of class `Impl`.
 template <class Impl>
 Impl& aggregator_impl(gpointer element) {
-  return static_cast<Impl&>(gst_event_aggregator_impl(GST_EVENT_AGGREGATOR(element)));
+  return static_cast<Impl&>(*gst_event_aggregator_impl(element));
 }
 
 /// The member `settings` of an element's EventAggregator, for Properties.
@@ -157,15 +149,16 @@ inline void add_aggregator_pad_template(GstEventAggregatorClass* klass, const ch
                    GST_TYPE_AGGREGATOR_PAD);
 }
 
-/// Defines and registers the type of an element with an EventAggregator of class `Impl`. The type's
-/// class_init must follow.
-#define DEFINE_EVENT_AGGREGATOR(Type, type, OBJECT, Impl, element, rank, description)         \
+/// Defines and registers the type of an element with an EventAggregator of class `Impl`; `...` is
+/// code for the type, such as implement(). The type's class_init must follow.
+#define DEFINE_EVENT_AGGREGATOR(Type, type, OBJECT, Impl, element, rank, description, ...)    \
   G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventAggregator)                           \
   struct _##Type {                                                                            \
     GstEventAggregator parent;                                                                \
   };                                                                                          \
   G_DEFINE_TYPE_WITH_CODE(Type, type, GST_TYPE_EVENT_AGGREGATOR,                              \
-                          GST_DEBUG_CATEGORY_INIT(GST_CAT_DEFAULT, #element, 0, description)) \
+                          GST_DEBUG_CATEGORY_INIT(GST_CAT_DEFAULT, #element, 0, description); \
+                          __VA_ARGS__)                                                        \
   GST_ELEMENT_REGISTER_DEFINE(element, #element, rank, type##_get_type())                     \
   /* A type takes no parentheses: NOLINTNEXTLINE(bugprone-macro-parentheses) */               \
   static void type##_init(Type* self) {                                                       \

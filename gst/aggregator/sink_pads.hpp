@@ -6,8 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "gst/base/owned.hpp"
-#include "gst/base/played_segment.hpp"
+#include "gst/base/pads.hpp"
 
 /// Ends of segments on sink pads. gst_aggregator_default_sink_event() has no case for SEGMENT_DONE:
 /// it forwards the event from each pad, and gst_aggregator_check_pads_ready() then waits for a

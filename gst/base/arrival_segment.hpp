@@ -43,7 +43,6 @@ class ArrivalSegment {
     return next.base;
   }
 
-  /// True if there is a segment.
   bool has_begun() const { return segment_.has_value(); }
 
   /// Extends the end of the received data to `end`.

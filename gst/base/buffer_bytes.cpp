@@ -2,8 +2,6 @@
 #include "gst/base/buffer_bytes.hpp"
 
 #include <algorithm>
-#include <memory>
-#include <new>
 #include <utility>
 
 GstBuffer* copied_buffer(std::span<const std::byte> bytes) {

@@ -70,7 +70,6 @@ class RepeatLevel {
  public:
   GstDebugLevel next() { return std::exchange(repeats_, true) ? GST_LEVEL_LOG : GST_LEVEL_WARNING; }
 
-  /// For a new stream: the next level is WARNING again.
   void reset() { repeats_ = false; }
 
  private:
@@ -90,7 +89,6 @@ class WarnOnce {
     if (level == GST_LEVEL_WARNING) post_message(element, GST_MESSAGE_WARNING, report, cause, at);
   }
 
-  /// For a new stream: posts the next warning again.
   void reset() { level_.reset(); }
 
  private:

@@ -2,7 +2,6 @@
 #include "gst/base/event_buffer.hpp"
 
 #include <algorithm>
-#include <new>
 
 using namespace eventcamera;
 

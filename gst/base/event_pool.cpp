@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/event_pool.hpp"
 
-#include <algorithm>
 #include <atomic>
 #include <bit>
 #include <new>
 
-#include "gst/base/types.hpp"
+#include "gst/base/element.hpp"
 
 G_DECLARE_FINAL_TYPE(GstEventPool, gst_event_pool, GST, EVENT_POOL, GstBufferPool)
 
@@ -93,7 +92,7 @@ void event_pool_reserve(GstBuffer* buffer, gsize size) {
   gst_buffer_set_size(buffer, static_cast<gssize>(size));
 }
 
-GstFlowReturn EventBuffers::acquire(gsize size, OwnedBuffer& buffer) {
+OwnedBuffer EventBuffers::acquire(gsize size) {
   if (!pool_) {
     pool_.reset(event_pool_new());
     GstStructure* config = gst_buffer_pool_get_config(pool_.get());
@@ -103,11 +102,11 @@ GstFlowReturn EventBuffers::acquire(gsize size, OwnedBuffer& buffer) {
       throw std::bad_alloc();
   }
   GstBuffer* acquired = nullptr;
-  const auto result = gst_buffer_pool_acquire_buffer(pool_.get(), &acquired, nullptr);
-  if (result != GST_FLOW_OK) return result;
-  buffer.reset(acquired);
+  if (gst_buffer_pool_acquire_buffer(pool_.get(), &acquired, nullptr) != GST_FLOW_OK)
+    throw std::bad_alloc();
+  OwnedBuffer buffer(acquired);
   event_pool_reserve(acquired, size);
-  return GST_FLOW_OK;
+  return buffer;
 }
 
 void EventBuffers::reset() {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include "gst/base/owned.hpp"
 
 /// Makes a pool of event buffers, whose size varies between intervals. Acquired buffers are empty;
@@ -23,7 +21,7 @@ class EventBuffers {
   EventBuffers& operator=(const EventBuffers&) = delete;
 
   /// Acquires a buffer of `size` > 0 bytes to write. Throws std::bad_alloc.
-  GstFlowReturn acquire(gsize size, OwnedBuffer& buffer);
+  OwnedBuffer acquire(gsize size);
 
   /// Drops the pool, which is freed once all buffers have returned.
   void reset();

@@ -9,6 +9,7 @@
 
 struct Unref {
   void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
+  void operator()(GstBufferList* list) const { gst_buffer_list_unref(list); }
   void operator()(GstBufferPool* pool) const { gst_object_unref(pool); }
   void operator()(GstCaps* caps) const { gst_caps_unref(caps); }
   void operator()(GstElement* element) const { gst_object_unref(element); }

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <string>
-#include <utility>
+#include <tuple>
 
+#include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
 
 /// Name of a custom query that simulators answer: the events come from video.
@@ -47,18 +46,19 @@ inline GstPad* add_pad(GstElement* element, const char* name) {
   return pad;
 }
 
-/// For init: adds the pads "sink" and "src" of an element that decides the caps of its output.
-inline std::pair<GstPad*, GstPad*> add_pads(GstElement* element, GstPadChainFunction chain,
-                                            GstPadEventFunction sink_event,
-                                            GstPadQueryFunction src_query) {
+/// An element that decides the caps of its output, with the pads "sink" and "src".
+struct ElementPads {
+  GstElement* const element;
   GstPad* const sink = add_pad(element, "sink");
-  gst_pad_set_chain_function(sink, chain);
-  gst_pad_set_event_function(sink, sink_event);
   GstPad* const src = add_pad(element, "src");
-  gst_pad_set_query_function(src, src_query);
-  gst_pad_use_fixed_caps(src);
-  return {sink, src};
-}
+
+  ElementPads(GstElement* of, GstPadChainFunction chain, GstPadEventFunction sink_event)
+      : element(of) {
+    gst_pad_set_chain_function(sink, chain);
+    gst_pad_set_event_function(sink, sink_event);
+    gst_pad_use_fixed_caps(src);
+  }
+};
 
 /// True if the peer of a pad can seek in this format.
 inline bool peer_can_seek(GstPad* pad, GstFormat format) {
@@ -80,39 +80,99 @@ inline GstFlowReturn push_event(GstPad* src, GstEvent* event) {
   return gst_pad_push_event(src, event) ? GST_FLOW_OK : gst_pad_get_last_flow_return(src);
 }
 
-/// True once a segment was sent from a source pad.
-inline bool has_segment(GstPad* src) {
-  GstEvent* const segment = gst_pad_get_sticky_event(src, GST_EVENT_SEGMENT, 0);
-  if (segment == nullptr) return false;
-  gst_event_unref(segment);
-  return true;
-}
-
 /// Answers a latency query on a source pad: upstream's latency plus the element's own.
-inline gboolean answer_latency(GstDebugCategory* category, GstPad* sink, GstQuery* query,
-                               GstClockTime own) {
+inline gboolean answer_latency(GstPad* sink, GstQuery* query, GstClockTime own) {
   if (!gst_pad_peer_query(sink, query)) return FALSE;
   gboolean live = FALSE;
   GstClockTime min = 0;
   GstClockTime max = 0;
   gst_query_parse_latency(query, &live, &min, &max);
-  GST_CAT_DEBUG_OBJECT(category, sink,
-                       "latency of upstream, %s: %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT
-                       "; own: %" GST_TIME_FORMAT,
-                       live ? "live" : "not live", GST_TIME_ARGS(min), GST_TIME_ARGS(max),
-                       GST_TIME_ARGS(own));
   gst_query_set_latency(query, live, min + own,
                         GST_CLOCK_TIME_IS_VALID(max) ? max + own : GST_CLOCK_TIME_NONE);
   return TRUE;
 }
 
-/// For init: posts a latency message whenever this property, part of the latency, is set.
-inline void announce_latency(GstDebugCategory* category, gpointer element, const char* property) {
-  const auto post = +[](GstElement* changed, GParamSpec* latency, gpointer log) {
-    GST_CAT_DEBUG_OBJECT(static_cast<GstDebugCategory*>(log), changed,
-                         "%s was set: latency may have changed", latency->name);
-    gst_element_post_message(changed, gst_message_new_latency(GST_OBJECT(changed)));
+/// For init: makes a source pad answer latency queries: `latency_of(element)` is the own latency.
+template <auto latency_of>
+void answer_latency_queries(GstPad* src) {
+  gst_pad_set_query_function(
+      src, +[](GstPad* pad, GstObject* element, GstQuery* query) {
+        if (GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
+          return gst_pad_query_default(pad, element, query);
+        const OwnedPad sink(gst_element_get_static_pad(GST_ELEMENT(element), "sink"));
+        return answer_latency(sink.get(), query, latency_of(element));
+      });
+}
+
+/// Says that the latency of an element may have changed.
+inline void post_latency(gpointer element) {
+  gst_element_post_message(GST_ELEMENT(element), gst_message_new_latency(GST_OBJECT(element)));
+}
+
+/// For init: posts a latency message whenever the property max-latency is set.
+inline void announce_max_latency(gpointer element) {
+  const auto post = +[](GstElement* changed, GParamSpec*, gpointer) { post_latency(changed); };
+  g_signal_connect(element, "notify::max-latency", G_CALLBACK(post), nullptr);
+}
+
+/// Caps of a CAPS event, which owns them.
+inline GstCaps* caps_of(GstEvent* event) {
+  GstCaps* caps = nullptr;
+  gst_event_parse_caps(event, &caps);
+  return caps;
+}
+
+/// Segment of a SEGMENT event, which owns it.
+inline const GstSegment& segment_of(GstEvent* event) {
+  const GstSegment* segment = nullptr;
+  gst_event_parse_segment(event, &segment);
+  return *segment;
+}
+
+/// True if both segments give a timestamp the same running time and the same stream time.
+inline bool continues(const GstSegment& current, const GstSegment& next) {
+  const guint64 position = current.start > next.start ? current.start : next.start;
+  const auto times = [&](const GstSegment& segment) {
+    guint64 running = 0;
+    guint64 stream = 0;
+    const gint running_sign =
+        gst_segment_to_running_time_full(&segment, segment.format, position, &running);
+    const gint stream_sign =
+        gst_segment_to_stream_time_full(&segment, segment.format, position, &stream);
+    return std::tuple(segment.format, segment.rate, running_sign, running, stream_sign, stream);
   };
-  const std::string notify = std::string("notify::").append(property);
-  g_signal_connect(element, notify.c_str(), G_CALLBACK(post), category);
+  return times(current) == times(next);
+}
+
+/// Posts an error message about a SEGMENT event, which it unrefs. Returns false.
+inline bool refuse_segment(gpointer element, GstEvent* event, const Report& report) {
+  gchar* const cause = gst_info_strdup_printf("segment %" GST_SEGMENT_FORMAT, &segment_of(event));
+  post_message(element, GST_MESSAGE_ERROR, report, cause);
+  g_free(cause);
+  gst_event_unref(event);
+  return false;
+}
+
+/// True if a SEGMENT event has a positive rate. Otherwise posts an error message of `element` and
+/// unrefs the event. `verb` is what the element does with events, such as "merge".
+inline bool plays_forwards(gpointer element, GstEvent* event, const char* verb) {
+  return segment_of(event).rate > 0 ||
+         refuse_segment(
+             element, event,
+             {GST_STREAM_ERROR_FAILED,
+              std::string("Cannot ") + verb + " events backwards; play at a positive rate."});
+}
+
+/// Property of decodebin to get events: are_final_caps() of gstdecodebin2.c stops at these caps.
+#define ASK_FOR_EVENTS "caps=\"application/x-event-camera,format=XYTP\""
+
+/// Like plays_forwards(), and also requires a segment in time format.
+inline bool plays_events(gpointer element, GstEvent* event, const char* verb) {
+  const GstFormat format = segment_of(event).format;
+  if (format == GST_FORMAT_TIME) return plays_forwards(element, event, verb);
+  return refuse_segment(
+      element, event,
+      {GST_STREAM_ERROR_FORMAT, std::string("Cannot ") + verb + " " + gst_format_get_name(format) +
+                                    ": this stream has no timestamps. Insert a reader of event "
+                                    "files upstream, such as decodebin " ASK_FOR_EVENTS "."});
 }

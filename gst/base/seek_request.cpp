@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/seek_request.hpp"
 
-#include <algorithm>
-
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
 
 SeekRequest::SeekRequest(GstEvent* event) : seqnum_(gst_event_get_seqnum(event)) {
   gst_event_parse_seek(event, &rate_, &format_, &flags_, &start_type_, &start_, &stop_type_,

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <algorithm>
 #include <optional>
 
 #include "gst/base/owned.hpp"
 
-/// Parsed seek event.
 class SeekRequest {
  public:
   explicit SeekRequest(GstEvent* event);

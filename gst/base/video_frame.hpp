@@ -7,6 +7,20 @@
 #include <cstdint>
 #include <string>
 
+#include "gst/base/errors.hpp"
+
+/// Report for a frame that does not match its caps.
+inline Report cannot_read(const std::string& fault) {
+  return {GST_RESOURCE_ERROR_FAILED,
+          "Cannot read a video frame: " + fault + ". Check the element upstream."};
+}
+
+/// Report for an output buffer that does not match its caps.
+inline Report cannot_draw(const std::string& fault) {
+  return {GST_RESOURCE_ERROR_FAILED,
+          "Cannot draw into an output buffer: " + fault + ". Check the element downstream."};
+}
+
 /// Duration of a frame; 0 if the framerate is variable.
 inline GstClockTime frame_duration(const GstVideoInfo& video) {
   if (GST_VIDEO_INFO_FPS_N(&video) <= 0) return 0;
@@ -42,7 +56,6 @@ class VideoFrame {
   /// called if false.
   explicit operator bool() const { return fault_.empty(); }
 
-  /// Description of the fault, for a message.
   const std::string& fault() const { return fault_; }
 
   const GstVideoFrame* get() const { return &frame_; }

@@ -3,11 +3,10 @@
 
 #include <gst/video/gstvideopool.h>
 
-#include <algorithm>
 #include <iterator>
 #include <string_view>
 
-#include "gst/base/types.hpp"
+#include "gst/base/element.hpp"
 
 using namespace eventcamera;
 

@@ -9,10 +9,8 @@
 #define COLOUR_FORMATS "{ BGRx, RGBx, xRGB, xBGR, BGRA, RGBA, ARGB, ABGR, RGB, BGR }"
 #define DRAWN_VIDEO_FORMATS "{ BGRx, RGBx, xRGB, xBGR, BGRA, RGBA, ARGB, ABGR, RGB, BGR, GRAY8 }"
 
-/// Pixel layout of a video of DRAWN_VIDEO_FORMATS.
 eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info);
 
-/// Enum type of properties that are a PaletteName.
 GType palette_type();
 
 /// Copies the metas of a frame to the picture of its events, if they remain valid although the

@@ -1,19 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/filter/eventfilter.hpp"
 
-#include <algorithm>
-#include <cstdint>
 #include <limits>
-#include <string>
 
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "src/filter/filter.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_filter_debug);
 #define GST_CAT_DEFAULT event_filter_debug
@@ -33,7 +25,6 @@ struct Counters {
 struct State {
   SensorSize sensor{};
   SensorSize output{};
-  /// Time of the last event.
   Microseconds passed = std::numeric_limits<Microseconds>::min() / 2;
   Microseconds delay = 0;  ///< added to the times that the filter sees
 };
@@ -66,15 +57,10 @@ static GstEventFilterPrivate& priv_of(gpointer self) {
       gst_event_filter_get_instance_private(GST_EVENT_FILTER(self)));
 }
 
-void gst_event_filter_set_impl(GstEventFilter* self, std::unique_ptr<EventFilter> impl) {
-  priv_of(self).impl = std::move(impl);
+std::unique_ptr<EventFilter>& gst_event_filter_impl(gpointer element) {
+  return priv_of(element).impl;
 }
 
-EventFilter& gst_event_filter_impl(GstEventFilter* self) {
-  return *priv_of(self).impl;
-}
-
-/// Runs `work`; reports any exception.
 template <class Work>
 static auto reported(gpointer self, const Work& work) {
   return catch_exceptions(
@@ -86,19 +72,6 @@ static auto reported(gpointer self, const Work& work) {
         return {GST_STREAM_ERROR_FAILED, std::string("Cannot filter the events: ") + error.what()};
       },
       work);
-}
-
-/* events */
-
-/// Skips a buffer that cannot be filtered.
-static GstFlowReturn reject(gpointer self, GstBuffer* buffer) {
-  auto& priv = priv_of(self);
-  priv.stream->faults.warn(self, event_fault(buffer), buffer);
-  const auto events = gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent);
-  const auto counters = priv.counters.lock();
-  counters->received += events;
-  counters->rejected += events;
-  return GST_BASE_TRANSFORM_FLOW_DROPPED;
 }
 
 /// Returns the start of a buffer on the time axis of the stream, after forgetting the past if time
@@ -139,9 +112,14 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
   auto& priv = priv_of(transform);
   if (!priv.stream->state) return GST_FLOW_NOT_NEGOTIATED;
   const auto interval = interval_of(buffer);
-  if (!interval || gst_buffer_get_size(buffer) % sizeof(GstEventCameraEvent) != 0)
-    return reject(transform, buffer);
-
+  if (!interval || gst_buffer_get_size(buffer) % sizeof(Event) != 0) {
+    priv.stream->faults.warn(transform, event_fault(buffer), buffer);
+    const auto events = gst_buffer_get_size(buffer) / sizeof(Event);
+    const auto counters = priv.counters.lock();
+    counters->received += events;
+    counters->rejected += events;
+    return GST_BASE_TRANSFORM_FLOW_DROPPED;
+  }
   return reported(transform, [&] {
     align_events(buffer);
     std::optional<WritableBytes> mapped(std::in_place, buffer, GST_MAP_READWRITE);
@@ -153,7 +131,7 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
     const auto valid =
         keep_valid(all, priv.stream->state->sensor,
                    static_cast<guint32>(std::min(max_t, GstClockTime{G_MAXUINT32})), invalid);
-    const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
+    const auto start = microseconds(interval->start);
     const auto kept = priv.impl->filter(valid, continued(transform, valid, start));
     mapped.reset();
     truncate_events(buffer, kept.events.size());
@@ -201,8 +179,6 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
 }
 
-/* negotiation, states */
-
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
   auto& priv = priv_of(transform);
   GstEventCameraInfo from;
@@ -238,13 +214,11 @@ static gboolean stop(GstBaseTransform* transform) {
   return TRUE;
 }
 
-/* type */
-
 static GstStructure* stats_of(GObject* object) {
   const Counters counters = priv_of(object).counters.copy();
-  return gst_structure_new("application/x-event-filter-stats", "events", G_TYPE_UINT64,
-                           counters.received, "dropped-events", G_TYPE_UINT64, counters.dropped,
-                           "rejected-events", G_TYPE_UINT64, counters.rejected, nullptr);
+  return new_counters("application/x-event-filter-stats", {{"events", counters.received},
+                                                           {"dropped-events", counters.dropped},
+                                                           {"rejected-events", counters.rejected}});
 }
 
 static void finalize(GObject* object) {

@@ -8,8 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "gst/base/element_type.hpp"
-#include "gst/base/properties.hpp"
+#include "gst/base/element.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/filter/filter.hpp"
 
@@ -24,7 +23,6 @@ class EventFilter {
   /// Starts a stream of a sensor of size `in`. All kept events must fit into `out`, the size in the
   /// output caps, which differs from `in` only if the subclass overrides transform_caps.
   virtual void start(eventcamera::SensorSize in, eventcamera::SensorSize out) = 0;
-  /// Drops all state.
   virtual void stop() {}
   /// Like the member function of eventcamera::Filter. May change x and y, too.
   virtual eventcamera::LabelledEvents filter(eventcamera::LabelledEvents events,
@@ -76,27 +74,26 @@ struct _GstEventFilterClass {
   GstBaseTransformClass parent_class;
 };
 
-void gst_event_filter_set_impl(GstEventFilter* self, std::unique_ptr<EventFilter> impl);
-EventFilter& gst_event_filter_impl(GstEventFilter* self);
+std::unique_ptr<EventFilter>& gst_event_filter_impl(gpointer element);
 
-/// Returns the EventFilter of an element, of class `Impl`.
 template <class Impl>
 Impl& filter_impl(gpointer element) {
-  return static_cast<Impl&>(gst_event_filter_impl(GST_EVENT_FILTER(element)));
+  return static_cast<Impl&>(*gst_event_filter_impl(element));
 }
 
 /// Defines and registers the type of an element with an EventFilter of class `Impl`, which must
-/// have a member `settings`, which type_settings() returns. The type's class_init must follow.
-#define DEFINE_EVENT_FILTER(Type, type, OBJECT, Impl, element)                     \
+/// have a member `settings`, which type_settings() returns; `...` is code for the type, such as
+/// implement(). The type's class_init must follow.
+#define DEFINE_EVENT_FILTER(Type, type, OBJECT, Impl, element, ...)                \
   G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventFilter)                    \
   struct _##Type {                                                                 \
     GstEventFilter parent;                                                         \
   };                                                                               \
-  G_DEFINE_TYPE(Type, type, GST_TYPE_EVENT_FILTER)                                 \
+  G_DEFINE_TYPE_WITH_CODE(Type, type, GST_TYPE_EVENT_FILTER, __VA_ARGS__)          \
   GST_ELEMENT_REGISTER_DEFINE(element, #element, GST_RANK_NONE, type##_get_type()) \
   /* A type takes no parentheses: NOLINTNEXTLINE(bugprone-macro-parentheses) */    \
   static void type##_init(Type* self) {                                            \
-    gst_event_filter_set_impl(GST_EVENT_FILTER(self), std::make_unique<Impl>());   \
+    gst_event_filter_impl(self) = std::make_unique<Impl>();                        \
   }                                                                                \
   static auto& type##_settings(GObject* object) {                                  \
     return filter_impl<Impl>(object).settings;                                     \

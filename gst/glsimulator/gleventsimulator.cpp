@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/glsimulator/gleventsimulator.hpp"
 
-#include <memory>
-
 #include "gst/glsimulator/shared_context.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(gl_event_simulator_debug);
@@ -42,15 +40,12 @@ static gboolean query(GstBaseTransform* self, GstPadDirection direction, GstQuer
   return PARENT_TRANSFORM_CLASS->query(self, direction, query);
 }
 
-/* allocation */
-
 /// Proposes no pool, because upstream's textures may belong to another context.
 static gboolean propose_allocation(GstBaseTransform* self, GstQuery* decide, GstQuery* query) {
   gst_query_add_allocation_meta(query, GST_GL_SYNC_META_API_TYPE, nullptr);
   return PARENT_TRANSFORM_CLASS->propose_allocation(self, decide, query);
 }
 
-/// Puts a pool of textures first: downstream's, if the context can draw in its textures.
 static void choose_texture_pool(GstQuery* query, GstCaps* caps, GstGLContext* context) {
   GstBufferPool* pool = nullptr;
   guint size = 0;
@@ -84,8 +79,6 @@ static gboolean decide_allocation(GstBaseTransform* self, GstQuery* query) {
   }
   return PARENT_TRANSFORM_CLASS->decide_allocation(self, query);
 }
-
-/* type */
 
 static void finalize(GObject* object) {
   std::destroy_at(&context_of(object));

@@ -4,8 +4,6 @@
 #include <gst/gl/egl/gstgldisplay_egl.h>
 #include <gst/gl/egl/gstgldisplay_egl_device.h>
 
-#include <utility>
-
 #include "gst/base/errors.hpp"
 
 /// Returns a new reference to the context of a display, creating it if needed; nullptr on failure.

@@ -36,7 +36,6 @@ class SharedContext {
   /// Makes find() replace this context, which is lost.
   void forget(GstGLContext* context);
 
-  /// For logs.
   GstDebugCategory* category() const { return category_; }
 
  private:

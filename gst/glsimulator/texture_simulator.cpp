@@ -3,17 +3,8 @@
 #include <gst/gl/gstglfuncs.h>
 #include <gst/video/video.h>
 
-#include <algorithm>
-#include <exception>
 #include <iterator>
-#include <memory>
-#include <new>
-#include <optional>
-#include <string>
-#include <utility>
 
-#include "gst/base/owned.hpp"
-#include "gst/base/video_frame.hpp"
 #include "gst/glsimulator/gleventsimulator.hpp"
 #include "gst/glsimulator/shared_context.hpp"
 #include "gst/simulator/frame_luma.hpp"
@@ -92,7 +83,6 @@ bool run_in(GstGLContext* context, const Work& work) {
   return call.has_run;
 }
 
-/// Describes the channels of the first texture of `video`.
 void describe_channels(const GstVideoInfo& video, eventcamera::gl::TextureFrame& frame) {
   const auto channel = [&](guint component) -> int& {
     return frame.weights[GST_VIDEO_INFO_COMP_POFFSET(&video, component)];
@@ -157,7 +147,7 @@ class TextureVideoSimulator final : public VideoSimulator {
     {
       const OwnedBuffer uploaded = in_texture(interval.frame.get());
       const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
-      if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
+      if (!texture.fault().empty()) refuse(cannot_read(texture.fault()), texture.fault());
       frame_.texture = texture.name();
       simulator_->set_flow(flow);
       run([&] { simulator_->queue(frame_, interval.end, settings); });
@@ -171,9 +161,9 @@ class TextureVideoSimulator final : public VideoSimulator {
     {
       const OwnedBuffer uploaded = in_texture(frame.get());
       const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
-      if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
+      if (!texture.fault().empty()) refuse(cannot_read(texture.fault()), texture.fault());
       const MappedTexture drawn(drawn_, picture, context_, GST_MAP_WRITE);
-      if (!drawn.fault().empty()) refuse(cannot_draw(drawn.fault()));
+      if (!drawn.fault().empty()) refuse(cannot_draw(drawn.fault()), drawn.fault());
       frame_.texture = texture.name();
       const eventcamera::gl::Picture out{
           drawn.name(), eventcamera::pixels_by_kind(palette, pixel_layout_of(drawn_))};
@@ -211,7 +201,6 @@ class TextureVideoSimulator final : public VideoSimulator {
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
 
  private:
-  /// A frame that the GPU may still read.
   struct Queued {
     Interval interval;
     bool is_drawn;
@@ -228,7 +217,7 @@ class TextureVideoSimulator final : public VideoSimulator {
   /// passes textures on unchanged.
   OwnedBuffer in_system_memory(GstBuffer* buffer) const {
     const VideoFrame mapped(video_, buffer, GST_MAP_READ);
-    if (!mapped) throw cannot_read(mapped.fault());
+    if (!mapped) throw VideoSimulatorError(cannot_read(mapped.fault()), mapped.fault());
     if (!gst_is_gl_memory(gst_buffer_peek_memory(buffer, 0)))
       return OwnedBuffer(gst_buffer_ref(buffer));
     OwnedBuffer copy(gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(&video_), nullptr));
@@ -259,15 +248,15 @@ class TextureVideoSimulator final : public VideoSimulator {
     auto result = gst_gl_upload_perform_with_buffer(upload_, in_memory.get(), &uploaded);
     if (result == GST_GL_UPLOAD_RECONFIGURE)  // it has selected an upload method
       result = gst_gl_upload_perform_with_buffer(upload_, in_memory.get(), &uploaded);
-    if (result != GST_GL_UPLOAD_DONE)
-      refuse(cannot_read("it cannot be uploaded to an OpenGL texture"));
+    const std::string fault = "it cannot be uploaded to an OpenGL texture";
+    if (result != GST_GL_UPLOAD_DONE) refuse(cannot_read(fault), fault);
     return OwnedBuffer(uploaded);
   }
 
   /// Throws the fault of a frame or a picture, or ContextLost if the context is the cause.
-  [[noreturn]] void refuse(const VideoSimulatorError& fault) {
+  [[noreturn]] void refuse(const Report& report, const std::string& cause) {
     run([] {});
-    throw fault;
+    throw VideoSimulatorError(report, cause);
   }
 
   /// Runs `work` in the context, which other elements share; turns OpenGL errors into messages.

@@ -1,33 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "gst/recording/eventreader.hpp"
-
-#include <algorithm>
-#include <array>
-#include <exception>
-#include <memory>
-#include <new>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
 
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
-#include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/seek_request.hpp"
-#include "gst/base/types.hpp"
-#include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/reader/reader_output.hpp"
 #include "gst/recording/reader/reader_reports.hpp"
-#include "gst/recording/reader/reader_timeline.hpp"
 #include "src/formats/byte_source.hpp"
 #include "src/formats/compressed_file.hpp"
 #include "src/formats/corruption.hpp"
@@ -140,7 +117,6 @@ class PadBytes final : public ByteSource {
   /// Reason for a failed read; GST_FLOW_EOS if upstream was stopped before the end of the file.
   GstFlowReturn flow() const { return flow_; }
 
-  /// Clears a failed read.
   void retry() { flow_ = GST_FLOW_OK; }
 
  private:
@@ -167,7 +143,7 @@ struct ReaderSettings {
 };
 
 class EventReader;
-static EventReader& event_reader_of(GstObject* element);
+static EventReader& reader_of(gpointer element);
 
 /// Implementation of the element: gets the bytes of a recording from its sink pad, and passes what
 /// they contain to its output. Except where noted, functions run under the sink pad's stream lock,
@@ -181,25 +157,25 @@ class EventReader {
         timeline_(sink_),
         reports_(element, format.has_many_streams),
         output_(
-            element, sink_, format, format_settings_, timeline_,
+            element, sink_, format, format_settings, timeline_,
             +[](GstPad* pad, GstObject* parent, GstEvent* event) {
-              return event_reader_of(parent).src_event(pad, event);
+              return reader_of(parent).src_event(pad, event);
             },
             +[](GstPad* pad, GstObject* parent, GstQuery* query) {
-              return event_reader_of(parent).src_query(pad, query);
+              return reader_of(parent).src_query(pad, query);
             }) {
     gst_pad_set_activate_function(sink_, choose_mode);
     gst_pad_set_activatemode_function(
         sink_, +[](GstPad*, GstObject* parent, GstPadMode mode, gboolean active) {
-          return event_reader_of(parent).activate(mode, active != FALSE);
+          return reader_of(parent).activate(mode, active != FALSE);
         });
     gst_pad_set_chain_function(
         sink_, +[](GstPad*, GstObject* parent, GstBuffer* buffer) {
-          return event_reader_of(parent).chain(buffer);
+          return reader_of(parent).chain(buffer);
         });
     gst_pad_set_event_function(
         sink_, +[](GstPad*, GstObject* parent, GstEvent* event) {
-          return event_reader_of(parent).sink_event(event);
+          return reader_of(parent).sink_event(event);
         });
   }
 
@@ -207,8 +183,8 @@ class EventReader {
   EventReader& operator=(const EventReader&) = delete;
 
   // From any thread.
-  Guarded<ReaderSettings>& settings() { return settings_; }
-  Guarded<FormatSettings>& format_settings() { return format_settings_; }
+  Guarded<ReaderSettings> settings;
+  Guarded<FormatSettings> format_settings;
   GstStructure* stats() const { return reports_.stats(); }
 
   gboolean src_event(GstPad* pad, GstEvent* event) {
@@ -221,7 +197,7 @@ class EventReader {
 
   gboolean src_query(GstPad* pad, GstQuery* query) {
     if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-      return answer_latency(GST_CAT_DEFAULT, sink_, query, settings_.copy().buffer_duration) ||
+      return answer_latency(sink_, query, settings.copy().buffer_duration) ||
              gst_pad_query_default(pad, GST_OBJECT(element_), query);
     if (timeline_.is_timed()) return gst_pad_query_default(pad, GST_OBJECT(element_), query);
     return timeline_.answer(pad, query);
@@ -267,7 +243,6 @@ class EventReader {
         drain();  // into the stream that ends here, before the new one
         if (recording_ && timeline_.is_timed()) recording_->interrupt();
         output_.start_stream(event);
-        gst_event_unref(event);
         return TRUE;
       case GST_EVENT_CAPS:
         return handle_caps(event);
@@ -316,12 +291,12 @@ class EventReader {
   /// Creates the recording, to read a file from its start or a stream of words.
   void open_recording() {
     const std::shared_ptr<GstCaps> caps(caps_ ? gst_caps_copy(caps_.get()) : nullptr, unref_caps);
-    auto make = [make_decoder = format_.make_decoder, caps, settings = format_settings_.copy()] {
+    auto make = [make_decoder = format_.make_decoder, caps, settings = format_settings.copy()] {
       return make_decoder(caps.get(), settings);
     };
     close_recording();
     const bool is_timed = timeline_.is_timed();
-    const auto length = static_cast<Microseconds>(settings_.copy().buffer_duration / GST_USECOND);
+    const auto length = microseconds(settings.copy().buffer_duration);
     recording_ = std::make_shared<RecordingReader>(
         make, length, is_timed ? RecordingReader::Clock::stream : RecordingReader::Clock::file);
     if (decompressed_)
@@ -343,7 +318,6 @@ class EventReader {
     is_consuming_ = false;
   }
 
-  /// Reads and pushes one item.
   GstFlowReturn step() {
     const auto output = recording_->next();
     if (bytes_ && bytes_->failed()) return bytes_->flow();
@@ -364,7 +338,6 @@ class EventReader {
     return std::visit([this](const auto& item) { return output_.push(item); }, *output);
   }
 
-  /// Pushes all available output.
   GstFlowReturn push_pending() {
     GstFlowReturn result = GST_FLOW_OK;
     while (result == GST_FLOW_OK) result = step();
@@ -439,9 +412,8 @@ class EventReader {
     std::optional<RecordingReader::Interval> interval;
     const bool has_end = GST_BUFFER_DURATION_IS_VALID(buffer);
     if (timeline_.is_timed() && GST_BUFFER_PTS_IS_VALID(buffer))
-      interval = {
-          static_cast<Microseconds>(GST_BUFFER_PTS(buffer) / GST_USECOND),
-          has_end ? static_cast<Microseconds>(GST_BUFFER_DURATION(buffer) / GST_USECOND) : 0};
+      interval = {microseconds(GST_BUFFER_PTS(buffer)),
+                  has_end ? microseconds(GST_BUFFER_DURATION(buffer)) : 0};
     GstFlowReturn result = GST_FLOW_OK;
     if (decompressor_) {
       decompressor_->push(bytes.get());
@@ -451,8 +423,7 @@ class EventReader {
       result = push_pending();
     }
     if (result == GST_FLOW_OK && interval && has_end) {
-      recording_->advance_to(static_cast<Microseconds>(
-          (GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer)) / GST_USECOND));
+      recording_->advance_to(microseconds((GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer))));
       result = push_pending();
     }
     if (result != GST_FLOW_OK) {
@@ -466,7 +437,6 @@ class EventReader {
     return result;
   }
 
-  /// Pushes the output of the decompressor.
   GstFlowReturn push_decompressed() {
     GstFlowReturn result = GST_FLOW_OK;
     while (result == GST_FLOW_OK) {
@@ -481,8 +451,7 @@ class EventReader {
   }
 
   gboolean handle_caps(GstEvent* event) {
-    GstCaps* caps = nullptr;
-    gst_event_parse_caps(event, &caps);
+    GstCaps* const caps = caps_of(event);
     const bool is_new = !caps_ || !gst_caps_is_equal(caps_.get(), caps);
     if (is_new) {
       drain();
@@ -555,7 +524,7 @@ class EventReader {
     if (is_known)
       flow_ = guard([&] {
         if (!recording_) open_recording();
-        recording_->advance_to(static_cast<Microseconds>((pts + duration) / GST_USECOND));
+        recording_->advance_to(microseconds(pts + duration));
         GstFlowReturn result = push_pending();
         if (recording_->has_events() || result != GST_FLOW_OK) return result;
         result = output_.begin();
@@ -672,9 +641,6 @@ class EventReader {
   GstElement* element_;
   GstPad* sink_;
   const EventReaderFormat& format_;
-  Guarded<ReaderSettings> settings_;
-  Guarded<FormatSettings> format_settings_;
-
   ReaderTimeline timeline_;
   ReaderReports reports_;
   ReaderOutput output_;
@@ -687,9 +653,7 @@ class EventReader {
   GstFlowReturn flow_ = GST_FLOW_OK;  ///< anything else refuses pushed bytes
 };
 
-struct GstEventReaderPrivate {
-  EventReader* reader;
-};
+using GstEventReaderPrivate = EventReader*;
 
 #define GST_TYPE_EVENT_READER (gst_event_reader_get_type())
 G_DECLARE_DERIVABLE_TYPE(GstEventReader, gst_event_reader, GST, EVENT_READER, GstElement)
@@ -704,40 +668,39 @@ G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventReader, gst_event_reader, GST_TYPE_ELEM
                                      GST_DEBUG_CATEGORY_INIT(event_reader_debug, "eventreader", 0,
                                                              "readers of recordings"))
 
-static EventReader*& reader_of(GObject* object) {
-  return static_cast<GstEventReaderPrivate*>(
-             gst_event_reader_get_instance_private(GST_EVENT_READER(object)))
-      ->reader;
+static EventReader*& priv_of(gpointer element) {
+  return *static_cast<EventReader**>(
+      gst_event_reader_get_instance_private(GST_EVENT_READER(element)));
 }
 
-static EventReader& event_reader_of(GstObject* element) {
-  return *reader_of(G_OBJECT(element));
+static EventReader& reader_of(gpointer element) {
+  return *priv_of(element);
 }
 
 static Guarded<ReaderSettings>& settings_of(GObject* object) {
-  return reader_of(object)->settings();
+  return reader_of(object).settings;
 }
 
 Guarded<FormatSettings>& format_settings_of(GObject* reader) {
-  return reader_of(reader)->format_settings();
+  return reader_of(reader).format_settings;
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
   const auto result =
       GST_ELEMENT_CLASS(gst_event_reader_parent_class)->change_state(element, transition);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) event_reader_of(GST_OBJECT(element)).reset();
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) reader_of(element).reset();
   return result;
 }
 
 /// Creates the reader here, because the subclass's format is not yet known in init.
 static void constructed(GObject* object) {
-  reader_of(object) =
+  priv_of(object) =
       new EventReader(GST_ELEMENT(object), *GST_EVENT_READER_GET_CLASS(object)->format);
   G_OBJECT_CLASS(gst_event_reader_parent_class)->constructed(object);
 }
 
 static void finalize(GObject* object) {
-  delete reader_of(object);
+  delete priv_of(object);
   G_OBJECT_CLASS(gst_event_reader_parent_class)->finalize(object);
 }
 
@@ -753,7 +716,7 @@ static void gst_event_reader_class_init(GstEventReaderClass* klass) {
                  "Duration of a buffer of events (nanoseconds, in whole microseconds)", GST_USECOND,
                  10 * GST_SECOND);
   install_stats(
-      object_class, [](GObject* object) { return reader_of(object)->stats(); },
+      object_class, [](GObject* object) { return reader_of(object).stats(); },
       "Counts since the start or the last seek: events, triggers, frames and imu-samples read; "
       "corrupt-places where bytes were skipped; and what was dropped: outside-events, outside the "
       "sensor; late-items, after their buffer was sent; stray-items, at an impossible time. "

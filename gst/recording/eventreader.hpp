@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <memory>
 #include <string>
 
-#include "gst/base/properties.hpp"
+#include "gst/base/element.hpp"
 #include "src/formats/decoder.hpp"
 
 /// User-settable values of a recording format, read at the start of a file. A reader has only the
@@ -20,7 +18,6 @@ struct FormatSettings {
   std::string events_path;         ///< in an HDF5 file; empty: the first events
 };
 
-/// Settings of a reader element.
 Guarded<FormatSettings>& format_settings_of(GObject* reader);
 
 using FormatProperties = Properties<format_settings_of>;

@@ -1,22 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/eventwriter.hpp"
 
-#include <algorithm>
-#include <cstdint>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/sensor_events.hpp"
 #include "gst/recording/writable_events.hpp"
@@ -36,14 +22,13 @@ constexpr std::size_t word_bytes = 8;
 /// Maximum bytes per event, including time words.
 constexpr std::size_t max_event_bytes = 32;
 
-/// Maximum bytes per buffer.
 std::size_t capacity(guint mtu) {
   return mtu / word_bytes * word_bytes;
 }
 
 /// A stream without buffers may have no segment.
 void ensure_segment(GstPad* src) {
-  if (has_segment(src)) return;
+  if (const OwnedEvent sent(gst_pad_get_sticky_event(src, GST_EVENT_SEGMENT, 0)); sent) return;
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_TIME);
   gst_pad_push_event(src, gst_event_new_segment(&segment));
@@ -83,6 +68,11 @@ class WrittenFile {
   GstCaps* caps() const { return caps_.get(); }
   /// True once bytes were pushed.
   bool has_begun() const { return has_begun_; }
+  /// True for words without a header, which have the sensor's size in their caps and may follow
+  /// words of another sensor.
+  bool is_words() const {
+    return gst_structure_has_name(gst_caps_get_structure(caps(), 0), GST_EVENT_CAMERA_MEDIA_TYPE);
+  }
 
   /// Writes a buffer of events, in buffers of at most `mtu` bytes.
   GstFlowReturn write(GstBuffer* buffer, guint mtu) {
@@ -112,15 +102,13 @@ class WrittenFile {
     triggers_.push(triggers);
     if (!triggers_.is_full()) return GST_FLOW_OK;
     ensure_segment(src_);
-    const auto first = std::max<Microseconds>(*triggers_.first(), 0);
-    const auto start = static_cast<GstClockTime>(first) * GST_USECOND;
+    const auto start = nanoseconds(*triggers_.first());
     if (const GstFlowReturn result = push_header(start); result != GST_FLOW_OK) return result;
     encode_triggers();
     writable_.advance_to(last_);
     return push_bytes(start, GST_CLOCK_TIME_NONE);
   }
 
-  /// Completes the file.
   GstFlowReturn end(guint mtu) {
     mtu_ = mtu;
     ensure_segment(src_);
@@ -179,7 +167,6 @@ class WrittenFile {
     return result;
   }
 
-  /// Overwrites part of the header.
   GstFlowReturn push_patch(FilePatch patch) {
     GST_DEBUG_OBJECT(element(),
                      "completing the header: %" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT,
@@ -207,7 +194,7 @@ class WrittenFile {
                              ? events.size()
                              : count_that_fits(events, room - std::min(room, bytes_.size()));
       if (count == 0) {
-        const auto end = std::max(start, static_cast<GstClockTime>(events.front().t) * GST_USECOND);
+        const auto end = std::max(start, nanoseconds(events.front().t));
         const GstFlowReturn result = push_bytes(start, end - start);
         if (result != GST_FLOW_OK) return result;
         start = end;
@@ -252,7 +239,6 @@ class WrittenFile {
     }
   }
 
-  /// Encodes all queued triggers.
   void encode_triggers() { encode(triggers_.pop_before(after_all_items)); }
 
   /// Warns of the first pause that is removed, and at the end of the file of the total, if there
@@ -288,7 +274,6 @@ class WrittenFile {
   std::uint64_t pauses_reported_ = 0;  ///< removed microseconds that a warning reported
 };
 
-/// User-settable values.
 struct Settings {
   EventWriterFormat::Choice choice;
   guint mtu = G_MAXUINT;
@@ -297,12 +282,12 @@ struct Settings {
 }  // namespace
 
 struct GstEventWriterPrivate {
-  explicit GstEventWriterPrivate(GstElement* self)
-      : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_ENCODE) {}
+  explicit GstEventWriterPrivate(GstElement* of)
+      : element(of), writable(of, GST_CAT_DEFAULT, GST_STREAM_ERROR_ENCODE) {}
 
-  Guarded<Settings> settings;
-  GstPad* sink = nullptr;
+  GstElement* const element;
   GstPad* src = nullptr;
+  Guarded<Settings> settings;
   WritableEvents writable;
   std::unique_ptr<WrittenFile> file;  ///< from caps to stop
 };
@@ -320,37 +305,34 @@ G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventWriter, gst_event_writer, GST_TYPE_ELEM
                                      GST_DEBUG_CATEGORY_INIT(event_writer_debug, "eventwriter", 0,
                                                              "writers of event files"))
 
-static GstEventWriterPrivate& priv_of(GstEventWriter* self) {
-  return *static_cast<GstEventWriterPrivate*>(gst_event_writer_get_instance_private(self));
+static GstEventWriterPrivate& priv_of(gpointer element) {
+  return *static_cast<GstEventWriterPrivate*>(
+      gst_event_writer_get_instance_private(GST_EVENT_WRITER(element)));
 }
 
 static Guarded<Settings>& settings_of(GObject* object) {
-  return priv_of(GST_EVENT_WRITER(object)).settings;
+  return priv_of(object).settings;
 }
 
-static const EventWriterFormat& format_of(GstEventWriter* self) {
-  return *GST_EVENT_WRITER_GET_CLASS(self)->format;
+static const EventWriterFormat& format_of(gpointer element) {
+  return *GST_EVENT_WRITER_GET_CLASS(element)->format;
 }
 
-/// Runs `work`; reports any exception.
 template <class Work>
-static GstFlowReturn reported(GstEventWriter* self, const Work& work) {
+static bool reported(GstEventWriterPrivate& self, const Work& work) {
   return catch_exceptions(
-      self,
+      self.element,
       [](const auto& error) {
         return WritableEvents::failure(error, {GST_STREAM_ERROR_ENCODE, "Cannot write the file."});
       },
       work);
 }
 
-/* negotiation */
-
-/// Begins a file.
-static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, OwnedCaps caps) {
-  auto& priv = priv_of(self);
-  auto encoder =
-      format_of(self).create({info.width, info.height}, priv.settings.copy().choice, caps.get());
-  priv.file = std::make_unique<WrittenFile>(priv.writable, priv.src, info, std::move(encoder),
+static void begin_file(GstEventWriterPrivate& self, const GstEventCameraInfo& info,
+                       OwnedCaps caps) {
+  auto encoder = format_of(self.element)
+                     .create({info.width, info.height}, self.settings.copy().choice, caps.get());
+  self.file = std::make_unique<WrittenFile>(self.writable, self.src, info, std::move(encoder),
                                             std::move(caps));
 }
 
@@ -366,29 +348,25 @@ static OwnedCaps allowed_caps(GstPad* src, const GstEventCameraInfo& info) {
   return OwnedCaps(gst_pad_peer_query_caps(src, own.get()));
 }
 
-static GstFlowReturn negotiate(GstEventWriter* self, const GstEventCameraInfo& info) {
-  auto& priv = priv_of(self);
-  OwnedCaps allowed = allowed_caps(priv.src, info);
-  if (gst_caps_is_empty(allowed.get())) {
-    const OwnedCaps accepted(gst_pad_peer_query_caps(priv.src, nullptr));
-    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
+static bool negotiate(GstEventWriterPrivate& self, const GstEventCameraInfo& info) {
+  OwnedCaps caps = allowed_caps(self.src, info);
+  if (gst_caps_is_empty(caps.get())) {
+    const OwnedCaps accepted(gst_pad_peer_query_caps(self.src, nullptr));
+    GST_ELEMENT_ERROR(self.element, STREAM, FORMAT,
                       ("Downstream does not take this format, or not from a sensor of %s. Correct "
                        "the caps after this element.",
                        in_pixels({info.width, info.height}).c_str()),
                       ("downstream accepts %" GST_PTR_FORMAT, accepted.get()));
-    return GST_FLOW_NOT_NEGOTIATED;
+    return false;
   }
-  GstCaps* caps = gst_caps_truncate(allowed.release());
-  if (const auto fixate = format_of(self).fixate)
-    caps = fixate(info, priv.settings.copy().choice.variant, caps);
-  OwnedCaps fixed(caps);
-  if (!gst_caps_is_fixed(fixed.get())) return GST_FLOW_NOT_NEGOTIATED;
-  GST_DEBUG_OBJECT(self, "writing the events of %dx%d pixels as %" GST_PTR_FORMAT, info.width,
-                   info.height, fixed.get());
-  begin_file(self, info, std::move(fixed));
-  return gst_pad_push_event(priv.src, gst_event_new_caps(priv.file->caps()))
-             ? GST_FLOW_OK
-             : GST_FLOW_NOT_NEGOTIATED;
+  caps.reset(gst_caps_truncate(caps.release()));
+  if (const auto fixate = format_of(self.element).fixate)
+    caps.reset(fixate(info, self.settings.copy().choice.variant, caps.release()));
+  if (!gst_caps_is_fixed(caps.get())) return false;
+  GST_DEBUG_OBJECT(self.element, "writing the events of %dx%d pixels as %" GST_PTR_FORMAT,
+                   info.width, info.height, caps.get());
+  begin_file(self, info, std::move(caps));
+  return gst_pad_push_event(self.src, gst_event_new_caps(self.file->caps())) != FALSE;
 }
 
 /// Caps that the sink pad accepts: the sensors that the format holds, and then all others, which
@@ -419,86 +397,63 @@ static gboolean sink_query(GstPad* pad, GstObject* parent, GstQuery* query) {
   }
 }
 
-/* data */
-
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
-  auto* self = GST_EVENT_WRITER(parent);
-  auto& priv = priv_of(self);
+  auto& self = priv_of(parent);
   const OwnedBuffer buffer(received);
-  if (!priv.file) return GST_FLOW_NOT_NEGOTIATED;
-  return reported(self, [&] { return priv.file->write(received, priv.settings.copy().mtu); });
+  if (!self.file) return GST_FLOW_NOT_NEGOTIATED;
+  GstFlowReturn result = GST_FLOW_ERROR;
+  reported(self, [&] { result = self.file->write(received, self.settings.copy().mtu); });
+  return result;
 }
 
-static void end_file(GstEventWriter* self) {
-  auto& priv = priv_of(self);
-  if (!priv.file) return;
-  priv.writable.end_file();
-  reported(self, [&] { return priv.file->end(priv.settings.copy().mtu); });
+static void end_file(GstEventWriterPrivate& self) {
+  if (!self.file) return;
+  self.writable.end_file();
+  reported(self, [&] { self.file->end(self.settings.copy().mtu); });
 }
 
-/// False for words without a header, which have the sensor's size in their caps and may follow
-/// words of another sensor.
-static bool is_file(const WrittenFile& file) {
-  return gst_structure_has_name(gst_caps_get_structure(file.caps(), 0),
-                                GST_EVENT_CAMERA_MEDIA_TYPE) == FALSE;
-}
-
-static gboolean handle_caps(GstEventWriter* self, GstEvent* event) {
-  const auto& priv = priv_of(self);
-  GstCaps* caps = nullptr;
-  gst_event_parse_caps(event, &caps);
+static gboolean handle_caps(GstEventWriterPrivate& self, const GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) {
-    GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are not event caps", caps);
+    GST_ERROR_OBJECT(self.element, "%" GST_PTR_FORMAT " are not event caps", caps);
     return FALSE;
   }
-  if (priv.file && priv.file->info().width == info.width && priv.file->info().height == info.height)
+  if (self.file && self.file->info().width == info.width && self.file->info().height == info.height)
     return TRUE;
-  if (priv.file && priv.file->has_begun()) {
-    if (is_file(*priv.file) && !priv.writable.accepts({info.width, info.height})) return FALSE;
+  if (self.file && self.file->has_begun()) {
+    if (!self.file->is_words() && !self.writable.accepts({info.width, info.height})) return FALSE;
     end_file(self);
   }
-  return reported(self, [&] { return negotiate(self, info); }) == GST_FLOW_OK;
-}
-
-/// After a flush: filesink has truncated the file, and a decoder expects a header.
-static void start_over(GstEventWriter* self) {
-  const auto& file = priv_of(self).file;
-  if (!file) return;
-  reported(self, [&] {
-    begin_file(self, file->info(), OwnedCaps(gst_caps_ref(file->caps())));
-    return GST_FLOW_OK;
-  });
+  return reported(self, [&] { return negotiate(self, info); });
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
-  auto* self = GST_EVENT_WRITER(parent);
+  auto& self = priv_of(parent);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CAPS: {
-      const gboolean handled = handle_caps(self, event);
-      gst_event_unref(event);
-      return handled;
+      const OwnedEvent owned(event);
+      return handle_caps(self, caps_of(event));
     }
     case GST_EVENT_SEGMENT:
-      if (!plays_forwards(self, event, "write")) return FALSE;
-      priv_of(self).writable.begin_segment(segment_of(event), priv_of(self).file &&
-                                                                  is_file(*priv_of(self).file) &&
-                                                                  is_simulated(pad));
+      if (!plays_forwards(self.element, event, "write")) return FALSE;
+      self.writable.begin_segment(segment_of(event),
+                                  self.file && !self.file->is_words() && is_simulated(pad));
       break;
     case GST_EVENT_EOS:
       end_file(self);
       break;
-    case GST_EVENT_FLUSH_STOP:
-      start_over(self);
+    case GST_EVENT_FLUSH_STOP:  // filesink has truncated the file, and a decoder expects a header
+      if (self.file)
+        reported(self, [&] {
+          begin_file(self, self.file->info(), OwnedCaps(gst_caps_ref(self.file->caps())));
+        });
       break;
     case GST_EVENT_CUSTOM_DOWNSTREAM:
       if (const auto triggers = triggers_of(event)) {
         gst_event_unref(event);
-        auto& priv = priv_of(self);
-        if (!priv.file) return TRUE;
-        return reported(self, [&] {
-                 return priv.file->write(*triggers, priv.settings.copy().mtu);
-               }) == GST_FLOW_OK;
+        return !self.file || reported(self, [&] {
+          return self.file->write(*triggers, self.settings.copy().mtu) == GST_FLOW_OK;
+        });
       }
       break;
     default:
@@ -507,23 +462,17 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   return gst_pad_event_default(pad, parent, event);
 }
 
-/* states */
-
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_writer_parent_class)->change_state(element, transition);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    auto& priv = priv_of(GST_EVENT_WRITER(element));
-    if (priv.file) {
-      priv.writable.end_file();
-      priv.file->warn_of_pending();
-    }
-    priv.file.reset();
+  auto& self = priv_of(element);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY && self.file) {
+    self.writable.end_file();
+    self.file->warn_of_pending();
+    self.file.reset();
   }
   return result;
 }
-
-/* type */
 
 static EventWriterFormat::Choice default_choice(const EventWriterFormat& format) {
   EventWriterFormat::Choice choice;
@@ -534,20 +483,18 @@ static EventWriterFormat::Choice default_choice(const EventWriterFormat& format)
 
 /// Creates the pads here, because the format is not yet known in init.
 static void constructed(GObject* object) {
-  auto* element = GST_ELEMENT(object);
-  auto& priv = priv_of(GST_EVENT_WRITER(object));
-  const auto& format = format_of(GST_EVENT_WRITER(object));
-  priv.settings.lock()->choice = default_choice(format);
-  priv.sink = add_pad(element, "sink");
-  gst_pad_set_chain_function(priv.sink, chain);
-  gst_pad_set_event_function(priv.sink, sink_event);
-  gst_pad_set_query_function(priv.sink, sink_query);
-  priv.src = add_pad(element, "src");
+  auto& self = priv_of(object);
+  self.settings.lock()->choice = default_choice(format_of(object));
+  GstPad* const sink = add_pad(self.element, "sink");
+  gst_pad_set_chain_function(sink, chain);
+  gst_pad_set_event_function(sink, sink_event);
+  gst_pad_set_query_function(sink, sink_query);
+  self.src = add_pad(self.element, "src");
   G_OBJECT_CLASS(gst_event_writer_parent_class)->constructed(object);
 }
 
 static void finalize(GObject* object) {
-  std::destroy_at(&priv_of(GST_EVENT_WRITER(object)));
+  std::destroy_at(&priv_of(object));
   G_OBJECT_CLASS(gst_event_writer_parent_class)->finalize(object);
 }
 
@@ -582,8 +529,7 @@ static void format_class_init(gpointer klass, gpointer data) {
                    "packet; words are never split",
                    64, G_MAXUINT);
   install_stats(
-      object_class,
-      [](GObject* object) { return priv_of(GST_EVENT_WRITER(object)).writable.stats(); },
+      object_class, [](GObject* object) { return priv_of(object).writable.stats(); },
       WritableEvents::stats_blurb);
   auto* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_template(

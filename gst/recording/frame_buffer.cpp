@@ -2,42 +2,21 @@
 #include "gst/recording/frame_buffer.hpp"
 
 #include <algorithm>
-#include <new>
-
-#include "src/core/sensor_size.hpp"
 
 using namespace eventcamera;
 
-static GstVideoFormat video_format(PixelFormat format) {
-  switch (format) {
-    case PixelFormat::grey8:
-      return GST_VIDEO_FORMAT_GRAY8;
-    case PixelFormat::grey16:
-      return GST_VIDEO_FORMAT_GRAY16_LE;
-    case PixelFormat::bgr:
-      return GST_VIDEO_FORMAT_BGR;
-    case PixelFormat::bgra:
-      return GST_VIDEO_FORMAT_BGRA;
-  }
-  return GST_VIDEO_FORMAT_UNKNOWN;
-}
-
-static PixelFormat pixel_format(GstVideoFormat format) {
-  switch (format) {
-    case GST_VIDEO_FORMAT_GRAY16_LE:
-      return PixelFormat::grey16;
-    case GST_VIDEO_FORMAT_BGR:
-      return PixelFormat::bgr;
-    case GST_VIDEO_FORMAT_BGRA:
-      return PixelFormat::bgra;
-    default:
-      return PixelFormat::grey8;
-  }
-}
+/// The formats of RECORDED_VIDEO_CAPS.
+struct Format {
+  PixelFormat pixels;
+  GstVideoFormat video;
+};
+static constexpr Format formats[] = {{PixelFormat::grey8, GST_VIDEO_FORMAT_GRAY8},
+                                     {PixelFormat::grey16, GST_VIDEO_FORMAT_GRAY16_LE},
+                                     {PixelFormat::bgr, GST_VIDEO_FORMAT_BGR},
+                                     {PixelFormat::bgra, GST_VIDEO_FORMAT_BGRA}};
 
 static const char* const frame_meta = "GstEventCameraFrame";
 
-/// Its times, as fields of the meta.
 struct TimeField {
   const char* name;
   Microseconds Frame::*time;
@@ -86,9 +65,9 @@ static void read_frame_meta(GstBuffer* buffer, Frame& frame) {
 
 bool frame_video_info(const Frame& frame, GstVideoInfo* info) {
   return frame.width <= max_side && frame.height <= max_side &&
-         gst_video_info_set_format(info, video_format(frame.format),
-                                   static_cast<guint>(frame.width),
-                                   static_cast<guint>(frame.height));
+         gst_video_info_set_format(
+             info, std::ranges::find(formats, frame.format, &Format::pixels)->video,
+             static_cast<guint>(frame.width), static_cast<guint>(frame.height));
 }
 
 GstBuffer* frame_buffer(const Frame& frame, const GstVideoInfo* info) {
@@ -109,7 +88,7 @@ Frame recorded_frame(const GstVideoFrame* video, Microseconds t) {
   Frame frame;
   frame.t = frame.begin = frame.end = frame.exposure_begin = frame.exposure_end = t;
   read_frame_meta(video->buffer, frame);
-  frame.format = pixel_format(GST_VIDEO_FRAME_FORMAT(video));
+  frame.format = std::ranges::find(formats, GST_VIDEO_FRAME_FORMAT(video), &Format::video)->pixels;
   frame.width = GST_VIDEO_FRAME_WIDTH(video);
   frame.height = GST_VIDEO_FRAME_HEIGHT(video);
   frame.pixels = static_cast<const guint8*>(GST_VIDEO_FRAME_PLANE_DATA(video, 0));

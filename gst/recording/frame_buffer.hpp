@@ -3,7 +3,7 @@
 
 #include <gst/video/video.h>
 
-#include "gst/base/event_caps.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "src/formats/decoder.hpp"
 
 /// Caps of the video frames of recordings.

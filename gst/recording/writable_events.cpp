@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/writable_events.hpp"
 
-#include <algorithm>
-#include <new>
 #include <stdexcept>
-#include <utility>
 
 #include "src/formats/temporary_file.hpp"
 
@@ -78,12 +75,11 @@ std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> event
       picked_labels_.push_back(labels[static_cast<std::size_t>(&event - events.data())]);
   }
   if (picked_.size() < events.size())
-    GST_CAT_LOG_OBJECT(category_, element_,
-                       "dropped %" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT
-                       " events at %" GST_TIME_FORMAT
-                       ": outside the sensor, or earlier than those written",
-                       events.size() - picked_.size(), events.size(),
-                       GST_TIME_ARGS(static_cast<GstClockTime>(start) * GST_USECOND));
+    GST_CAT_LOG_OBJECT(
+        category_, element_,
+        "dropped %" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT
+        ": outside the sensor, or earlier than those written",
+        events.size() - picked_.size(), events.size(), GST_TIME_ARGS(nanoseconds(start)));
   if (picked_.size() > before_last_dropped) {
     if (earlier_.reported == 0) warn_of_earlier();
     if (outside_.reported == 0) warn_of_outside();
@@ -121,10 +117,11 @@ void WritableEvents::warn(Dropped& dropped, const std::string& what, const std::
 
 GstStructure* WritableEvents::stats() {
   const Written written = *written_.lock();
-  return gst_structure_new("application/x-event-writer-stats", "events", G_TYPE_UINT64,
-                           written.events, "labels", G_TYPE_UINT64, written.labels, "triggers",
-                           G_TYPE_UINT64, written.triggers, "frames", G_TYPE_UINT64, written.frames,
-                           "imu-samples", G_TYPE_UINT64, written.imu_samples, nullptr);
+  return new_counters("application/x-event-writer-stats", {{"events", written.events},
+                                                           {"labels", written.labels},
+                                                           {"triggers", written.triggers},
+                                                           {"frames", written.frames},
+                                                           {"imu-samples", written.imu_samples}});
 }
 
 Report WritableEvents::failure(const std::exception& error, const Report& otherwise) {

@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <algorithm>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "gst/base/errors.hpp"
+#include "gst/base/element.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
-#include "src/core/event.hpp"
-#include "src/core/sensor_size.hpp"
 
-/// Numbers of items in a file that is being written.
 struct Written {
   guint64 events = 0;
   guint64 labels = 0;
@@ -89,7 +82,6 @@ class WritableEvents {
   /// them.
   Guarded<Written>& written() { return written_; }
 
-  /// Property `stats` of the element.
   GstStructure* stats();
   static constexpr auto stats_blurb =
       "Counts of what was written to the file: events, their labels, triggers, frames and "
@@ -100,7 +92,6 @@ class WritableEvents {
   static Report failure(const std::exception& error, const Report& otherwise);
 
  private:
-  /// Counters of events dropped for one reason.
   struct Dropped {
     guint64 count = 0;
     guint64 reported = 0;

@@ -4,7 +4,6 @@
 #include <glib.h>
 
 #include <memory>
-#include <stdexcept>
 
 #include "gst/base/named_file.hpp"
 

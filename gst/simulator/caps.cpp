@@ -3,9 +3,8 @@
 
 #include <initializer_list>
 
-#include "gst/base/event_caps.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/eventcamera/eventcamera.h"
 
 namespace {
 
@@ -74,16 +73,6 @@ void SimulatorVideo::install_pads(GstElementClass* klass) const {
                                            ", " SIZE_CAPS ", framerate = (fraction) [ 0, max ]"));
   add_pad_template(klass, "sink", GST_PAD_SINK, OwnedCaps(input_caps(any.get())));
   add_pad_template(klass, "src", GST_PAD_SRC, OwnedCaps(output_caps(any.get())));
-}
-
-GstCaps* event_simulator_fixate_output(GstCaps* caps) {
-  guint chosen = 0;
-  for (guint i = gst_caps_get_size(caps); i-- > 0;)
-    if (gst_structure_has_name(gst_caps_get_structure(caps, i), GST_EVENT_CAMERA_MEDIA_TYPE))
-      chosen = i;
-  GstCaps* fixed = gst_caps_copy_nth(caps, chosen);
-  gst_caps_unref(caps);
-  return gst_caps_fixate(fixed);
 }
 
 bool event_simulator_draws(const GstCaps* output) {

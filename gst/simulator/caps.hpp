@@ -29,7 +29,6 @@ struct SimulatorVideo {
   /// Input caps for this output, events or accumulated-event video.
   GstCaps* input_caps(const GstCaps* output) const;
 
-  /// For class_init: adds the pad templates.
   void install_pads(GstElementClass* klass) const;
 
  private:
@@ -41,10 +40,6 @@ inline constexpr SimulatorVideo system_memory_video = {
     .formats = EVENT_SIMULATOR_INPUT_FORMATS,
     .drawn_formats = DRAWN_VIDEO_FORMATS,
 };
-
-/// Fixates the output to events if `caps` (not empty) include them, else to video. Takes ownership
-/// of `caps`.
-GstCaps* event_simulator_fixate_output(GstCaps* caps);
 
 /// True if output caps are accumulated-event video, false for events.
 bool event_simulator_draws(const GstCaps* output);

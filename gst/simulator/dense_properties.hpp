@@ -3,7 +3,6 @@
 
 #include <memory>
 
-#include "gst/base/types.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "src/simulate/warp.hpp"

@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/simulator/dvs_properties.hpp"
 
-#include <algorithm>
 #include <bitset>
 #include <cstdint>
 #include <iterator>
-#include <stdexcept>
-#include <type_traits>
 #include <variant>
 
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
 #include "gst/simulator/camera_profile.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 
@@ -209,7 +204,6 @@ struct Overrides {
   }
 };
 
-/// A setting in a camera profile that is not valid.
 std::runtime_error error_in(const std::string& profile, const std::string& setting,
                             const std::string& fault) {
   return std::runtime_error("The camera profile \"" + profile + "\" sets " + setting + fault);
@@ -242,7 +236,6 @@ Overrides read_profile(const std::string& path, GObjectClass* klass) {
   return overrides;
 }
 
-/// User-settable values.
 struct Settings {
   DvsPreset preset = DvsPreset::standard;
   std::string profile;

@@ -14,5 +14,4 @@ std::shared_ptr<void> make_dvs_settings();
 void install_dvs_properties(GObjectClass* klass);
 std::string fault_of_profile(GObject* object);
 
-/// Settings of such an element.
 eventcamera::DvsSettings dvs_settings_of(GObject* object);

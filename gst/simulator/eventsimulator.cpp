@@ -1,22 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "gst/simulator/eventsimulator.hpp"
 
-#include <algorithm>
-#include <atomic>
-#include <memory>
-#include <utility>
-
-#include "gst/base/element_type.hpp"
 #include "gst/base/event_pool.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
 #include "gst/base/seek_request.hpp"
-#include "gst/base/types.hpp"
-#include "gst/drawing/drawn_video.hpp"
-#include "gst/simulator/caps.hpp"
+#include "gst/eventcamera/eventcamera.h"
 #include "gst/simulator/simulation.hpp"
 
 GST_DEBUG_CATEGORY(event_simulator_debug);
@@ -50,8 +37,6 @@ void* event_simulator_settings(GObject* object) {
   return priv_of(object).method_settings.get();
 }
 
-/* negotiation */
-
 static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection direction,
                                GstCaps* caps, GstCaps* filter) {
   const SimulatorVideo& video = method_of(transform).video;
@@ -62,10 +47,17 @@ static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection dire
   return filtered;
 }
 
+/// Fixates the output to events if the caps include them, else to video.
 static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection direction, GstCaps*,
                             GstCaps* other) {
   if (direction == GST_PAD_SRC || gst_caps_is_empty(other)) return gst_caps_fixate(other);
-  return event_simulator_fixate_output(other);
+  guint chosen = 0;
+  for (guint i = gst_caps_get_size(other); i-- > 0;)
+    if (gst_structure_has_name(gst_caps_get_structure(other, i), GST_EVENT_CAMERA_MEDIA_TYPE))
+      chosen = i;
+  GstCaps* const fixed = gst_caps_copy_nth(other, chosen);
+  gst_caps_unref(other);
+  return gst_caps_fixate(fixed);
 }
 
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
@@ -75,8 +67,6 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
     gst_base_transform_set_qos_enabled(transform, event_simulator_draws(out));
   return TRUE;
 }
-
-/* buffers */
 
 static gboolean propose_allocation(GstBaseTransform* transform, GstQuery* decide, GstQuery* query) {
   gst_query_add_allocation_meta(query, GST_VIDEO_META_API_TYPE,
@@ -123,23 +113,10 @@ static gboolean transform_size(GstBaseTransform*, GstPadDirection direction, Gst
   return TRUE;
 }
 
-/// Copies nothing: intervals inherit no metadata from the frame that ends them.
-static gboolean copy_no_metadata(GstBaseTransform*, GstBuffer*, GstBuffer*) {
-  return TRUE;
-}
-
-/// Never called, because generate_output() is overridden. GstBaseTransform allocates output buffers
-/// only for classes that have a transform().
-static GstFlowReturn transform_not_in_place(GstBaseTransform*, GstBuffer*, GstBuffer*) {
-  return GST_FLOW_NOT_SUPPORTED;
-}
-
 GstFlowReturn event_simulator_prepare_buffer(GstBaseTransform* element, GstBuffer* in,
                                              GstBuffer** out) {
   return PARENT_TRANSFORM_CLASS->prepare_output_buffer(element, in, out);
 }
-
-/* data, events, queries */
 
 /// Takes a frame, unless GstBaseTransform skips it for QoS: then the next interval is longer.
 static GstFlowReturn submit_input_buffer(GstBaseTransform* transform, gboolean is_discont,
@@ -254,7 +231,7 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
       gst_structure_has_name(gst_query_get_structure(query), simulated_query))
     return TRUE;
   if (direction == GST_PAD_SRC && GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(GST_CAT_DEFAULT, GST_BASE_TRANSFORM_SINK_PAD(transform), query,
+    return answer_latency(GST_BASE_TRANSFORM_SINK_PAD(transform), query,
                           simulation_of(transform).latency());
   return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 }
@@ -274,8 +251,6 @@ static gboolean stop(GstBaseTransform* transform) {
   simulation_of(transform).reset();
   return TRUE;
 }
-
-/* properties */
 
 static Guarded<SimulatorSettings>& settings_of(GObject* object) {
   return simulation_of(object).settings;
@@ -302,7 +277,6 @@ const char* const denoise_blurb =
     "-1 = automatic: four standard deviations of the noise, found where successive frames differ "
     "least)";
 
-/// Installs the properties that not all methods have.
 static void install_method_properties(GObjectClass* klass, const EventSimulatorMethod& method) {
   Properties<settings_of> properties(klass, defaults_of(method));
   if (method.threshold) {
@@ -348,10 +322,11 @@ static void get_qos(GObject* object, GValue* value) {
 
 static GstStructure* stats_of(GObject* object) {
   const auto stats = simulation_of(object).stats.copy();
-  return gst_structure_new("application/x-event-simulator-stats", "frames", G_TYPE_UINT64,
-                           stats.frames, "skipped-frames", G_TYPE_UINT64, stats.skipped_frames,
-                           "repeated-frames", G_TYPE_UINT64, stats.repeated_frames,
-                           "processing-time", G_TYPE_UINT64, stats.processing_time, nullptr);
+  return new_counters("application/x-event-simulator-stats",
+                      {{"frames", stats.frames},
+                       {"skipped-frames", stats.skipped_frames},
+                       {"repeated-frames", stats.repeated_frames},
+                       {"processing-time", stats.processing_time}});
 }
 
 static void install_base_properties(GObjectClass* klass) {
@@ -386,8 +361,6 @@ static void install_base_properties(GObjectClass* klass) {
                 "repeated-frames (by upstream), processing-time (of all processed frames, ns)");
 }
 
-/* type */
-
 /// Makes the method's settings here, because the method is not yet known in init.
 static void constructed(GObject* object) {
   const auto& method = method_of(object);
@@ -421,8 +394,15 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   transform_class->propose_allocation = propose_allocation;
   transform_class->decide_allocation = decide_allocation;
   transform_class->transform_size = transform_size;
-  transform_class->copy_metadata = copy_no_metadata;
-  transform_class->transform = transform_not_in_place;
+  // Intervals inherit no metadata from the frame that ends them.
+  transform_class->copy_metadata = [](GstBaseTransform*, GstBuffer*, GstBuffer*) -> gboolean {
+    return TRUE;
+  };
+  // Never called, because generate_output() is overridden. GstBaseTransform allocates output
+  // buffers only for classes that have a transform().
+  transform_class->transform = [](GstBaseTransform*, GstBuffer*, GstBuffer*) {
+    return GST_FLOW_NOT_SUPPORTED;
+  };
   transform_class->submit_input_buffer = submit_input_buffer;
   transform_class->generate_output = generate_output;
   transform_class->sink_event = sink_event;

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "gst/base/properties.hpp"
+#include "gst/base/element.hpp"
 #include "gst/simulator/caps.hpp"
 #include "gst/simulator/video_simulator.hpp"
 #include "src/simulate/simulator.hpp"
@@ -38,7 +38,6 @@ struct EventSimulatorMethod {
   /// Creates the simulator of an element for frames of this format.
   std::unique_ptr<VideoSimulator> (*create)(GObject* element, const GstVideoInfo& video);
 
-  /// Input video and drawn video.
   const SimulatorVideo& video = system_memory_video;
 
   /// For methods with their own properties, else null: create a Guarded, install the
@@ -50,14 +49,12 @@ struct EventSimulatorMethod {
   std::string (*fault)(GObject* object) = nullptr;
 };
 
-/// Text of the property denoise.
 extern const char* const denoise_blurb;
 
 /// Name of the base class in the plugin that this library is linked to. Each plugin defines its
 /// own.
 extern const char* const event_simulator_type_name;
 
-/// Base class of all simulators.
 #define GST_TYPE_EVENT_SIMULATOR (gst_event_simulator_get_type())
 G_DECLARE_DERIVABLE_TYPE(GstEventSimulator, gst_event_simulator, GST, EVENT_SIMULATOR,
                          GstBaseTransform)

@@ -37,7 +37,7 @@ class LumaVideoSimulator final : public VideoSimulator {
             GstBuffer* picture) override {
     const auto* events = simulate(frame.get(), time, settings, flow);
     const VideoFrame mapped(drawing_->video, picture, GST_MAP_WRITE);
-    if (!mapped) throw cannot_draw(mapped.fault());
+    if (!mapped) throw VideoSimulatorError(cannot_draw(mapped.fault()), mapped.fault());
     if (events != nullptr) drawing_->accumulator.add(*events, simulator_->threads());
     drawing_->accumulator.draw(palette, pixel_layout_of(drawing_->video), mapped.data(),
                                mapped.stride(), simulator_->threads());
@@ -55,7 +55,7 @@ class LumaVideoSimulator final : public VideoSimulator {
                                             const eventcamera::Settings& settings,
                                             const KnownFlow& flow) {
     const VideoFrame mapped(video_, frame, GST_MAP_READ);
-    if (!mapped) throw cannot_read(mapped.fault());
+    if (!mapped) throw VideoSimulatorError(cannot_read(mapped.fault()), mapped.fault());
     return simulator_->push(luma_.of(mapped, simulator_->threads()), time, settings, flow);
   }
 

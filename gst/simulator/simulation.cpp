@@ -1,25 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/simulator/simulation.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <functional>
-#include <new>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_pool.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/video_frame.hpp"
-#include "gst/drawing/drawn_video.hpp"
-#include "gst/simulator/caps.hpp"
 #include "gst/simulator/frame_luma.hpp"
-#include "src/core/sensor_size.hpp"
 
 #define GST_CAT_DEFAULT event_simulator_debug
 
@@ -149,7 +137,7 @@ void Simulation::update_latency(GstClockTime before) {
   interval_ = static_cast<GstClockTime>(stream_.interval.value());
   if (latency() == before) return;
   GST_DEBUG_OBJECT(element_, "latency is now %" GST_TIME_FORMAT, GST_TIME_ARGS(latency()));
-  gst_element_post_message(GST_ELEMENT(element_), gst_message_new_latency(GST_OBJECT(element_)));
+  post_latency(element_);
 }
 
 bool Simulation::is_live() {
@@ -377,7 +365,6 @@ void Simulation::skip_frame(GstClockTime pts) {
 
 /* settings */
 
-/// Updates controlled properties to their values at `time`, a timestamp of the segment.
 void Simulation::sync_controlled_properties(GstClockTime time) {
   const GstSegment& segment = element_->segment;
   if (segment.format != GST_FORMAT_TIME) return;  // before the first segment
@@ -439,7 +426,6 @@ void Simulation::keep_flow(GstBuffer* frame) {
   stream_.motion.reset(g_bytes_ref(gst_event_camera_flow_meta_get_flow(meta)));
 }
 
-/// Adds the flow of an interval to the buffer of its events.
 static void add_flow(GstBuffer* buffer, const eventcamera::ImageView<Flow>& flow) {
   const auto width = static_cast<std::size_t>(flow.width);
   std::vector<Flow> rows(width * static_cast<std::size_t>(flow.height));
@@ -595,12 +581,8 @@ void Simulation::hold_until(Nanoseconds end, guint32 seqnum) {
     has_noise |= events != nullptr && events->size() > 0;
     if (events != nullptr && events->size() > 0) {
       if (sent < start) flow = push_gap(sent, start, seqnum);
-      const OwnedBuffer in(gst_buffer_new());
-      OwnedBuffer out;
-      if (flow == GST_FLOW_OK) flow = write_events(*events, in.get(), out);
       if (flow == GST_FLOW_OK)
-        flow = push_buffer(std::move(out), static_cast<GstClockTime>(start),
-                           static_cast<GstClockTime>(part_end - start));
+        push_interval(Interval{OwnedBuffer(gst_buffer_new()), start, part_end, events});
       sent = part_end;
     }
     start = part_end;
@@ -692,7 +674,6 @@ GstFlowReturn Simulation::write_events(const EventBuckets& events, GstBuffer* fr
   return GST_FLOW_OK;
 }
 
-/// Pushes a GAP for an interval without events.
 GstFlowReturn Simulation::push_gap(Nanoseconds start, Nanoseconds end, guint32 seqnum) {
   GstEvent* gap =
       gst_event_new_gap(static_cast<GstClockTime>(start), static_cast<GstClockTime>(end - start));
@@ -700,7 +681,6 @@ GstFlowReturn Simulation::push_gap(Nanoseconds start, Nanoseconds end, guint32 s
   return push_event(GST_BASE_TRANSFORM_SRC_PAD(element_), gap);
 }
 
-/// Sets the timestamps and flags of an output buffer, and pushes it.
 GstFlowReturn Simulation::push_buffer(OwnedBuffer out, GstClockTime pts, GstClockTime duration) {
   GST_BUFFER_PTS(out.get()) = pts;
   GST_BUFFER_DTS(out.get()) = GST_CLOCK_TIME_NONE;

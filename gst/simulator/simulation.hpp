@@ -9,12 +9,8 @@
 #include <memory>
 #include <optional>
 
-#include "gst/base/errors.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 #include "gst/simulator/repeated_frames.hpp"
-#include "gst/simulator/video_simulator.hpp"
 #include "src/core/image.hpp"
 
 GST_DEBUG_CATEGORY_EXTERN(event_simulator_debug);
@@ -27,7 +23,6 @@ struct SimulatorSettings {
   bool skip_repeated = false;  ///< compare pictures to find repeated frames
 };
 
-/// Counters of the property stats.
 struct SimulatorStats {
   guint64 frames = 0;
   guint64 skipped_frames = 0;
@@ -98,7 +93,6 @@ class Simulation {
 
   /// Events arrive this much after the start of their interval; pictures replace their frame.
   GstClockTime latency() const { return draws_ ? 0 : interval_.load(); }
-  /// Duration of the last intervals.
   GstClockTime interval() const { return interval_; }
 
   Guarded<SimulatorSettings> settings;

@@ -14,7 +14,6 @@
 #include "src/render/palette.hpp"
 #include "src/simulate/simulator.hpp"
 
-/// An interval between two frames.
 struct Interval {
   OwnedBuffer frame;  ///< frame that ends it
   eventcamera::Nanoseconds start;
@@ -35,7 +34,6 @@ class VideoSimulator {
   /// Sets the format of the next frames. Size and depth must stay the same.
   virtual void set_video(const GstVideoInfo& video) = 0;
 
-  /// Sets the format of the next pictures.
   virtual void set_drawn_video(const GstVideoInfo& drawn) = 0;
 
   /// Simulates an interval; for a first frame, it is empty. Returns the interval that is finished,
@@ -51,10 +49,8 @@ class VideoSimulator {
   /// Waits for the last interval, and returns it unless push() did.
   virtual std::optional<Interval> finish() { return std::nullopt; }
 
-  /// Forgets the last interval.
   virtual void drop() {}
 
-  /// Calls hold_until() of the simulator.
   virtual const eventcamera::EventBuckets* hold_until(eventcamera::Nanoseconds time,
                                                       const eventcamera::Settings& settings) {
     return simulator().hold_until(time, settings);
@@ -63,7 +59,6 @@ class VideoSimulator {
   virtual eventcamera::IntervalSimulator& simulator() = 0;
 };
 
-/// Failure with its own message.
 class VideoSimulatorError : public std::runtime_error {
  public:
   VideoSimulatorError(Report report, const std::string& cause)
@@ -74,17 +69,3 @@ class VideoSimulatorError : public std::runtime_error {
  private:
   Report report_;
 };
-
-/// Error for a frame that does not match its caps.
-inline VideoSimulatorError cannot_read(const std::string& fault) {
-  return {{GST_RESOURCE_ERROR_FAILED,
-           "Cannot read a video frame: " + fault + ". Check the element upstream."},
-          fault};
-}
-
-/// Error for an output buffer that does not match its caps.
-inline VideoSimulatorError cannot_draw(const std::string& fault) {
-  return {{GST_RESOURCE_ERROR_FAILED,
-           "Cannot draw into an output buffer: " + fault + ". Check the element downstream."},
-          fault};
-}

@@ -19,11 +19,7 @@
 /// A recording of five seconds, in files of every format.
 namespace recording_files {
 
-using eventcamera::AbsoluteEvent;
-using eventcamera::EvtFormat;
-using eventcamera::Microseconds;
-using eventcamera::Polarity;
-using eventcamera::SensorSize;
+using namespace eventcamera;
 using harness::Owned;
 using Bytes = std::vector<std::uint8_t>;
 
@@ -74,14 +70,9 @@ class Folder {
     return folder.path_ / name;
   }
 
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  ~Folder() { std::filesystem::remove_all(path_); }
-
  private:
   Folder() {
     gst_init(nullptr, nullptr);
-    std::filesystem::create_directories(path_);
     const auto events = some_events();
     for (const auto& [name, format] : {std::pair{"evt2.raw", EvtFormat::evt2},
                                        {"evt21.raw", EvtFormat::evt21},
@@ -125,8 +116,7 @@ class Folder {
                static_cast<std::streamsize>(bytes.size()));
   }
 
-  std::filesystem::path path_ = std::filesystem::temp_directory_path() /
-                                ("recording-files-" + std::to_string(std::random_device()()));
+  TemporaryFolder path_;
 };
 
 struct File {

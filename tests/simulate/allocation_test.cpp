@@ -11,10 +11,8 @@
 
 #include "src/dvs/dvs_simulator.hpp"
 #include "src/render/accumulator.hpp"
-#include "src/simulate/dense_simulator.hpp"
-#include "src/simulate/diff_simulator.hpp"
-#include "src/simulate/frame_simulator.hpp"
-#include "src/simulate/sparse_simulator.hpp"
+#include "src/simulate/interpolation.hpp"
+#include "src/simulate/simulators.hpp"
 #include "tests/simulate/scene.hpp"
 
 /// In place of src/core/thread_pool.cpp: deals the rounds of every loop out to the threads in turn,

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "src/simulate/denoiser.hpp"
-#include "src/simulate/frame_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/reference/dvs.hpp"
 #include "tests/simulate/scene.hpp"

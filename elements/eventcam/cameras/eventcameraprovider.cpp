@@ -2,7 +2,6 @@
 /// Device provider: event cameras that Linux knows as video devices.
 #include <fcntl.h>
 #include <glob.h>
-#include <gst/gst.h>
 #include <linux/media.h>
 #include <linux/videodev2.h>
 #include <sys/ioctl.h>
@@ -13,12 +12,10 @@
 #include <cctype>
 #include <cstdint>
 #include <cstring>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "elements/eventcam/cameras/event_camera.hpp"
-#include "gst/base/element_type.hpp"
+#include "gst/base/element.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/evt_caps.hpp"
@@ -185,8 +182,6 @@ static std::vector<FoundDevice> find_video_devices() {
 
 #define DEVICE_CLASS "EventCamera/Source"
 
-/* devices */
-
 G_DECLARE_FINAL_TYPE(GstEventCameraDevice, gst_event_camera_device, GST, EVENT_CAMERA_DEVICE,
                      GstDevice)
 
@@ -267,8 +262,6 @@ static GstDevice* device_of(const FoundDevice& found, const EventCamera& camera)
   if (camera.is_grey) device->elements = g_strdup(elements_of(found, camera).c_str());
   return GST_DEVICE(device);
 }
-
-/* provider */
 
 G_DECLARE_FINAL_TYPE(GstEventCameraProvider, gst_event_camera_provider, GST, EVENT_CAMERA_PROVIDER,
                      GstDeviceProvider)

@@ -41,29 +41,14 @@
  *
  * Since: 0.1
  */
-#include <gst/gst.h>
 #include <gst/video/video.h>
-
-#include <algorithm>
-#include <memory>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "elements/eventcam/cameras/event_camera.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
+#include "gst/base/element.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
-#include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/evt_caps.hpp"
 #include "src/formats/chunker.hpp"
 #include "src/formats/evt/word_scanner.hpp"
@@ -101,7 +86,7 @@ class CameraBuffers {
                       .lost = lost};
     if (GST_CLOCK_TIME_IS_VALID(arrival) && GST_CLOCK_TIME_IS_VALID(last) && arrival >= last &&
         arrival - last <= max_gap)
-      transfer.words.elapsed = static_cast<Microseconds>((arrival - last) / GST_USECOND);
+      transfer.words.elapsed = microseconds(arrival - last);
     return transfer;
   }
 
@@ -115,7 +100,7 @@ class CameraBuffers {
     const auto arrival = segment.format == GST_FORMAT_TIME
                              ? gst_segment_to_running_time(&segment, GST_FORMAT_TIME, pts)
                              : pts;
-    constexpr auto max = static_cast<GstClockTime>(Chunker::max_time) * GST_USECOND;
+    constexpr auto max = nanoseconds(Chunker::max_time);
     return arrival <= max ? arrival : GST_CLOCK_TIME_NONE;
   }
 
@@ -150,56 +135,10 @@ class CameraBuffers {
   guint64 last_offset_ = GST_BUFFER_OFFSET_NONE;
 };
 
-/// Segments of a camera's stream: they map the camera's clock to running time, as its transfers
-/// arrive.
-class CameraSegment {
- public:
-  /// Records the arrival of data up to the time `sent`. After a gap, the camera's clock may have
-  /// been reset.
-  void arrive(Microseconds sent, GstClockTime arrival, bool after_gap) {
-    is_due_ |= clock_.arrive(sent, static_cast<Nanoseconds>(arrival), after_gap);
-  }
-
-  /// Pushes a segment from `start` before data of these times, unless the last segment is still
-  /// valid. Returns the running time of `start` if it did. Data before running time 0, as in a
-  /// first transfer, is late: the next data corrects the mapping.
-  std::optional<GstClockTime> begin(GstPad* src, guint32 seqnum, GstClockTime start,
-                                    GstClockTime end) {
-    std::optional<GstClockTime> mapped;
-    if (is_due_ || !segment_.continues(start, GST_CLOCK_TIME_NONE)) {
-      const auto running = running_time_of(start);
-      is_due_ = running && *running < 0;
-      mapped = segment_.begin(src, seqnum, start,
-                              running ? static_cast<GstClockTime>(std::max(*running, Nanoseconds{}))
-                                      : GST_CLOCK_TIME_NONE,
-                              start);
-    }
-    segment_.extend_to(end);
-    return mapped;
-  }
-
-  bool has_begun() const { return segment_.has_begun(); }
-  /// Running time of a camera time; none before the first transfer.
-  std::optional<Nanoseconds> running_time_of(GstClockTime time) const {
-    const auto offset = clock_.offset();
-    return offset ? std::optional(static_cast<Nanoseconds>(time) + *offset) : std::nullopt;
-  }
-
-  /// Parts per million by which the camera's clock is slow.
-  double drift() const { return clock_.drift(); }
-
- private:
-  ArrivalClock clock_;
-  ArrivalSegment segment_{0};
-  bool is_due_ = false;  ///< a segment that corrects the mapping
-};
-
 constexpr int max_words_side = 2048;
 
-/// Value of `format`: as in the caps.
 constexpr int format_of_caps = -1;
 
-/// User-settable values.
 struct Settings {
   int format = format_of_caps;
   int width = 0;
@@ -207,7 +146,6 @@ struct Settings {
   GstClockTime latency = 10 * GST_MSECOND;
 };
 
-/// Fields of the input's caps.
 struct Input {
   std::optional<EvtFormat> format;
   SensorSize sensor;
@@ -238,7 +176,15 @@ struct State {
   CameraBuffers buffers;
   std::unique_ptr<WordScanner> scanner;
   std::vector<WordScanner::Piece> pieces{};
-  CameraSegment segment{};  ///< of the output
+  ArrivalClock clock{};         ///< maps the camera's clock to running time
+  ArrivalSegment segment{0};    ///< of the output
+  bool is_segment_due = false;  ///< to correct the mapping
+
+  /// Running time of a camera time; none before the first transfer.
+  std::optional<Nanoseconds> running_time_of(GstClockTime time) const {
+    const auto offset = clock.offset();
+    return offset ? std::optional(static_cast<Nanoseconds>(time) + *offset) : std::nullopt;
+  }
 };
 
 /// State from start to stop.
@@ -253,13 +199,11 @@ struct Stream {
   RepeatLevel loss_level;
 };
 
-struct Private {
-  explicit Private(const std::pair<GstPad*, GstPad*>& pads) : sink(pads.first), src(pads.second) {}
+struct Private : ElementPads {
+  using ElementPads::ElementPads;
 
   Guarded<Settings> settings;
   Guarded<Stats> stats;
-  GstPad* const sink;
-  GstPad* const src;
   StreamLocked<Stream> stream{sink};
 };
 
@@ -268,48 +212,38 @@ struct Private {
 DEFINE_EVENT_ELEMENT(GstEvtParse, gst_evt_parse, EVT_PARSE, GstElement, GST_TYPE_ELEMENT, evtparse,
                      GST_RANK_NONE, "words of live event cameras")
 
-static Guarded<Settings>& settings_of(GObject* object) {
-  return GST_EVT_PARSE(object)->priv->settings;
-}
-
-/* negotiation */
-
-static std::optional<EvtFormat> format_named(const char* name) {
-  const auto format = words_of_fourcc(name != nullptr ? name : "");
-  return format ? format : evt_format_named(name);
-}
-
 static Input input_of(const GstCaps* caps) {
   const GstStructure* const structure = gst_caps_get_structure(caps, 0);
   const char* const format = gst_structure_get_string(structure, "format");
-  Input input;
   if (gst_structure_has_name(structure, "video/x-raw") && g_strcmp0(format, "GRAY8") == 0)
     return {.format = {}, .sensor = {}, .framing = Framing::padded};
-  input.format = format_named(format);
-  if (input.format && evt_format_named(format) == std::nullopt) input.framing = Framing::padded;
+  const auto of_driver = words_of_fourcc(format != nullptr ? format : "");
+  Input input{.format = of_driver ? of_driver : evt_format_named(format),
+              .sensor = {},
+              .framing = of_driver ? Framing::padded : Framing::loose};
   gst_structure_get_int(structure, "width", &input.sensor.width);
   gst_structure_get_int(structure, "height", &input.sensor.height);
   return input;
 }
 
 template <class Work>
-static auto reported(GstEvtParse* self, const Work& work) {
+static auto reported(Private& self, const Work& work) {
   return catch_exceptions(
-      self, Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for the events."}, work);
+      self.element, Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for the events."},
+      work);
 }
 
 /// Begins a stream. False, after an error, if its words are unknown.
-static bool start_stream(GstEvtParse* self) {
-  auto& priv = *self->priv;
-  const auto settings = priv.settings.copy();
-  const auto input = priv.stream->input.value_or(Input{});
+static bool start_stream(Private& self) {
+  const auto settings = self.settings.copy();
+  const auto input = self.stream->input.value_or(Input{});
   auto format = input.format;
   if (settings.format != format_of_caps) format = static_cast<EvtFormat>(settings.format);
   auto sensor = input.sensor;
   if (settings.width > 0 && settings.height > 0) sensor = {settings.width, settings.height};
   if (!format || sensor.width < 1 || sensor.height < 1 || sensor.width > max_words_side ||
       sensor.height > max_words_side) {
-    post_message(self, GST_MESSAGE_ERROR,
+    post_message(self.element, GST_MESSAGE_ERROR,
                  {GST_RESOURCE_ERROR_SETTINGS,
                   "Cannot read this camera: its caps do not state the format of its words and the "
                   "size of its sensor. Set format, width and height."},
@@ -317,78 +251,70 @@ static bool start_stream(GstEvtParse* self) {
     return false;
   }
   return reported(self, [&] {
-    priv.stream->state.emplace(State{.buffers = CameraBuffers(input.framing),
+    self.stream->state.emplace(State{.buffers = CameraBuffers(input.framing),
                                      .scanner = make_word_scanner(*format, sensor, input.framing)});
     const OwnedCaps caps(gst_caps_new_simple(GST_EVENT_CAMERA_MEDIA_TYPE, "format", G_TYPE_STRING,
                                              evt_format_name(*format), "width", G_TYPE_INT,
                                              sensor.width, "height", G_TYPE_INT, sensor.height,
                                              "framerate", GST_TYPE_FRACTION, 0, 1, nullptr));
-    GST_DEBUG_OBJECT(self, "reading %s as %" GST_PTR_FORMAT,
+    GST_DEBUG_OBJECT(self.element, "reading %s as %" GST_PTR_FORMAT,
                      input.framing == Framing::padded ? "padded buffers" : "loose bytes",
                      caps.get());
-    gst_pad_push_event(priv.src, gst_event_new_caps(caps.get()));
+    gst_pad_push_event(self.src, gst_event_new_caps(caps.get()));
   });
 }
 
-/* output */
-
-static GstClockTime nanoseconds(Microseconds t) {
-  return static_cast<GstClockTime>(t) * GST_USECOND;
+/// Pushes a segment before data of an interval, unless the last segment is still valid. Data before
+/// running time 0, as in a first transfer, is late: the next data corrects the mapping.
+static void begin_segment(Private& self, const EventInterval& interval) {
+  auto& state = *self.stream->state;
+  if (state.is_segment_due || !state.segment.continues(interval.start, GST_CLOCK_TIME_NONE)) {
+    const bool is_correction = state.segment.has_begun();
+    const auto running = state.running_time_of(interval.start);
+    state.is_segment_due = running && *running < 0;
+    const auto mapped =
+        state.segment.begin(self.src, self.stream->segment_seqnum, interval.start,
+                            running ? static_cast<GstClockTime>(std::max(*running, Nanoseconds{}))
+                                    : GST_CLOCK_TIME_NONE,
+                            interval.start);
+    GST_DEBUG_OBJECT(self.element,
+                     "the camera's %" GST_TIME_FORMAT " is running time %" GST_TIME_FORMAT,
+                     GST_TIME_ARGS(interval.start), GST_TIME_ARGS(mapped));
+    const auto stats = self.stats.lock();
+    stats->clock_offset = GST_CLOCK_DIFF(interval.start, mapped);
+    stats->clock_corrections += is_correction ? 1 : 0;
+  }
+  state.segment.extend_to(interval.end);
 }
 
-/// Pushes a segment before data of these times, if they need one.
-static void begin_segment(GstEvtParse* self, GstClockTime start, GstClockTime end) {
-  auto& priv = *self->priv;
-  auto& segment = priv.stream->state->segment;
-  const bool is_correction = segment.has_begun();
-  const auto mapped = segment.begin(priv.src, priv.stream->segment_seqnum, start, end);
-  if (!mapped) return;
-  GST_DEBUG_OBJECT(self, "the camera's %" GST_TIME_FORMAT " is running time %" GST_TIME_FORMAT,
-                   GST_TIME_ARGS(start), GST_TIME_ARGS(*mapped));
-  const auto stats = priv.stats.lock();
-  stats->clock_offset = GST_CLOCK_DIFF(start, *mapped);
-  stats->clock_corrections += is_correction ? 1 : 0;
-}
-
-static GstBuffer* buffer_of(WordScanner::Piece&& piece) {
-  GstBuffer* const buffer = owning_buffer(std::move(piece.words));
-  GST_BUFFER_PTS(buffer) = nanoseconds(piece.start);
-  GST_BUFFER_DURATION(buffer) = nanoseconds(piece.end - piece.start);
-  if (piece.is_discontinuous) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
-  return buffer;
-}
-
-/// Pushes the pieces of a transfer.
-static GstFlowReturn push_pieces(GstEvtParse* self) {
-  auto& priv = *self->priv;
-  auto& state = *priv.stream->state;
+static GstFlowReturn push_pieces(Private& self) {
+  auto& state = *self.stream->state;
   GstFlowReturn result = GST_FLOW_OK;
   for (auto& piece : state.pieces) {
     if (result != GST_FLOW_OK) break;
-    const auto start = nanoseconds(piece.start);
-    begin_segment(self, start, nanoseconds(piece.end));
-    GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " bytes of events at %" GST_TIME_FORMAT,
-                   piece.words.size(), GST_TIME_ARGS(start));
-    result = gst_pad_push(priv.src, buffer_of(std::move(piece)));
+    const EventInterval interval{nanoseconds(piece.start), nanoseconds(piece.end)};
+    begin_segment(self, interval);
+    GST_LOG_OBJECT(self.element, "%" G_GSIZE_FORMAT " bytes of events at %" GST_TIME_FORMAT,
+                   piece.words.size(), GST_TIME_ARGS(interval.start));
+    GstBuffer* const buffer = owning_buffer(std::move(piece.words));
+    stamp(buffer, interval, piece.is_discontinuous);
+    result = gst_pad_push(self.src, buffer);
   }
   state.pieces.clear();
   return result;
 }
 
-/* data */
-
-static void note_losses(GstEvtParse* self, const WordScanner::Counts& before, guint64 buffers) {
+static void note_losses(Private& self, const WordScanner::Counts& before, guint64 buffers) {
   constexpr guint64 max_skipped = 1U << 16;
-  auto& priv = *self->priv;
-  const auto& counts = priv.stream->state->scanner->counts();
+  const auto& counts = self.stream->state->scanner->counts();
   if (buffers > 0 || counts.lost_bytes != before.lost_bytes)
-    GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, priv.stream->loss_level.next(), self,
+    GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, self.stream->loss_level.next(), self.element,
                       "lost %" G_GUINT64_FORMAT " buffers, and %" G_GUINT64_FORMAT
                       " bytes with %" G_GUINT64_FORMAT " events",
                       buffers, guint64{counts.lost_bytes - before.lost_bytes},
                       guint64{counts.lost_events - before.lost_events});
   if (counts.lost_bytes > std::max<guint64>(counts.bytes, max_skipped))
-    priv.stream->warn_of_no_words(self,
+    self.stream->warn_of_no_words(self.element,
                                   {GST_STREAM_ERROR_DECODE,
                                    "Most of the camera's data is not valid in this format. Set "
                                    "format, width and height to match the camera."},
@@ -396,49 +322,49 @@ static void note_losses(GstEvtParse* self, const WordScanner::Counts& before, gu
 }
 
 /// Raises the latency to the duration of the longest transfer.
-static void note_transfer(GstEvtParse* self, GstClockTime arrival) {
-  auto& priv = *self->priv;
-  const auto& state = *priv.stream->state;
+static void note_transfer(Private& self, GstClockTime arrival) {
+  const auto& state = *self.stream->state;
   // The first transfer may hold older data from the camera's buffer.
   if (!state.segment.has_begun() || state.pieces.empty() || !GST_CLOCK_TIME_IS_VALID(arrival))
     return;
-  const auto first = state.segment.running_time_of(nanoseconds(state.pieces.front().start));
+  const auto first = state.running_time_of(nanoseconds(state.pieces.front().start));
   if (!first) return;
   const auto length = std::clamp<gint64>(static_cast<gint64>(arrival) - *first, 0, GST_SECOND);
-  const auto min_latency = priv.settings.copy().latency;
+  const auto min_latency = self.settings.copy().latency;
   bool has_grown = false;
   {
-    const auto stats = priv.stats.lock();
+    const auto stats = self.stats.lock();
     const auto transfer = static_cast<GstClockTime>(length);
     has_grown = transfer > std::max(min_latency, stats->max_transfer);
     // With a margin, so that the latency rarely changes.
     if (has_grown) stats->max_transfer = transfer + transfer / 8;
   }
   if (!has_grown) return;
-  GST_DEBUG_OBJECT(self, "a transfer takes %" GST_TIME_FORMAT, GST_TIME_ARGS(length));
-  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
+  GST_DEBUG_OBJECT(self.element, "a transfer takes %" GST_TIME_FORMAT, GST_TIME_ARGS(length));
+  post_latency(self.element);
 }
 
-static GstFlowReturn handle_transfer(GstEvtParse* self, GstBuffer* buffer,
+static GstFlowReturn handle_transfer(Private& self, GstBuffer* buffer,
                                      std::span<const guint8> bytes) {
-  auto& priv = *self->priv;
-  auto& state = *priv.stream->state;
+  auto& state = *self.stream->state;
   const auto before = state.scanner->counts();
-  const auto transfer = state.buffers.transfer_of(buffer, bytes, priv.stream->upstream);
+  const auto transfer = state.buffers.transfer_of(buffer, bytes, self.stream->upstream);
   state.scanner->scan(transfer.words, state.pieces);
   if (!state.pieces.empty() && state.pieces.back().end > Chunker::max_time) {
-    GST_ELEMENT_ERROR(self, STREAM, DECODE, ("The clock of the camera has jumped too far."),
+    GST_ELEMENT_ERROR(self.element, STREAM, DECODE, ("The clock of the camera has jumped too far."),
                       ("it is at %" G_GINT64_FORMAT " us", state.pieces.back().end));
     return GST_FLOW_ERROR;
   }
   if (!state.pieces.empty() && GST_CLOCK_TIME_IS_VALID(transfer.arrival)) {
+    // After a gap, the camera's clock may have been reset.
     const bool after_gap = std::ranges::any_of(state.pieces, &WordScanner::Piece::is_discontinuous);
-    state.segment.arrive(state.pieces.back().end, transfer.arrival, after_gap);
+    state.is_segment_due |= state.clock.arrive(
+        state.pieces.back().end, static_cast<Nanoseconds>(transfer.arrival), after_gap);
   }
   {
-    const auto stats = priv.stats.lock();
+    const auto stats = self.stats.lock();
     add(stats->words, before, state.scanner->counts());
-    stats->clock_drift = state.segment.drift();
+    stats->clock_drift = state.clock.drift();
     ++stats->buffers;
     stats->lost_buffers += transfer.lost;
   }
@@ -448,27 +374,26 @@ static GstFlowReturn handle_transfer(GstEvtParse* self, GstBuffer* buffer,
 }
 
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
-  auto* self = GST_EVT_PARSE(parent);
+  auto& self = priv_of(parent);
   const OwnedBuffer buffer(received);
-  if (!self->priv->stream->state && !start_stream(self)) return GST_FLOW_ERROR;
-  const MappedBytes bytes(GST_ELEMENT(self), OwnedBuffer(gst_buffer_ref(received)));
+  if (!self.stream->state && !start_stream(self)) return GST_FLOW_ERROR;
+  const MappedBytes bytes(self.element, OwnedBuffer(gst_buffer_ref(received)));
   if (!bytes.is_mapped()) return GST_FLOW_ERROR;
   return reported(self, [&] { return handle_transfer(self, received, bytes.get()); });
 }
 
 /// Pushes the last words before the stream ends or changes.
-static void end_stream(GstEvtParse* self) {
-  auto& priv = *self->priv;
-  if (!priv.stream->state) return;
+static void end_stream(Private& self) {
+  if (!self.stream->state) return;
   reported(self, [&] {
-    auto& scanner = *priv.stream->state->scanner;
+    auto& scanner = *self.stream->state->scanner;
     const auto before = scanner.counts();
-    scanner.finish(priv.stream->state->pieces);
-    add(priv.stats.lock()->words, before, scanner.counts());
+    scanner.finish(self.stream->state->pieces);
+    add(self.stats.lock()->words, before, scanner.counts());
     note_losses(self, before, 0);
-    if (scanner.counts().events == 0 && priv.stats.copy().buffers > 0)
-      priv.stream->warn_of_no_words(
-          self,
+    if (scanner.counts().events == 0 && self.stats.copy().buffers > 0)
+      self.stream->warn_of_no_words(
+          self.element,
           {GST_STREAM_ERROR_DECODE,
            "No events were found. If the camera sent some, set format, width and height to match "
            "it."},
@@ -478,26 +403,22 @@ static void end_stream(GstEvtParse* self) {
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
-  auto* self = GST_EVT_PARSE(parent);
-  auto& priv = *self->priv;
+  auto& self = priv_of(parent);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_STREAM_START:
       end_stream(self);  // into the stream that ends here
-      priv.stream->state.reset();
+      self.stream->state.reset();
       break;
-    case GST_EVENT_CAPS: {
-      GstCaps* caps = nullptr;
-      gst_event_parse_caps(event, &caps);
+    case GST_EVENT_CAPS:
       end_stream(self);
-      priv.stream->state.reset();
-      priv.stream->input = input_of(caps);
+      self.stream->state.reset();
+      self.stream->input = input_of(caps_of(event));
       gst_event_unref(event);
       return start_stream(self);
-    }
     case GST_EVENT_SEGMENT:
-      if (!plays_forwards(self, event, "parse")) return FALSE;
-      gst_event_copy_segment(event, &priv.stream->upstream);
-      priv.stream->segment_seqnum = gst_event_get_seqnum(event);
+      if (!plays_forwards(self.element, event, "parse")) return FALSE;
+      gst_event_copy_segment(event, &self.stream->upstream);
+      self.stream->segment_seqnum = gst_event_get_seqnum(event);
       gst_event_unref(event);
       return TRUE;
     case GST_EVENT_GAP:
@@ -507,7 +428,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       end_stream(self);
       break;
     case GST_EVENT_FLUSH_STOP:
-      priv.stream->state.reset();
+      self.stream->state.reset();
       break;
     default:
       break;
@@ -515,31 +436,23 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   return gst_pad_event_default(pad, parent, event);
 }
 
-static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
-  auto& priv = *GST_EVT_PARSE(parent)->priv;
-  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(GST_CAT_DEFAULT, priv.sink, query,
-                          std::max(priv.settings.copy().latency, priv.stats.copy().max_transfer));
-  return gst_pad_query_default(pad, parent, query);
+static GstClockTime latency_of(gpointer element) {
+  return std::max(priv_of(element).settings.copy().latency,
+                  priv_of(element).stats.copy().max_transfer);
 }
 
-/* states */
-
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
-  auto& priv = *GST_EVT_PARSE(element)->priv;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *priv.stats.lock() = {};
+  auto& self = priv_of(element);
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *self.stats.lock() = {};
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_evt_parse_parent_class)->change_state(element, transition);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    priv.stream.reset();
-  }
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) self.stream.reset();
   return result;
 }
 
-/* type */
-
 static void gst_evt_parse_init(GstEvtParse* self) {
-  self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));
+  self->priv = new Private(GST_ELEMENT(self), chain, sink_event);
+  answer_latency_queries<latency_of>(self->priv->src);
 }
 
 static GstStructure* structure_of(const Stats& stats) {
@@ -557,7 +470,7 @@ static void gst_evt_parse_class_init(GstEvtParseClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
 
-  Properties<settings_of> properties(object_class);
+  Properties<field_of<&Private::settings>> properties(object_class);
   properties.add_fixed(
       &Settings::format, "format", "Format of the camera's words",
       enum_type<int>(
@@ -578,8 +491,7 @@ static void gst_evt_parse_class_init(GstEvtParseClass* klass) {
       "Minimum latency of live sinks, which rises to the duration of the longest transfer (ns)", 0,
       GST_SECOND);
   install_stats(
-      object_class,
-      [](GObject* object) { return structure_of(GST_EVT_PARSE(object)->priv->stats.copy()); },
+      object_class, [](GObject* object) { return structure_of(priv_of(object).stats.copy()); },
       "Counts since the start: buffers received; bytes and events passed on; lost-buffers, which "
       "the driver dropped; lost-bytes, which are not valid here, and lost-events in them; gaps in "
       "the output. The mapping of the camera's clock: clock-offset (int64, ns), running time minus "

@@ -1,15 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "elements/eventcam/drawing/event_pictures.hpp"
 
-#include <algorithm>
-#include <string>
-#include <utility>
-
-#include "gst/base/event_caps.hpp"
-#include "gst/base/played_segment.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/drawing/drawn_video.hpp"
-#include "gst/eventcamera/eventcamera.h"
 
 #define GST_CAT_DEFAULT category_
 
@@ -30,8 +23,6 @@ EventPictures::EventPictures(GstAggregator* element, GstDebugCategory* category)
       category_(category),
       warn_of_pause_(category) {}
 
-/* events */
-
 /// Adds the events of a buffer up to `end`, or all if there is none. Returns true if these were
 /// all.
 bool EventPictures::add_events(const MappedEvents& mapped, const EventInterval& interval,
@@ -40,9 +31,8 @@ bool EventPictures::add_events(const MappedEvents& mapped, const EventInterval& 
   if (*processed_ == 0)
     GST_LOG_OBJECT(main_pad(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, rest.size(),
                    GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
-  const auto due = end && *end < interval.end
-                       ? events_until(rest, mapped.start(), static_cast<Microseconds>(*end / 1000))
-                       : rest;
+  const auto due =
+      end && *end < interval.end ? events_until(rest, mapped.start(), microseconds(*end)) : rest;
   *processed_ += due.size();
   state_->renderer.configure(render_settings());
   warn(state_->renderer.add(due, mapped.start(), length_of(interval)), buffer);
@@ -152,9 +142,6 @@ GstClockTime EventPictures::next_time() {
   return waiting_since_ ? *waiting_since_ + max_wait : GST_CLOCK_TIME_NONE;
 }
 
-/* pictures */
-
-/// Skips a picture that sinks would drop anyway.
 void EventPictures::skip(const EventInterval& picture, GstClockTime running_time,
                          GstClockTimeDiff lateness) {
   discontinuous_ = true;
@@ -171,13 +158,10 @@ GstFlowReturn EventPictures::draw(const EventInterval& events, GstBuffer* buffer
   state_->renderer.configure(render_settings());
   const VideoFrame frame(*state_->video, buffer, GST_MAP_WRITE);
   if (!frame) {
-    GST_ELEMENT_ERROR(element(), RESOURCE, FAILED,
-                      ("Cannot draw into an output buffer: %s. Check the element downstream.",
-                       frame.fault().c_str()),
-                      ("%" GST_PTR_FORMAT, buffer));
+    post_message(element(), GST_MESSAGE_ERROR, cannot_draw(frame.fault()), frame.fault());
     return GST_FLOW_ERROR;
   }
-  state_->renderer.draw(window_start(events), static_cast<Microseconds>(events.end / 1000),
+  state_->renderer.draw(window_start(events), microseconds(events.end),
                         pixel_layout_of(*state_->video), frame.data(), frame.stride());
   return GST_FLOW_OK;
 }
@@ -211,10 +195,7 @@ GstFlowReturn EventPictures::push_picture(const EventInterval& events,
   OwnedBuffer buffer(acquired);
   result = draw(events, acquired);
   if (result != GST_FLOW_OK) return result;
-  GST_BUFFER_PTS(acquired) = picture.start;
-  GST_BUFFER_DTS(acquired) = GST_CLOCK_TIME_NONE;
-  GST_BUFFER_DURATION(acquired) = picture.end - picture.start;
-  if (std::exchange(discontinuous_, false)) GST_BUFFER_FLAG_SET(acquired, GST_BUFFER_FLAG_DISCONT);
+  stamp(acquired, picture, discontinuous_);
   GST_LOG_OBJECT(element(),
                  "picture at %" GST_TIME_FORMAT " of the events from %" GST_TIME_FORMAT
                  " to %" GST_TIME_FORMAT,
@@ -223,7 +204,6 @@ GstFlowReturn EventPictures::push_picture(const EventInterval& events,
   return push(std::move(buffer));
 }
 
-/// Draws the next picture and pushes it.
 GstFlowReturn EventPictures::push_next_picture() {
   const EventInterval events = times_->events();
   const EventInterval picture = times_->picture();
@@ -242,8 +222,6 @@ bool EventPictures::has_begun_picture() const {
 void EventPictures::drain() {
   if (has_begun_picture()) push_next_picture();
 }
-
-/* negotiation */
 
 GstFlowReturn EventPictures::choose_caps(GstCaps* downstream, GstCaps** result) const {
   if (!state_) return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -280,18 +258,15 @@ bool EventPictures::set_video(const GstCaps* caps) {
 }
 
 bool EventPictures::handle_caps(GstAggregatorPad*, GstCaps* caps) {
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-  if (state_ && state_->width == info.width && state_->height == info.height) return true;
+  const auto sensor = sensor_of(caps);
+  if (!sensor) return false;
+  if (state_ && state_->sensor == *sensor) return true;
   drain();
   state_.reset();  // before allocating the next: pictures can be large
-  state_.emplace(
-      State{info.width, info.height, Renderer(info.width, info.height, render_settings())});
+  state_.emplace(State{*sensor, Renderer(sensor->width, sensor->height, render_settings())});
   gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
   return true;
 }
-
-/* segments, states */
 
 void EventPictures::handle_segment(const GstSegment& segment) {
   if (continues(segment_of(main_pad()), segment)) return;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
 #include <gst/video/video.h>
 
 #include <mutex>
@@ -9,8 +8,6 @@
 
 #include "elements/eventcam/drawing/frame_times.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_faults.hpp"
 #include "src/render/renderer.hpp"
 
 /// Quality of service of drawn pictures: predicts which ones sinks would drop, and counts them.
@@ -85,18 +82,16 @@ class EventPictures : public EventAggregator {
   PictureQos qos;
 
  protected:
-  /// Settings of the next picture.
   virtual eventcamera::RenderSettings render_settings() const = 0;
   /// Start of the window for the picture of an interval.
   virtual eventcamera::Microseconds window_start(const EventInterval& interval) const {
-    return static_cast<eventcamera::Microseconds>(interval.start / 1000);
+    return microseconds(interval.start);
   }
 
  private:
   /// State from caps to stop.
   struct State {
-    int width;  ///< of the sensor
-    int height;
+    eventcamera::SensorSize sensor;
     eventcamera::Renderer renderer;
     std::optional<GstVideoInfo> video{};  ///< output format, once negotiated
 

@@ -26,20 +26,8 @@
  *
  * Since: 0.1
  */
-#include <algorithm>
-#include <cstdint>
-#include <new>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
-
 #include "elements/eventcam/drawing/frame_times.hpp"
 #include "elements/eventcam/drawing/frames_with_events.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
 #include "gst/base/video_frame.hpp"
 #include "src/reconstruct/complementary_filter.hpp"
 
@@ -101,7 +89,8 @@ class EventFuse final : public FramesWithEvents {
 
   /// Time at which the next picture of a live source is pushed without waiting for input.
   GstClockTime next_time() override {
-    return times_ && !has_ended(main_pad()) ? running(times_->picture().start) : next_main_time();
+    return times_ && !has_ended(main_pad()) ? running(times_->picture().start)
+                                            : FramesWithEvents::next_time();
   }
 
   Guarded<ComplementaryFilter::Settings> settings;
@@ -128,7 +117,6 @@ class EventFuse final : public FramesWithEvents {
       times_.emplace(start, output_, segment_of(main_pad()).rate);
   }
 
-  /// The settings in running time.
   ComplementaryFilter::Settings running_settings() const {
     auto current = settings.copy();
     current.cutoff *= segment_of(main_pad()).rate;
@@ -173,8 +161,7 @@ class EventFuse final : public FramesWithEvents {
       if (times_ && times_->picture().start < interval.start) return push_next_picture(timed_out);
       if (is_gap(frame) && !filter_) {
         drop_frame();
-        return is_segment_sent() ? push_gap(interval.start, interval.end - interval.start)
-                                 : GST_FLOW_OK;
+        return push_gap(interval.start, interval.end - interval.start);
       }
       if (!add_events_until(running(interval.start)) && !timed_out)
         return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -199,16 +186,13 @@ class EventFuse final : public FramesWithEvents {
   bool show(GstBuffer* buffer, GstClockTime start) {
     const VideoFrame frame(*video_, buffer, GST_MAP_READ);
     if (!frame) {
-      GST_ELEMENT_ERROR(
-          element(), RESOURCE, FAILED,
-          ("Cannot read a video frame: %s. Check the element upstream.", frame.fault().c_str()),
-          ("%" GST_PTR_FORMAT, buffer));
+      post_message(element(), GST_MESSAGE_ERROR, cannot_read(frame.fault()), frame.fault());
       return false;
     }
     const ImageView<std::uint8_t> view{reinterpret_cast<const std::uint8_t*>(frame.data()),
                                        frame.stride(), GST_VIDEO_INFO_WIDTH(&*video_),
                                        GST_VIDEO_INFO_HEIGHT(&*video_)};
-    const auto time = static_cast<Microseconds>(running(start) / 1000);
+    const auto time = microseconds(running(start));
     if (filter_)
       filter_->set_frame(view, time);
     else
@@ -237,13 +221,9 @@ class EventFuse final : public FramesWithEvents {
     if (!buffer) throw std::bad_alloc();
     {
       const VideoFrame picture(output_, buffer.get(), GST_MAP_WRITE);
-      filter_->draw(static_cast<Microseconds>(running(interval.start) / 1000), picture.data(),
-                    picture.stride());
+      filter_->draw(microseconds(running(interval.start)), picture.data(), picture.stride());
     }
-    GST_BUFFER_PTS(buffer.get()) = interval.start;
-    GST_BUFFER_DURATION(buffer.get()) = interval.end - interval.start;
-    if (std::exchange(discontinuous_, false))
-      GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
+    stamp(buffer.get(), interval, discontinuous_);
     GST_LOG_OBJECT(element(), "picture at %" GST_TIME_FORMAT, GST_TIME_ARGS(interval.start));
     return push(std::move(buffer));
   }

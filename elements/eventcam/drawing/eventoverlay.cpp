@@ -23,19 +23,9 @@
  */
 #include <gst/video/video.h>
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <new>
-#include <optional>
-#include <span>
 
 #include "elements/eventcam/drawing/frames_with_events.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/properties.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/drawing/drawn_video.hpp"
 #include "src/render/overlay.hpp"
@@ -111,10 +101,6 @@ class EventOverlay final : public FramesWithEvents {
     return video_ ? handle_frame(interval, timed_out) : GST_FLOW_NOT_NEGOTIATED;
   }
 
-  /// Time at which a live frame is pushed without waiting for events: at once if it has no time,
-  /// and at the end of the video.
-  GstClockTime next_time() override { return next_main_time(); }
-
   Guarded<Settings> settings;
 
  private:
@@ -172,16 +158,14 @@ class EventOverlay final : public FramesWithEvents {
           ("%" GST_PTR_FORMAT, buffer));
       return GST_FLOW_ERROR;
     }
-    const auto end = static_cast<Microseconds>(interval.end / 1000);
-    const auto start = current.accumulation_time > 0
-                           ? end - static_cast<Microseconds>(current.accumulation_time / 1000)
-                           : static_cast<Microseconds>(interval.start / 1000);
+    const auto end = microseconds(interval.end);
+    const auto start = current.accumulation_time > 0 ? end - microseconds(current.accumulation_time)
+                                                     : microseconds(interval.start);
     overlay_->draw(start, end, palette(current.palette), current.opacity, pixel_layout_of(*drawn_),
                    frame.data(), frame.stride());
     return GST_FLOW_OK;
   }
 
-  /// Draws on the first queued frame and pushes it.
   GstFlowReturn handle_frame(const std::optional<EventInterval>& interval, bool timed_out) {
     if (interval) {
       if (sensor_ && !overlay_) {
@@ -194,9 +178,7 @@ class EventOverlay final : public FramesWithEvents {
     }
     OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
     if (interval) shown_ = interval->end;
-    if (is_gap(out.get()))
-      return is_segment_sent() ? push_gap(GST_BUFFER_PTS(out.get()), GST_BUFFER_DURATION(out.get()))
-                               : GST_FLOW_OK;
+    if (is_gap(out.get())) return push(std::move(out));
     GST_LOG_OBJECT(main_pad(),
                    "frame at %" GST_TIME_FORMAT "; events are known until %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(GST_BUFFER_PTS(out.get())), GST_TIME_ARGS(known_));

@@ -34,13 +34,9 @@
  *
  * Since: 0.1
  */
-#include <algorithm>
 #include <limits>
 
 #include "elements/eventcam/drawing/event_pictures.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
 #include "gst/drawing/drawn_video.hpp"
 #include "src/render/renderer.hpp"
 
@@ -82,11 +78,9 @@ struct Settings {
   /// Start of the window for the picture of an interval.
   Microseconds window_start(const EventInterval& interval) const {
     if (accumulation_time > 0)
-      return interval.end > accumulation_time
-                 ? static_cast<Microseconds>((interval.end - accumulation_time) / 1000)
-                 : -1;
+      return interval.end > accumulation_time ? microseconds(interval.end - accumulation_time) : -1;
     if (event_count > 0 || area_event_count > 0) return -1;
-    return static_cast<Microseconds>(interval.start / 1000);
+    return microseconds(interval.start);
   }
 };
 

@@ -28,7 +28,6 @@ class FrameTimes {
     };
     return {at(index_), at(index_ + 1)};
   }
-  /// Timestamps of the picture's buffer.
   EventInterval picture() const {
     const auto at = [this](guint64 index) {
       const guint64 time = gst_util_uint64_scale(index, fps_d_ * GST_SECOND, fps_n_);

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "elements/eventcam/drawing/frames_with_events.hpp"
 
-#include <algorithm>
-#include <cstdint>
 #include <limits>
 
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/video_frame.hpp"
-#include "gst/eventcamera/eventcamera.h"
 
 #define GST_CAT_DEFAULT category_
 
@@ -42,10 +37,13 @@ void FramesWithEvents::flush() noexcept {
 }
 
 bool FramesWithEvents::handle_caps(GstAggregatorPad* pad, GstCaps* caps) {
-  return pad == main_pad() ? handle_video_caps(caps) : handle_event_caps(caps);
-}
-
-bool FramesWithEvents::handle_video_caps(const GstCaps* caps) {
+  if (pad != main_pad()) {
+    const auto sensor = sensor_of(caps);
+    if (!sensor) return false;
+    if (sensor_ && sensor_ != sensor) start_over();
+    sensor_ = sensor;
+    return true;
+  }
   GstVideoInfo video;
   if (!gst_video_info_from_caps(&video, caps)) return false;
   if (!video_ || GST_VIDEO_INFO_WIDTH(&*video_) != GST_VIDEO_INFO_WIDTH(&video) ||
@@ -61,15 +59,6 @@ bool FramesWithEvents::handle_video_caps(const GstCaps* caps) {
                       "No events to draw: link a source of events to the pad \"event_sink\". Until "
                       "then, video from a live source passes unchanged, and other video waits."},
                      "the pad \"event_sink\" is not linked");
-  return true;
-}
-
-bool FramesWithEvents::handle_event_caps(const GstCaps* caps) {
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-  const SensorSize sensor{info.width, info.height};
-  if (sensor_ && sensor_ != sensor) start_over();
-  sensor_ = sensor;
   return true;
 }
 
@@ -92,13 +81,13 @@ bool FramesWithEvents::add_events(GstBuffer* buffer, const EventInterval& interv
     warn(event_fault(buffer), buffer);
     return true;
   }
-  const auto origin = static_cast<Microseconds>(interval.start / 1000);
+  const auto origin = microseconds(interval.start);
   const double rate = segment_of(events_pad_).rate;
   const auto rest = mapped.events().subspan(std::min(processed_, mapped.events().size()));
   if (processed_ == 0)
     GST_LOG_OBJECT(events_pad_, "%" G_GSIZE_FORMAT " events at running time %" GST_TIME_FORMAT,
                    rest.size(), GST_TIME_ARGS(interval.start));
-  const auto length = static_cast<double>(static_cast<Microseconds>(end / 1000) - origin) * rate;
+  const auto length = static_cast<double>(microseconds(end) - origin) * rate;
   const auto due =
       end < interval.end ? events_until(rest, 0, static_cast<Microseconds>(length)) : rest;
   processed_ += due.size();

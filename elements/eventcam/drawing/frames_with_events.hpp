@@ -8,10 +8,6 @@
 #include <vector>
 
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "src/core/event_validator.hpp"
-#include "src/core/sensor_size.hpp"
 
 /// Video of the pad `video_sink`, and events of the pad `event_sink` up to a running time.
 class FramesWithEvents : public EventAggregator {
@@ -21,7 +17,6 @@ class FramesWithEvents : public EventAggregator {
 
   void stop() override;
   void flush() noexcept override;
-  void release_memory() noexcept override { flush(); }
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override;
 
  protected:
@@ -40,8 +35,6 @@ class FramesWithEvents : public EventAggregator {
   GstClockTime known_ = 0;  ///< running time up to which events are complete
 
  private:
-  bool handle_video_caps(const GstCaps* caps);
-  bool handle_event_caps(const GstCaps* caps);
   std::span<const eventcamera::Event> in_running_time(std::span<const eventcamera::Event> events,
                                                       double rate);
   bool add_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end);

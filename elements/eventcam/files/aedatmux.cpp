@@ -30,32 +30,22 @@
  * Since: 0.1
  */
 #include <gst/base/gstaggregator.h>
+#include <gst/video/video.h>
 
-#include <algorithm>
 #include <atomic>
-#include <optional>
-#include <span>
-#include <string>
+#include <stdexcept>
 #include <string_view>
-#include <utility>
 
-#include "elements/eventcam/files/aedat_file.hpp"
 #include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/owned.hpp"
-#include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
-#include "gst/eventcamera/eventcamera.h"
+#include "gst/base/element.hpp"
+#include "gst/base/video_frame.hpp"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/frame_buffer.hpp"
+#include "gst/recording/sensor_events.hpp"
 #include "gst/recording/writable_events.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
+#include "src/formats/waiting_items.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(aedat_mux_debug);
 #define GST_CAT_DEFAULT aedat_mux_debug
@@ -64,6 +54,191 @@ using namespace eventcamera;
 
 namespace {
 
+/// An AEDAT 4 file that is being written: knows its streams, and makes its bytes.
+class AedatFile {
+ public:
+  using Bytes = std::vector<guint8>;
+
+  explicit AedatFile(GstElement* element)
+      : writable(element, GST_CAT_DEFAULT, GST_STREAM_ERROR_MUX), element_(element) {}
+
+  /// Sets the sensor of the events. False, after an error message, if the file has another sensor.
+  bool handle_sensor(SensorSize size) {
+    if (encoder_ && !writable.accepts(size)) return false;
+    size_ = size;
+    return true;
+  }
+
+  void set_video(const GstVideoInfo& video) { video_ = video; }
+  void set_source(const gchar* name) { source_ = name; }
+  /// Queues the triggers or IMU samples of an event for the next buffer. False for other events.
+  bool handle_items(GstEvent* event) {
+    return queue(triggers_of(event), triggers_) || queue(imu_samples_of(event), imu_samples_);
+  }
+
+  /// True if too many items are queued to wait for a buffer.
+  bool is_full() const {
+    const auto is_full = [](const auto& waiting) { return waiting && waiting->is_full(); };
+    return is_full(triggers_) || is_full(imu_samples_);
+  }
+
+  bool has_sensor() const { return size_ != SensorSize{}; }
+  bool has_video() const { return video_.has_value(); }
+  bool has_begun() const { return encoder_ != nullptr; }
+
+  /// Returns the header. `settings` has the compression, and whether there are frames and a table.
+  Bytes begin(Aedat4Settings settings) {
+    settings.size = size_;
+    if (!has_sensor() && video_)
+      settings.size = {GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)};
+    settings.source = source_;
+    settings.triggers = triggers_.has_value();
+    settings.imu_samples = imu_samples_.has_value();
+    writable.begin_file(size_);
+    GST_DEBUG_OBJECT(element_, "beginning a file of %dx%d pixels%s%s%s, %s a table of packets",
+                     settings.size.width, settings.size.height, settings.frames ? ", frames" : "",
+                     settings.triggers ? ", triggers" : "",
+                     settings.imu_samples ? ", IMU samples" : "",
+                     settings.table ? "with" : "without");
+    encoder_ = std::make_unique<Aedat4Encoder>(settings);
+    Bytes header;
+    encoder_->flush(header);
+    return header;
+  }
+
+  Bytes write_items() {
+    Bytes out;
+    const auto triggers = encode(triggers_, "triggers", out);
+    const auto imu_samples = encode(imu_samples_, "IMU samples", out);
+    const auto written = writable.written().lock();
+    written->triggers += triggers;
+    written->imu_samples += imu_samples;
+    return out;
+  }
+
+  /// Encodes the items that wait and a buffer of time `t`: events, a frame, or neither if empty.
+  Bytes write(GstBuffer* buffer, Microseconds t, bool has_events) {
+    Bytes out = write_items();
+    if (gst_buffer_get_size(buffer) > 0)
+      has_events ? write_events(buffer, out) : write_frame(buffer, t, out);
+    if (t - flushed_ >= max_wait) {
+      flushed_ = t;
+      encoder_->flush(out);
+    }
+    return out;
+  }
+
+  /// Ends incomplete packets.
+  Bytes flush() {
+    Bytes out = write_items();
+    encoder_->flush(out);
+    return out;
+  }
+
+  Bytes finish() {
+    writable.end_file();
+    Bytes bytes = write_items();
+    encoder_->finish(bytes);
+    return bytes;
+  }
+
+  /// Bytes of the header to overwrite after finish().
+  std::optional<FilePatch> patch() { return encoder_->patch(); }
+
+  void warn_skipped(const char* what, const std::string& cause) {
+    warn_(element_, {GST_STREAM_ERROR_MUX, std::string("Dropped ") + what + "."}, cause);
+  }
+
+  /// Starts a new file of the same streams.
+  void start_over() {
+    encoder_.reset();
+    triggers_.reset();
+    imu_samples_.reset();
+    flushed_ = 0;
+    warn_.reset();
+  }
+
+  /// Forgets the streams, too.
+  void reset() {
+    if (encoder_) writable.end_file();
+    start_over();
+    size_ = {};
+    video_.reset();
+    source_.clear();
+  }
+
+  WritableEvents writable;
+
+ private:
+  /// Maximum time that events wait to be written as a packet.
+  static constexpr Microseconds max_wait = 100'000;
+
+  /// Items that wait for the next buffer. Set once they are announced, so that the header has a
+  /// stream for them.
+  template <class Item>
+  using Waiting = std::optional<WaitingItems<Item>>;
+
+  template <class Item>
+  bool queue(std::optional<std::vector<Item>>&& items, Waiting<Item>& waiting) {
+    if (!items) return false;
+    if (!waiting) waiting.emplace();
+    waiting->push(*items);
+    return true;
+  }
+
+  /// Encodes the waiting items of a stream, and returns how many were written.
+  template <class Item>
+  std::size_t encode(Waiting<Item>& waiting, const char* name, Bytes& out) {
+    const std::span<const Item> items =
+        waiting ? waiting->pop_before(after_all_items) : std::span<Item>();
+    const auto count = encoder_->encode(items, out);
+    if (!items.empty())
+      GST_LOG_OBJECT(element_, "wrote %" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT " %s", count,
+                     items.size(), name);
+    return count;
+  }
+
+  void write_events(GstBuffer* buffer, Bytes& out) {
+    const MappedEvents mapped(buffer);
+    if (!mapped)
+      return warn_skipped("a buffer with a partial event",
+                          std::to_string(gst_buffer_get_size(buffer)) + " bytes");
+    GST_LOG_OBJECT(element_, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+                   mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
+    encoder_->encode(writable.pick(mapped.events(), writable.time_of(GST_BUFFER_PTS(buffer))), out);
+  }
+
+  void write_frame(GstBuffer* buffer, Microseconds t, Bytes& out) {
+    GST_LOG_OBJECT(element_, "frame at %" G_GINT64_FORMAT " us", gint64{t});
+    const auto reject = [&](const char* cause) {
+      warn_skipped("a frame that does not fit into the file",
+                   std::string(cause) + ", at " + std::to_string(t) + " us");
+    };
+    if (!video_) return reject("no caps");
+    const VideoFrame video(*video_, buffer, GST_MAP_READ);
+    if (!video) return reject(video.fault().c_str());
+    const auto frame = recorded_frame(video.get(), t);
+    try {
+      encoder_->encode(frame, out);
+      ++writable.written().lock()->frames;
+    } catch (const std::invalid_argument& error) {
+      reject(error.what());
+    }
+  }
+
+  GstElement* element_;
+  WarnOnce warn_{GST_CAT_DEFAULT};
+
+  SensorSize size_;  ///< of the event stream
+  std::optional<GstVideoInfo> video_;
+  std::string source_;
+  Waiting<Trigger> triggers_;
+  Waiting<ImuSample> imu_samples_;
+
+  std::unique_ptr<Aedat4Encoder> encoder_;  ///< null until the header is written
+  Microseconds flushed_ = 0;                ///< time of the last flushed packet
+};
+
 struct Settings {
   Aedat4Compression compression = Aedat4Compression::lz4;
 };
@@ -71,8 +246,9 @@ struct Settings {
 using Pad = OwnedAggregatorPad;
 
 struct Private {
-  explicit Private(GstElement* self) : file(self, GST_CAT_DEFAULT) {}
+  explicit Private(GstElement* of) : element(of), file(of) {}
 
+  GstElement* const element;
   Guarded<Settings> settings;
   std::atomic<bool> has_header = false;  ///< no pads can be added
   AedatFile file;
@@ -92,8 +268,6 @@ DEFINE_EVENT_ELEMENT(GstAedatMux, gst_aedat_mux, AEDAT_MUX, GstAggregator, GST_T
 #define EVENTS_CAPS EVENT_CAPS ", framerate = (fraction) [ 0, max ]"
 
 constexpr const char* any_pad = "sink_%u";
-
-/* input */
 
 enum class Kind { events, video, unknown };
 
@@ -115,7 +289,7 @@ static Kind kind_of(GstAggregatorPad* pad) {
   return kind_of(caps.get());
 }
 
-/// Segment of a pad, if it is one of times.
+/// Segment of a pad, if it is in time format.
 static std::optional<GstSegment> segment_of(GstAggregatorPad* pad) {
   GST_OBJECT_LOCK(pad);
   const GstSegment segment = pad->segment;
@@ -124,25 +298,13 @@ static std::optional<GstSegment> segment_of(GstAggregatorPad* pad) {
   return segment;
 }
 
-/// Running time of a buffer; GST_CLOCK_TIME_NONE if it has none.
-static GstClockTime running_time(GstAggregatorPad* pad, GstBuffer* buffer) {
-  const auto segment = segment_of(pad);
-  if (!segment) return GST_CLOCK_TIME_NONE;
-  return gst_segment_to_running_time(&*segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
-}
-
-/// True if a buffer stands for a gap.
-static bool is_silent(GstBuffer* buffer) {
-  return gst_buffer_get_size(buffer) == 0;
-}
-
 /// Running time at which a buffer is written: its start, or the end of a gap, until
 /// which its pad has nothing to wait for.
 static GstClockTime due_time(GstAggregatorPad* pad, GstBuffer* buffer) {
   const auto segment = segment_of(pad);
   GstClockTime time = GST_BUFFER_PTS(buffer);
   if (!segment || time > segment->stop) return 0;
-  if (is_silent(buffer) && GST_BUFFER_DURATION_IS_VALID(buffer))
+  if (gst_buffer_get_size(buffer) == 0 && GST_BUFFER_DURATION_IS_VALID(buffer))
     time += std::min(GST_BUFFER_DURATION(buffer), segment->stop - time);
   const auto running = gst_segment_to_running_time(&*segment, GST_FORMAT_TIME, time);
   return GST_CLOCK_TIME_IS_VALID(running) ? running : 0;
@@ -150,9 +312,9 @@ static GstClockTime due_time(GstAggregatorPad* pad, GstBuffer* buffer) {
 
 /// Returns the pad with the earliest next buffer; a buffer without a time comes first, and events
 /// come before a frame of the same time. Null if no pad has a buffer.
-static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
+static Pad earliest_pad(Private& self, GstClockTime* time) {
   Pad earliest;
-  for (Pad& pad : sink_pads(self)) {
+  for (Pad& pad : sink_pads(self.element)) {
     const auto buffer = next_buffer(pad.get());
     if (!buffer) continue;
     const GstClockTime from = due_time(pad.get(), buffer.get());
@@ -164,95 +326,91 @@ static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
   return earliest;
 }
 
-/* output */
-
-/// Pushes `bytes` downstream.
-static GstFlowReturn push_bytes(GstAedatMux* self, AedatFile::Bytes bytes, bool header = false) {
+static GstFlowReturn push_bytes(Private& self, AedatFile::Bytes bytes, bool header = false) {
   if (bytes.empty()) return GST_FLOW_OK;
   GstBuffer* const buffer = owning_buffer(std::move(bytes));
   if (header) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_HEADER);
-  return gst_aggregator_finish_buffer(GST_AGGREGATOR(self), buffer);
+  return gst_aggregator_finish_buffer(GST_AGGREGATOR(self.element), buffer);
 }
 
-/// Sends the caps, with the header as streamheader for late joiners.
-static void send_caps(GstAedatMux* self, const AedatFile::Bytes& header) {
+static void send_caps(Private& self, const AedatFile::Bytes& header) {
   const OwnedBuffer buffer(copied_buffer(std::as_bytes(std::span(header))));
   const OwnedCaps caps = with_stream_header(
       OwnedCaps(gst_caps_new_simple("application/x-aedat", "version", G_TYPE_INT, 4, nullptr)),
       buffer.get());
-  gst_aggregator_set_src_caps(GST_AGGREGATOR(self), caps.get());
+  gst_aggregator_set_src_caps(GST_AGGREGATOR(self.element), caps.get());
 }
 
 /// Positions the next buffer at `position` in the file.
-static void send_segment(GstAedatMux* self, guint64 position) {
+static void send_segment(Private& self, guint64 position) {
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_BYTES);
   segment.start = segment.time = segment.position = position;
-  gst_aggregator_update_segment(GST_AGGREGATOR(self), &segment);
+  gst_aggregator_update_segment(GST_AGGREGATOR(self.element), &segment);
 }
 
-/// Writes the header.
-static GstFlowReturn begin_file(GstAedatMux* self) {
-  self->priv->has_header = true;
+static GstFlowReturn begin_file(Private& self) {
+  self.has_header = true;
   Aedat4Settings settings;
   settings.frames = std::ranges::any_of(
-      sink_pads(self), [](const Pad& pad) { return kind_of(pad.get()) != Kind::events; });
-  settings.table = peer_can_seek(GST_AGGREGATOR_SRC_PAD(self), GST_FORMAT_BYTES);
-  settings.compression = self->priv->settings.copy().compression;
-  auto header = self->priv->file.begin(std::move(settings));
+      sink_pads(self.element), [](const Pad& pad) { return kind_of(pad.get()) != Kind::events; });
+  settings.table = peer_can_seek(GST_AGGREGATOR_SRC_PAD(self.element), GST_FORMAT_BYTES);
+  settings.compression = self.settings.copy().compression;
+  auto header = self.file.begin(std::move(settings));
   send_caps(self, header);
   send_segment(self, 0);
   return push_bytes(self, std::move(header), true);
 }
 
-/// Writes the end of the file, and patches the header.
-static GstFlowReturn end_file(GstAedatMux* self) {
-  auto& file = self->priv->file;
+static GstFlowReturn end_file(Private& self) {
+  auto& file = self.file;
   const GstFlowReturn result = push_bytes(self, file.finish());
   auto patch = file.patch();
-  GST_DEBUG_OBJECT(self, "the file ends%s", patch ? "; completing its header" : "");
+  GST_DEBUG_OBJECT(self.element, "the file ends%s", patch ? "; completing its header" : "");
   if (result != GST_FLOW_OK || !patch) return result;
   send_segment(self, patch->position);
   return push_bytes(self, std::move(patch->bytes));
 }
 
-/// Segment of the events before the next frame, or of those that come first; none without events.
-static std::optional<GstSegment> segment_of_events(GstAedatMux* self) {
-  if (const auto& segment = self->priv->segment) return segment;
-  for (const Pad& pad : sink_pads(self))
+/// Segment of the events written last, else of the first ones; none without events.
+static std::optional<GstSegment> segment_of_events(Private& self) {
+  if (const auto& segment = self.segment) return segment;
+  for (const Pad& pad : sink_pads(self.element))
     if (kind_of(pad.get()) == Kind::events) return segment_of(pad.get());
   return std::nullopt;
 }
 
 /// Time of a frame in the file: the time of events at its running time, or its own PTS if there are
 /// none.
-static Microseconds frame_time(GstAedatMux* self, GstBuffer* frame, GstClockTime running) {
+static Microseconds frame_time(Private& self, GstBuffer* frame, GstClockTime running) {
   GstClockTime time = GST_BUFFER_PTS(frame);
   const auto segment = segment_of_events(self);
   if (segment &&
       gst_segment_position_from_running_time_full(&*segment, GST_FORMAT_TIME, running, &time) < 0)
     time = 0;  // timestamps are not negative
-  return self->priv->file.time_of(time);
+  return self.file.writable.time_of(time);
 }
 
-/// Writes the earliest buffer.
-static GstFlowReturn write_next(GstAedatMux* self) {
-  auto& file = self->priv->file;
+static GstFlowReturn write_next(Private& self) {
+  auto& file = self.file;
   GstClockTime time = 0;
   const Pad pad = earliest_pad(self, &time);
   if (!pad) return GST_AGGREGATOR_FLOW_NEED_DATA;
   const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pad.get()));
   if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
-  const GstClockTime running = running_time(pad.get(), buffer.get());
+  const auto segment = segment_of(pad.get());
+  const GstClockTime running = segment ? gst_segment_to_running_time(&*segment, GST_FORMAT_TIME,
+                                                                     GST_BUFFER_PTS(buffer.get()))
+                                       : GST_CLOCK_TIME_NONE;
   if (!GST_CLOCK_TIME_IS_VALID(running)) {
     file.warn_skipped("a buffer without a timestamp, or outside its segment",
                       "pad " + std::string(GST_PAD_NAME(pad.get())) + ", no running time");
     return GST_FLOW_OK;
   }
   const bool of_events = kind_of(pad.get()) == Kind::events;
-  const Microseconds t = of_events ? file.time_of(GST_BUFFER_PTS(buffer.get()))
+  const Microseconds t = of_events ? file.writable.time_of(GST_BUFFER_PTS(buffer.get()))
                                    : frame_time(self, buffer.get(), running);
-  if (of_events) self->priv->segment = segment_of(pad.get());
+  if (of_events) self.segment = segment;
   return push_bytes(self, file.write(buffer.get(), t, of_events));
 }
 
@@ -262,22 +420,22 @@ static bool is_at_end(const Pad& pad) {
 
 /// True if enough is known to write the header: the caps, and the announcements before the first
 /// buffer.
-static bool is_known(GstAedatMux* self) {
-  const auto& file = self->priv->file;
+static bool is_known(Private& self) {
+  const auto& file = self.file;
   if (file.has_sensor())
-    return std::ranges::all_of(sink_pads(self), [](const Pad& pad) {
+    return std::ranges::all_of(sink_pads(self.element), [](const Pad& pad) {
       return kind_of(pad.get()) != Kind::events || is_at_end(pad) || next_buffer(pad.get());
     });
-  return file.has_video() && std::ranges::all_of(sink_pads(self), [](const Pad& pad) {
+  return file.has_video() && std::ranges::all_of(sink_pads(self.element), [](const Pad& pad) {
            return kind_of(pad.get()) == Kind::video || is_at_end(pad);
          });
 }
 
 /// Forgets the ends of segments that all inputs have reached, and returns one of them. Null if all
 /// have reached EOS.
-static OwnedEvent pop_segment_ends(GstAedatMux* self) {
+static OwnedEvent pop_segment_ends(Private& self) {
   OwnedEvent done;
-  for (const Pad& pad : sink_pads(self)) {
+  for (const Pad& pad : sink_pads(self.element)) {
     auto end = segment_end_of(pad.get());
     if (!end) continue;
     done = std::move(end);
@@ -288,13 +446,13 @@ static OwnedEvent pop_segment_ends(GstAedatMux* self) {
 }
 
 /// Writes the header, the earliest buffer, or the end of a segment or file.
-static GstFlowReturn write_some(GstAedatMux* self) {
-  auto& file = self->priv->file;
-  const bool ended = std::ranges::all_of(sink_pads(self), is_at_end);
+static GstFlowReturn write_some(Private& self) {
+  auto& file = self.file;
+  const bool ended = std::ranges::all_of(sink_pads(self.element), is_at_end);
   if (!file.has_begun()) {
     if (!is_known(self)) {
       if (!ended) return GST_AGGREGATOR_FLOW_NEED_DATA;
-      GST_ELEMENT_ERROR(self, STREAM, MUX,
+      GST_ELEMENT_ERROR(self.element, STREAM, MUX,
                         ("No stream to write. Link events or video to the muxer."),
                         ("no pad had caps before the end of the stream"));
       return GST_FLOW_ERROR;
@@ -305,18 +463,17 @@ static GstFlowReturn write_some(GstAedatMux* self) {
   if (!ended) return write_next(self);
   if (OwnedEvent done = pop_segment_ends(self)) {
     const GstFlowReturn result = push_bytes(self, file.flush());
-    gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self), done.release());
+    gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self.element), done.release());
     return result;
   }
   const GstFlowReturn result = end_file(self);
   return result == GST_FLOW_OK ? GST_FLOW_EOS : result;
 }
 
-/// Runs `work`; reports any exception.
 template <class Work>
-static GstFlowReturn reported(GstAedatMux* self, const Work& work) {
+static GstFlowReturn reported(Private& self, const Work& work) {
   return catch_exceptions(
-      self,
+      self.element,
       [](const auto& error) {
         return WritableEvents::failure(error, {GST_STREAM_ERROR_MUX, "Cannot write the file."});
       },
@@ -324,38 +481,36 @@ static GstFlowReturn reported(GstAedatMux* self, const Work& work) {
 }
 
 static GstFlowReturn aggregate(GstAggregator* aggregator, gboolean /*timeout*/) {
-  auto* self = GST_AEDAT_MUX(aggregator);
+  auto& self = priv_of(aggregator);
   return reported(self, [&] { return write_some(self); });
 }
 
 /// Live pipelines wait for other pads until the running time of the earliest buffer, once the file
 /// has begun or can begin.
 static GstClockTime get_next_time(GstAggregator* aggregator) {
-  auto* self = GST_AEDAT_MUX(aggregator);
+  auto& self = priv_of(aggregator);
   GstClockTime time = GST_CLOCK_TIME_NONE;
   reported(self, [&] {
-    if (self->priv->file.has_begun() || is_known(self)) earliest_pad(self, &time);
+    if (self.file.has_begun() || is_known(self)) earliest_pad(self, &time);
     return GST_FLOW_OK;
   });
   return time;
 }
 
-/* events, queries, pads */
-
-static bool handle_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* caps) {
-  auto& file = self->priv->file;
+static bool handle_caps(Private& self, GstAggregatorPad* pad, const GstCaps* caps) {
+  auto& file = self.file;
   const Kind kind = kind_of(caps);
-  auto& latest = kind == Kind::events ? self->priv->events_pad : self->priv->video_pad;
-  for (const Pad& other : sink_pads(self)) {
+  auto& latest = kind == Kind::events ? self.events_pad : self.video_pad;
+  for (const Pad& other : sink_pads(self.element)) {
     if (other.get() == pad || (other.get() != latest && kind_of(other.get()) != kind)) continue;
-    GST_ELEMENT_ERROR(self, STREAM, MUX,
+    GST_ELEMENT_ERROR(self.element, STREAM, MUX,
                       ("Cannot write two streams of %s into one file; link one stream of events "
                        "and one of video.",
                        kind == Kind::events ? "events" : "video"),
                       ("pads %s and %s", GST_PAD_NAME(other.get()), GST_PAD_NAME(pad)));
     return false;
   }
-  for (auto* const of_kind : {&self->priv->events_pad, &self->priv->video_pad})
+  for (auto* const of_kind : {&self.events_pad, &self.video_pad})
     if (*of_kind == pad) *of_kind = nullptr;
   latest = pad;
   if (kind == Kind::video) {
@@ -364,9 +519,8 @@ static bool handle_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps*
     file.set_video(video);
     return true;
   }
-  GstEventCameraInfo info;
-  return gst_event_camera_info_from_caps(&info, caps) &&
-         file.handle_sensor({info.width, info.height});
+  const auto sensor = sensor_of(caps);
+  return sensor && file.handle_sensor(*sensor);
 }
 
 static GstFlowReturn sink_event_pre_queue(GstAggregator* aggregator, GstAggregatorPad* pad,
@@ -376,8 +530,8 @@ static GstFlowReturn sink_event_pre_queue(GstAggregator* aggregator, GstAggregat
 }
 
 /// Writes the triggers and IMU samples if too many wait for a buffer.
-static GstFlowReturn write_waiting(GstAedatMux* self) {
-  auto& file = self->priv->file;
+static GstFlowReturn write_waiting(Private& self) {
+  auto& file = self.file;
   if (!file.is_full()) return GST_FLOW_OK;
   if (!file.has_begun())
     if (const GstFlowReturn begun = begin_file(self); begun != GST_FLOW_OK) return begun;
@@ -385,16 +539,15 @@ static GstFlowReturn write_waiting(GstAedatMux* self) {
 }
 
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
-  auto* self = GST_AEDAT_MUX(aggregator);
-  auto& file = self->priv->file;
+  auto& self = priv_of(aggregator);
+  auto& file = self.file;
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT) {
-    if (!plays_forwards(self, event, "write")) return FALSE;
+    if (!plays_forwards(self.element, event, "write")) return FALSE;
     if (kind_of(pad) == Kind::events)
-      file.begin_segment(segment_of(event), is_simulated(GST_PAD(pad)));
+      file.writable.begin_segment(segment_of(event), is_simulated(GST_PAD(pad)));
   }
   if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
-    GstCaps* caps = nullptr;
-    gst_event_parse_caps(event, &caps);
+    GstCaps* const caps = caps_of(event);
     GST_DEBUG_OBJECT(pad, "%" GST_PTR_FORMAT, caps);
     if (!handle_caps(self, pad, caps)) {
       gst_event_unref(event);
@@ -437,18 +590,18 @@ static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
 
 static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplate* templ,
                                         const gchar* wanted, const GstCaps* caps) {
-  auto* self = GST_AEDAT_MUX(aggregator);
+  auto& self = priv_of(aggregator);
   const std::string_view kind = GST_PAD_TEMPLATE_NAME_TEMPLATE(templ);
-  if (self->priv->has_header) {
-    GST_WARNING_OBJECT(self, "the header is already written, without a stream for pad %s",
+  if (self.has_header) {
+    GST_WARNING_OBJECT(self.element, "the header is already written, without a stream for pad %s",
                        kind.data());
     return nullptr;
   }
   if (kind == any_pad)
     return PARENT_AGGREGATOR_CLASS->create_new_pad(aggregator, templ, wanted, caps);
   const auto is_of_kind = [&](const Pad& pad) { return GST_PAD_PAD_TEMPLATE(pad.get()) == templ; };
-  if (std::ranges::any_of(sink_pads(self), is_of_kind)) {
-    GST_WARNING_OBJECT(self, "pad %s already exists", kind.data());
+  if (std::ranges::any_of(sink_pads(self.element), is_of_kind)) {
+    GST_WARNING_OBJECT(self.element, "pad %s already exists", kind.data());
     return nullptr;
   }
   const auto first = std::string(kind.substr(0, kind.find('%'))) + '0';
@@ -458,35 +611,29 @@ static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplat
 }
 
 static gboolean start(GstAggregator* aggregator) {
-  send_segment(GST_AEDAT_MUX(aggregator), 0);
+  send_segment(priv_of(aggregator), 0);
   return TRUE;
 }
 
 static gboolean stop(GstAggregator* aggregator) {
-  auto* priv = GST_AEDAT_MUX(aggregator)->priv;
-  priv->file.reset();
-  priv->segment.reset();
-  priv->events_pad = nullptr;
-  priv->video_pad = nullptr;
-  priv->has_header = false;
-  pop_segment_ends(GST_AEDAT_MUX(aggregator));
+  auto& self = priv_of(aggregator);
+  self.file.reset();
+  self.segment.reset();
+  self.events_pad = nullptr;
+  self.video_pad = nullptr;
+  self.has_header = false;
+  pop_segment_ends(self);
   return TRUE;
 }
 
 /// After a flush, filesink has truncated the file, so start with a new header.
 static GstFlowReturn flush(GstAggregator* aggregator) {
-  auto* priv = GST_AEDAT_MUX(aggregator)->priv;
+  auto& self = priv_of(aggregator);
   GST_DEBUG_OBJECT(aggregator, "flushed: beginning a new file");
-  priv->has_header = false;
-  priv->file.start_over();
-  priv->segment.reset();
+  self.has_header = false;
+  self.file.start_over();
+  self.segment.reset();
   return GST_FLOW_OK;
-}
-
-/* type */
-
-static Guarded<Settings>& settings_of(GObject* object) {
-  return GST_AEDAT_MUX(object)->priv->settings;
 }
 
 static void gst_aedat_mux_init(GstAedatMux* self) {
@@ -496,7 +643,7 @@ static void gst_aedat_mux_init(GstAedatMux* self) {
 static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  Properties<settings_of> properties(object_class);
+  Properties<field_of<&Private::settings>> properties(object_class);
   properties.add_fixed(
       &Settings::compression, "compression", "Compression of the file",
       enum_type<Aedat4Compression>(
@@ -507,7 +654,7 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
            {Aedat4Compression::zstd, "Zstandard", "zstd"},
            {Aedat4Compression::zstd_high, "Zstandard, the smallest", "zstd-high"}}));
   install_stats(
-      object_class, [](GObject* object) { return GST_AEDAT_MUX(object)->priv->file.stats(); },
+      object_class, [](GObject* object) { return priv_of(object).file.writable.stats(); },
       WritableEvents::stats_blurb);
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);

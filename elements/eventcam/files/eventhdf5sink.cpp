@@ -25,20 +25,9 @@
 
 #include <cerrno>
 #include <chrono>
-#include <memory>
-#include <span>
-#include <string>
 #include <system_error>
-#include <utility>
 
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_caps.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
-#include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/sensor_events.hpp"
 #include "gst/recording/writable_events.hpp"
@@ -60,15 +49,17 @@ struct Settings {
 
 /// State of the file, from caps to READY.
 struct State {
-  GstEventCameraInfo info = {};
+  SensorSize sensor;
   std::unique_ptr<Hdf5Writer> writer;  ///< null before caps and after the end
   bool begun = false;                  ///< events were written
   bool ended = false;
 };
 
 struct Private {
-  explicit Private(GstElement* self) : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_ENCODE) {}
+  explicit Private(GstElement* of)
+      : element(of), writable(of, GST_CAT_DEFAULT, GST_STREAM_ERROR_ENCODE) {}
 
+  GstElement* const element;
   Guarded<Settings> settings;
   State state;
   WritableEvents writable;
@@ -80,8 +71,6 @@ DEFINE_EVENT_ELEMENT(GstEventHdf5Sink, gst_event_hdf5_sink, EVENT_HDF5_SINK, Gst
                      GST_TYPE_BASE_SINK, eventhdf5sink, GST_RANK_NONE,
                      "writer of HDF5 files of events")
 
-/* the file */
-
 static bool is_full(const std::exception& error) {
   const auto* const failed = dynamic_cast<const std::system_error*>(&error);
   const int code = failed != nullptr ? failed->code().value() : 0;
@@ -90,14 +79,13 @@ static bool is_full(const std::exception& error) {
 
 /// Runs `work`; reports any exception and ends the file, because it cannot be repaired.
 template <class Work>
-static bool reported(GstEventHdf5Sink* self, const Work& work) {
+static bool reported(Private& self, const Work& work) {
   return catch_exceptions(
-      self,
+      self.element,
       [&](const std::exception& error) {
-        auto* priv = self->priv;
-        priv->state.writer.reset();
-        priv->state.ended = true;
-        const std::string location = priv->settings.copy().location;
+        self.state.writer.reset();
+        self.state.ended = true;
+        const std::string location = self.settings.copy().location;
         if (is_full(error))
           return Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
                         "The disk is full, or limits the size of files. " + location +
@@ -110,98 +98,92 @@ static bool reported(GstEventHdf5Sink* self, const Work& work) {
       work);
 }
 
-/// Writes pending events and closes the file.
-static bool end_file(GstEventHdf5Sink* self) {
-  State& state = self->priv->state;
+static bool end_file(Private& self) {
+  State& state = self.state;
   state.ended = true;
   const auto writer = std::exchange(state.writer, nullptr);
   if (writer) {
-    GST_DEBUG_OBJECT(self, "closing the file");
-    self->priv->writable.end_file();
+    GST_DEBUG_OBJECT(self.element, "closing the file");
+    self.writable.end_file();
   }
   return !writer || reported(self, [&] { writer->close(); });
 }
 
 /// Starts a new file for events of this sensor, overwriting any existing file.
-static bool begin_file(GstEventHdf5Sink* self, const GstEventCameraInfo& info) {
-  auto* priv = self->priv;
-  priv->state = State();  // close first: HDF5 treats two open files of the same name as one
-  priv->state.info = info;
-  priv->writable.begin_file({info.width, info.height});
-  const auto [location, format, compression, commit_interval] = priv->settings.copy();
-  GST_DEBUG_OBJECT(self, "writing the events of %dx%d pixels to %s", info.width, info.height,
-                   location.c_str());
-  const Hdf5Writer::Settings settings{
-      format, compression, {info.width, info.height}, std::chrono::nanoseconds(commit_interval)};
+static bool begin_file(Private& self, SensorSize sensor) {
+  self.state = State();  // close first: HDF5 treats two open files of the same name as one
+  self.state.sensor = sensor;
+  self.writable.begin_file(sensor);
+  const auto [location, format, compression, commit_interval] = self.settings.copy();
+  GST_DEBUG_OBJECT(self.element, "writing the events of %dx%d pixels to %s", sensor.width,
+                   sensor.height, location.c_str());
+  const Hdf5Writer::Settings settings{format, compression, sensor,
+                                      std::chrono::nanoseconds(commit_interval)};
   return reported(self, [&, &path = location] {
-    priv->state.writer = std::make_unique<Hdf5Writer>(path, settings);
+    self.state.writer = std::make_unique<Hdf5Writer>(path, settings);
   });
 }
 
 static gboolean set_caps(GstBaseSink* sink, GstCaps* caps) {
-  auto* self = GST_EVENT_HDF5_SINK(sink);
-  const State& state = self->priv->state;
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) {
-    GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are not event caps", caps);
+  auto& self = priv_of(sink);
+  const State& state = self.state;
+  const auto sensor = sensor_of(caps);
+  if (!sensor) {
+    GST_ERROR_OBJECT(self.element, "%" GST_PTR_FORMAT " are not event caps", caps);
     return FALSE;
   }
   if (state.ended) return TRUE;
-  if (state.writer && info.width == state.info.width && info.height == state.info.height)
-    return TRUE;
-  if (state.begun && !self->priv->writable.accepts({info.width, info.height})) return FALSE;
-  return begin_file(self, info);
+  if (state.writer && state.sensor == *sensor) return TRUE;
+  if (state.begun && !self.writable.accepts(*sensor)) return FALSE;
+  return begin_file(self, *sensor);
 }
 
-/* data */
-
 static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
-  auto* self = GST_EVENT_HDF5_SINK(sink);
-  State& state = self->priv->state;
+  auto& self = priv_of(sink);
+  State& state = self.state;
   if (state.ended) return GST_FLOW_EOS;
   if (!state.writer) return GST_FLOW_NOT_NEGOTIATED;
   const bool written = reported(self, [&] {
-    return self->priv->writable.write(buffer, [&](const auto& events) {
+    return self.writable.write(buffer, [&](const auto& events) {
       state.begun |= !events.empty();
-      const auto labels = state.writer->label(self->priv->writable.labels());
-      self->priv->writable.written().lock()->labels += labels;
+      const auto labels = state.writer->label(self.writable.labels());
+      self.writable.written().lock()->labels += labels;
       state.writer->append(events);
     });
   });
   return written ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
-/// Writes triggers, if the format supports them.
-static bool write_triggers(GstEventHdf5Sink* self, std::span<const Trigger> triggers) {
-  const State& state = self->priv->state;
+static bool write_triggers(Private& self, std::span<const Trigger> triggers) {
+  const State& state = self.state;
   if (!state.writer) return true;
   return reported(self, [&] {
     const bool written = state.writer->append(triggers);
-    GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " triggers, %s", triggers.size(),
+    GST_LOG_OBJECT(self.element, "%" G_GSIZE_FORMAT " triggers, %s", triggers.size(),
                    written ? "written" : "dropped: the format has none");
-    if (written) self->priv->writable.written().lock()->triggers += triggers.size();
+    if (written) self.writable.written().lock()->triggers += triggers.size();
   });
 }
 
 /// Commits waiting events although no others arrive.
-static bool keep_up(GstEventHdf5Sink* self) {
-  const State& state = self->priv->state;
+static bool keep_up(Private& self) {
+  const State& state = self.state;
   return !state.writer ||
          reported(self, [&] { state.writer->append(std::span<const AbsoluteEvent>()); });
 }
 
 /// Completes the file before EOS is posted to the application, and starts over after a flush.
 static gboolean event(GstBaseSink* sink, GstEvent* event) {
-  auto* self = GST_EVENT_HDF5_SINK(sink);
-  const State& state = self->priv->state;
-  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_forwards(self, event, "write"))
+  auto& self = priv_of(sink);
+  const State& state = self.state;
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_forwards(self.element, event, "write"))
     return FALSE;
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT)
-    self->priv->writable.begin_segment(segment_of(event), is_simulated(GST_BASE_SINK_PAD(sink)));
+    self.writable.begin_segment(segment_of(event), is_simulated(GST_BASE_SINK_PAD(sink)));
   bool done = true;
   if (GST_EVENT_TYPE(event) == GST_EVENT_EOS) done = end_file(self);
-  if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && state.info.width > 0)
-    done = begin_file(self, GstEventCameraInfo(state.info));
+  if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && state.sensor != SensorSize{})
+    done = begin_file(self, state.sensor);
   if (GST_EVENT_TYPE(event) == GST_EVENT_GAP) done = keep_up(self);
   if (const auto triggers = triggers_of(event)) done = write_triggers(self, *triggers);
   if (!done) {
@@ -211,14 +193,11 @@ static gboolean event(GstBaseSink* sink, GstEvent* event) {
   return GST_BASE_SINK_CLASS(gst_event_hdf5_sink_parent_class)->event(sink, event);
 }
 
-/* states */
-
-/// GstBaseSink's start and stop are of READY, in which the properties may still be set.
+/// GstBaseSink calls start() and stop() in READY, where properties may still change.
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
-  auto* self = GST_EVENT_HDF5_SINK(element);
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED &&
-      self->priv->settings.copy().location.empty()) {
-    GST_ELEMENT_ERROR(self, RESOURCE, NOT_FOUND,
+  auto& self = priv_of(element);
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && self.settings.copy().location.empty()) {
+    GST_ELEMENT_ERROR(self.element, RESOURCE, NOT_FOUND,
                       ("No file to write to. Set the property location."), ("location is empty"));
     return GST_STATE_CHANGE_FAILURE;
   }
@@ -226,15 +205,9 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
       GST_ELEMENT_CLASS(gst_event_hdf5_sink_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     end_file(self);
-    self->priv->state = State();
+    self.state = State();
   }
   return result;
-}
-
-/* type */
-
-static Guarded<Settings>& settings_of(GObject* object) {
-  return GST_EVENT_HDF5_SINK(object)->priv->settings;
 }
 
 static void gst_event_hdf5_sink_init(GstEventHdf5Sink* self) {
@@ -245,7 +218,7 @@ static void gst_event_hdf5_sink_init(GstEventHdf5Sink* self) {
 static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  Properties<settings_of> properties(object_class);
+  Properties<field_of<&Private::settings>> properties(object_class);
   properties.add_fixed(&Settings::location, "location",
                        "File to write; an existing file is overwritten");
   properties.add_fixed(
@@ -270,8 +243,7 @@ static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
       "flush only at the end, and the same events in the same buffers make the same bytes)",
       0, G_MAXINT64);
   install_stats(
-      object_class,
-      [](GObject* object) { return GST_EVENT_HDF5_SINK(object)->priv->writable.stats(); },
+      object_class, [](GObject* object) { return priv_of(object).writable.stats(); },
       WritableEvents::stats_blurb);
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);

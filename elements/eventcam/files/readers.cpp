@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// The elements that read event files: a table of formats for GstEventReader.
-#include <memory>
-#include <utility>
 
 #include "elements/eventcam/files/es_origin.hpp"
 #include "features.hpp"
-#include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/eventreader.hpp"
 #include "gst/recording/evt_caps.hpp"
@@ -62,7 +59,6 @@ void add_sensor_size(FormatProperties& properties) {
                        0, GST_EVENT_CAMERA_MAX_SIDE);
 }
 
-/// For tables.
 void add_table_properties(FormatProperties& properties) {
   add_sensor_size(properties);
   properties.add_fixed(
@@ -80,7 +76,6 @@ void add_table_properties(FormatProperties& properties) {
                        "xytp; empty = as stated in the file, or detected from its first rows");
 }
 
-/// Creates a decoder of a table.
 template <class TableDecoder>
 std::unique_ptr<Decoder> make_table_decoder(const GstCaps* /*caps*/,
                                             const FormatSettings& settings) {

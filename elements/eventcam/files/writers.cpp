@@ -4,7 +4,6 @@
 
 #include "elements/eventcam/files/es_origin.hpp"
 #include "features.hpp"
-#include "gst/base/types.hpp"
 #include "gst/recording/eventwriter.hpp"
 #include "gst/recording/evt_caps.hpp"
 #include "src/formats/dat/dat.hpp"

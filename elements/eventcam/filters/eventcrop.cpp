@@ -16,7 +16,6 @@
  * Since: 0.1
  */
 #include <stdexcept>
-#include <string>
 
 #include "gst/filter/changed_caps.hpp"
 #include "gst/filter/eventfilter.hpp"

@@ -30,28 +30,15 @@
  */
 #include <gst/base/gstbasetransform.h>
 
-#include <algorithm>
 #include <limits>
-#include <optional>
-#include <utility>
-#include <vector>
 
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
+#include "gst/base/element.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/event_pool.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
 #include "gst/filter/changed_caps.hpp"
 #include "gst/recording/sensor_events.hpp"
-#include "src/core/event_validator.hpp"
-#include "src/core/sensor_size.hpp"
 #include "src/formats/waiting_items.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_cut_debug);
@@ -71,7 +58,6 @@ constexpr GstClockTime max_latency = GST_SECOND;
 
 enum class Edge { rising, falling, both };
 
-/// User-settable values.
 struct Settings {
   Edge edge = Edge::rising;
   gint64 input = -1;
@@ -82,7 +68,6 @@ struct Settings {
   }
 };
 
-/// Counters since the start.
 struct Counters {
   guint64 events = 0;
   guint64 dropped = 0;
@@ -106,8 +91,9 @@ struct Stream {
 };
 
 struct Private {
-  explicit Private(GstBaseTransform* element) : stream(GST_BASE_TRANSFORM_SINK_PAD(element)) {}
+  explicit Private(GstBaseTransform* of) : element(of), stream(GST_BASE_TRANSFORM_SINK_PAD(of)) {}
 
+  GstBaseTransform* const element;
   Guarded<Settings> settings;
   Guarded<Counters> counters;
   Guarded<GstClockTime> latency;
@@ -120,22 +106,15 @@ DEFINE_EVENT_ELEMENT(GstEventCut, gst_event_cut, EVENT_CUT, GstBaseTransform,
                      GST_TYPE_BASE_TRANSFORM, eventcut, GST_RANK_NONE, "windows between triggers")
 #define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_cut_parent_class)
 
-static Guarded<Settings>& settings_of(GObject* object) {
-  return GST_EVENT_CUT(object)->priv->settings;
-}
-
-/// Runs `work`; reports any exception.
 template <class Work>
-static auto reported(gpointer self, const Work& work) {
-  return catch_exceptions(self, events_report("cut"), work);
+static auto reported(Private& self, const Work& work) {
+  return catch_exceptions(self.element, events_report("cut"), work);
 }
-
-/* windows */
 
 /// Drops the window, and waits for the trigger that starts the next one.
-static void start_over(GstEventCut* self) {
-  const auto stream = self->priv->stream.lock();
-  self->priv->counters.lock()->dropped += stream->events.size();
+static void start_over(Private& self) {
+  const auto stream = self.stream.lock();
+  self.counters.lock()->dropped += stream->events.size();
   stream->events.clear();
   stream->start.reset();
   stream->is_labelled = false;
@@ -144,52 +123,47 @@ static void start_over(GstEventCut* self) {
   if (stream->validator) stream->validator->restart();
 }
 
-static void lengthen_latency(GstEventCut* self, GstClockTime duration) {
+static void lengthen_latency(Private& self, GstClockTime duration) {
   {
-    const auto latency = self->priv->latency.lock();
+    const auto latency = self.latency.lock();
     if (std::min(duration, max_latency) <= *latency) return;
     *latency = std::min(duration, max_latency);
   }
-  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
+  post_latency(self.element);
 }
 
-/// Pushes the window, which holds these events and ends at `end`.
-static GstFlowReturn push_window(GstEventCut* self, std::span<const AbsoluteEvent> events,
+static GstFlowReturn push_window(Private& self, std::span<const AbsoluteEvent> events,
                                  Microseconds end) {
-  const auto stream = self->priv->stream.lock();
-  GstPad* const src = GST_BASE_TRANSFORM_SRC_PAD(self);
+  const auto stream = self.stream.lock();
+  GstPad* const src = GST_BASE_TRANSFORM_SRC_PAD(self.element);
   const Microseconds start = *stream->start;
-  const GstClockTime pts = static_cast<GstClockTime>(start) * GST_USECOND;
-  const GstClockTime duration = static_cast<GstClockTime>(end - start) * GST_USECOND;
-  GST_LOG_OBJECT(
-      self, "window of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
-      events.size(), GST_TIME_ARGS(pts), GST_TIME_ARGS(pts + duration));
-  ++self->priv->counters.lock()->windows;
+  const GstClockTime pts = nanoseconds(start);
+  const GstClockTime duration = nanoseconds(end - start);
+  GST_LOG_OBJECT(self.element,
+                 "window of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT
+                 " to %" GST_TIME_FORMAT,
+                 events.size(), GST_TIME_ARGS(pts), GST_TIME_ARGS(pts + duration));
+  ++self.counters.lock()->windows;
   lengthen_latency(self, duration);
   if (events.empty()) return push_event(src, gst_event_new_gap(pts, duration));
 
-  OwnedBuffer buffer;
-  const GstFlowReturn result = stream->buffers.acquire(events.size() * sizeof(Event), buffer);
-  if (result != GST_FLOW_OK) return result;
+  OwnedBuffer buffer = stream->buffers.acquire(events.size() * sizeof(Event));
   std::ranges::transform(events, WritableBytes(buffer.get()).events().begin(),
                          [start](const AbsoluteEvent& event) {
                            return Event{static_cast<guint32>(event.t - start), event.x, event.y_p};
                          });
   if (stream->is_labelled)
     std::ranges::transform(events, add_labels(buffer.get(), events.size()).begin(), label_of);
-  GST_BUFFER_PTS(buffer.get()) = pts;
-  GST_BUFFER_DURATION(buffer.get()) = duration;
-  if (std::exchange(stream->is_discontinuous, false))
-    GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
+  stamp(buffer.get(), {pts, pts + duration}, stream->is_discontinuous);
   return gst_pad_push(src, buffer.release());
 }
 
 /// Pushes the windows that end in the interval, whose events have been added. Before the first
 /// window, a GAP without duration, of which no tensor or picture is made, says that time passes.
-static GstFlowReturn advance(GstEventCut* self, const EventInterval& interval) {
-  const auto stream = self->priv->stream.lock();
+static GstFlowReturn advance(Private& self, const EventInterval& interval) {
+  const auto stream = self.stream.lock();
   stream->reached = std::max(stream->reached, interval.end);
-  const auto reached = static_cast<Microseconds>(stream->reached / GST_USECOND);
+  const auto reached = microseconds(stream->reached);
   GstFlowReturn result = GST_FLOW_OK;
   std::span<const AbsoluteEvent> rest = stream->events;
   for (const auto& trigger : stream->triggers.pop_before(reached + 1)) {
@@ -200,7 +174,7 @@ static GstFlowReturn advance(GstEventCut* self, const EventInterval& interval) {
     if (stream->start && trigger.t - *stream->start <= max_length)
       result = push_window(self, before, trigger.t);
     else
-      self->priv->counters.lock()->dropped += before.size();
+      self.counters.lock()->dropped += before.size();
     rest = rest.subspan(before.size());
     stream->start = trigger.t;
     stream->validator->pass(trigger.t);
@@ -208,24 +182,23 @@ static GstFlowReturn advance(GstEventCut* self, const EventInterval& interval) {
   stream->events.erase(stream->events.begin(),
                        stream->events.end() - static_cast<std::ptrdiff_t>(rest.size()));
   if (stream->start) return result;
-  self->priv->counters.lock()->dropped += stream->events.size();
+  self.counters.lock()->dropped += stream->events.size();
   stream->events.clear();
-  return push_event(GST_BASE_TRANSFORM_SRC_PAD(self),
+  return push_event(GST_BASE_TRANSFORM_SRC_PAD(self.element),
                     gst_event_new_gap(interval.start, GST_CLOCK_TIME_NONE));
 }
 
 /// Starts over if an interval is earlier than the last one. Triggers that wait belong to it.
-static void start_over_if_earlier(GstEventCut* self, const EventInterval& interval) {
-  const GstClockTime reached = self->priv->stream->reached;
+static void start_over_if_earlier(Private& self, const EventInterval& interval) {
+  const GstClockTime reached = self.stream->reached;
   if (interval.start + event_resolution >= reached) return;
-  GST_DEBUG_OBJECT(self, "time goes back from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
+  GST_DEBUG_OBJECT(self.element, "time goes back from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(reached), GST_TIME_ARGS(interval.start));
   start_over(self);
 }
 
-/// Adds the events of a buffer.
-static void add(GstEventCut* self, const MappedEvents& mapped, GstBuffer* buffer) {
-  const auto stream = self->priv->stream.lock();
+static void add(Private& self, const MappedEvents& mapped, GstBuffer* buffer) {
+  const auto stream = self.stream.lock();
   const auto labels = labels_of(buffer);
   stream->is_labelled |= !labels.empty();
   std::size_t excess = 0;
@@ -237,34 +210,34 @@ static void add(GstEventCut* self, const MappedEvents& mapped, GstBuffer* buffer
   };
   const auto invalid = stream->validator->for_each_valid(
       mapped.events(), mapped.start(), length_of(mapped.interval()), keep, labels);
-  stream->faults.warn(self, invalid, buffer);
+  stream->faults.warn(self.element, invalid, buffer);
   if (excess > 0)
     stream->warn_of_excess(
-        self,
+        self.element,
         {GST_STREAM_ERROR_FAILED, "Cannot keep all events: there are more than " +
                                       std::to_string(max_events) +
                                       " in a window; skipping the rest. Check input and edge."},
         std::to_string(excess) + " events skipped");
-  const auto counters = self->priv->counters.lock();
+  const auto counters = self.counters.lock();
   counters->dropped += excess;
   counters->rejected += invalid.outside + invalid.unsorted;
 }
 
 static GstFlowReturn submit_input_buffer(GstBaseTransform* transform, gboolean, GstBuffer* input) {
-  auto* self = GST_EVENT_CUT(transform);
+  auto& self = priv_of(transform);
   const OwnedBuffer buffer(input);
-  const auto stream = self->priv->stream.lock();
+  const auto stream = self.stream.lock();
   if (!stream->validator) return GST_FLOW_NOT_NEGOTIATED;
   const auto events = gst_buffer_get_size(input) / sizeof(Event);
-  self->priv->counters.lock()->events += events;
+  self.counters.lock()->events += events;
   const MappedEvents mapped(input);
   if (!mapped) {
-    stream->faults.warn(self, event_fault(input), input);
-    self->priv->counters.lock()->rejected += events;
+    stream->faults.warn(self.element, event_fault(input), input);
+    self.counters.lock()->rejected += events;
     return GST_FLOW_OK;
   }
   const auto& interval = mapped.interval();
-  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, events,
+  GST_LOG_OBJECT(self.element, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, events,
                  GST_TIME_ARGS(interval.start));
   return reported(self, [&] {
     start_over_if_earlier(self, interval);
@@ -278,33 +251,30 @@ static GstFlowReturn submit_input_buffer(GstBaseTransform* transform, gboolean, 
   });
 }
 
-/* events, queries */
-
-/// Passes a GAP as an interval without events.
-static bool handle_gap(GstEventCut* self, GstEvent* event) {
+static bool handle_gap(Private& self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
-  if (!self->priv->stream->validator || start > G_MAXINT64) return true;
+  if (!self.stream->validator || start > G_MAXINT64) return true;
   if (!GST_CLOCK_TIME_IS_VALID(duration)) duration = 0;
   const EventInterval interval{start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)};
   start_over_if_earlier(self, interval);
   return advance(self, interval) == GST_FLOW_OK;
 }
 
-static void add_triggers(GstEventCut* self, GstEvent* event) {
+static void add_triggers(Private& self, GstEvent* event) {
   auto triggers = triggers_of(event);
-  const auto stream = self->priv->stream.lock();
+  const auto stream = self.stream.lock();
   if (!triggers || stream->triggers.is_full()) return;
-  const Settings settings = self->priv->settings.copy();
+  const Settings settings = self.settings.copy();
   std::erase_if(*triggers, [&](const Trigger& trigger) { return !settings.cuts_at(trigger); });
   stream->triggers.push(*triggers);
 }
 
-static void warn_without_windows(GstEventCut* self) {
-  const Counters counters = self->priv->counters.copy();
+static void warn_without_windows(Private& self) {
+  const Counters counters = self.counters.copy();
   if (counters.events > 0 && counters.windows == 0)
-    post_message(self, GST_MESSAGE_WARNING,
+    post_message(self.element, GST_MESSAGE_WARNING,
                  {GST_STREAM_ERROR_FAILED,
                   "There are no windows: fewer than two triggers cut these events. Check the "
                   "properties input and edge, and that the recording has triggers."},
@@ -312,7 +282,7 @@ static void warn_without_windows(GstEventCut* self) {
 }
 
 static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
-  auto* self = GST_EVENT_CUT(transform);
+  auto& self = priv_of(transform);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CUSTOM_DOWNSTREAM:
       reported(self, [&] { add_triggers(self, event); });
@@ -322,13 +292,13 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
       return reported(self, [&] { return handle_gap(self, event); }) ? TRUE : FALSE;
     }
     case GST_EVENT_SEGMENT:
-      if (!plays_events(self, event, "cut")) return FALSE;
+      if (!plays_events(self.element, event, "cut")) return FALSE;
       if (continues(transform->segment, segment_of(event))) break;
       [[fallthrough]];
     case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_EOS:
     case GST_EVENT_FLUSH_STOP:
-      self->priv->stream->triggers.clear();
+      self.stream->triggers.clear();
       start_over(self);
       if (GST_EVENT_TYPE(event) == GST_EVENT_EOS) warn_without_windows(self);
       break;
@@ -340,12 +310,10 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
 
 static gboolean query(GstBaseTransform* transform, GstPadDirection direction, GstQuery* query) {
   if (direction == GST_PAD_SRC && GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(GST_CAT_DEFAULT, GST_BASE_TRANSFORM_SINK_PAD(transform), query,
-                          GST_EVENT_CUT(transform)->priv->latency.copy());
+    return answer_latency(GST_BASE_TRANSFORM_SINK_PAD(transform), query,
+                          priv_of(transform).latency.copy());
   return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 }
-
-/* negotiation, states */
 
 /// Windows have no framerate.
 static GstCaps* transform_caps(GstBaseTransform*, GstPadDirection direction, GstCaps* caps,
@@ -360,37 +328,34 @@ static GstCaps* transform_caps(GstBaseTransform*, GstPadDirection direction, Gst
 }
 
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
-  auto* self = GST_EVENT_CUT(transform);
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, in)) return FALSE;
-  const auto stream = self->priv->stream.lock();
-  const SensorSize sensor{info.width, info.height};
-  if (stream->validator && stream->sensor == sensor) return TRUE;
+  auto& self = priv_of(transform);
+  const auto sensor = sensor_of(in);
+  if (!sensor) return FALSE;
+  const auto stream = self.stream.lock();
+  if (stream->validator && stream->sensor == *sensor) return TRUE;
   start_over(self);
-  stream->sensor = sensor;
-  stream->validator.emplace(info.width, info.height);
+  stream->sensor = *sensor;
+  stream->validator.emplace(sensor->width, sensor->height);
   return TRUE;
 }
 
 static gboolean start(GstBaseTransform* transform) {
-  *GST_EVENT_CUT(transform)->priv->counters.lock() = {};
+  *priv_of(transform).counters.lock() = {};
   return TRUE;
 }
 
 static gboolean stop(GstBaseTransform* transform) {
-  GST_EVENT_CUT(transform)->priv->stream.reset();
-  *GST_EVENT_CUT(transform)->priv->latency.lock() = 0;
+  priv_of(transform).stream.reset();
+  *priv_of(transform).latency.lock() = 0;
   return TRUE;
 }
 
-/* type */
-
 static GstStructure* stats_of(GObject* object) {
-  const Counters counters = GST_EVENT_CUT(object)->priv->counters.copy();
-  return gst_structure_new("application/x-event-cut-stats", "events", G_TYPE_UINT64,
-                           counters.events, "dropped-events", G_TYPE_UINT64, counters.dropped,
-                           "rejected-events", G_TYPE_UINT64, counters.rejected, "windows",
-                           G_TYPE_UINT64, counters.windows, nullptr);
+  const Counters counters = priv_of(object).counters.copy();
+  return new_counters("application/x-event-cut-stats", {{"events", counters.events},
+                                                        {"dropped-events", counters.dropped},
+                                                        {"rejected-events", counters.rejected},
+                                                        {"windows", counters.windows}});
 }
 
 static void gst_event_cut_init(GstEventCut* self) {
@@ -401,7 +366,7 @@ static void gst_event_cut_init(GstEventCut* self) {
 static void gst_event_cut_class_init(GstEventCutClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  Properties<settings_of> properties(object_class);
+  Properties<field_of<&Private::settings>> properties(object_class);
   properties.add(&Settings::edge, "edge", "Edges of triggers to cut at",
                  enum_type<Edge>("GstEventCutEdge", {{Edge::rising, "Rising edges", "rising"},
                                                      {Edge::falling, "Falling edges", "falling"},

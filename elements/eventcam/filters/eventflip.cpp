@@ -77,24 +77,13 @@ class Flip final : public EventFilter {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventFlip, gst_event_flip, GST, EVENT_FLIP, GstEventFilter)
-
-struct _GstEventFlip {
-  GstEventFilter parent;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstEventFlip, gst_event_flip, GST_TYPE_EVENT_FILTER,
-                        G_IMPLEMENT_INTERFACE(GST_TYPE_VIDEO_DIRECTION, nullptr))
-GST_ELEMENT_REGISTER_DEFINE(eventflip, "eventflip", GST_RANK_NONE, gst_event_flip_get_type())
-
-static Guarded<Settings>& settings_of(GObject* object) {
-  return filter_impl<Flip>(object).settings;
-}
+DEFINE_EVENT_FILTER(GstEventFlip, gst_event_flip, EVENT_FLIP, Flip, eventflip,
+                    implement(g_define_type_id, GST_TYPE_VIDEO_DIRECTION))
 
 static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection, GstCaps* caps,
                                GstCaps* filter) {
-  const bool transpose =
-      orientation_of(settings_of(G_OBJECT(transform)).copy().direction).transpose;
+  const auto direction = gst_event_flip_settings(G_OBJECT(transform)).copy().direction;
+  const bool transpose = orientation_of(direction).transpose;
   return changed_caps(caps, filter, [transpose](GstStructure* structure) {
     const GValue* width = gst_structure_get_value(structure, "width");
     const GValue* height = gst_structure_get_value(structure, "height");
@@ -108,13 +97,9 @@ static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection, Gst
   });
 }
 
-static void gst_event_flip_init(GstEventFlip* self) {
-  gst_event_filter_set_impl(GST_EVENT_FILTER(self), std::make_unique<Flip>());
-}
-
 static void gst_event_flip_class_init(GstEventFlipClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  Properties<settings_of> properties(object_class);
+  Properties<gst_event_flip_settings> properties(object_class);
   // Implements the property of GstVideoDirection, which does not say that it may change at any
   // time.
   properties.add(&Settings::direction, "video-direction", "How to flip or rotate",

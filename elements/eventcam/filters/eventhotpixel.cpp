@@ -30,12 +30,8 @@
  *
  * Since: 0.1
  */
-#include <algorithm>
 #include <filesystem>
 #include <iterator>
-#include <stdexcept>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "gst/base/named_file.hpp"
@@ -46,7 +42,6 @@ using namespace eventcamera;
 
 namespace {
 
-/// User-settable values.
 struct Settings : HotPixelFilter::Settings {
   std::string location;
 };

@@ -27,22 +27,10 @@
  */
 #include <gst/video/video.h>
 
-#include <algorithm>
 #include <limits>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/video_frame.hpp"
-#include "src/core/label.hpp"
-#include "src/core/sensor_size.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_label_debug);
 #define GST_CAT_DEFAULT event_label_debug
@@ -89,13 +77,11 @@ class EventLabeller final : public EventAggregator {
     image_time_ = never;
   }
 
-  void release_memory() noexcept override { flush(); }
-
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
     if (pad == main_pad()) {
-      GstEventCameraInfo info;
-      if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-      sensor_ = {info.width, info.height};
+      const auto sensor = sensor_of(caps);
+      if (!sensor) return false;
+      sensor_ = sensor;
       if (!gst_pad_is_linked(GST_PAD(images_pad_)))
         warn_of_missing_(
             element(),
@@ -130,12 +116,7 @@ class EventLabeller final : public EventAggregator {
                                                                               : result;
   }
 
-  /// Time at which live events are pushed without waiting for images: at once if they have no time,
-  /// and at the end of the events.
-  GstClockTime next_time() override { return next_main_time(); }
-
  private:
-  /// An image of classes.
   struct ClassImage {
     OwnedBuffer buffer;
     GstVideoInfo format;
@@ -286,8 +267,6 @@ class EventLabeller final : public EventAggregator {
     const auto labels = std::move(head_->labels);
     head_.reset();  // otherwise the buffer would not be writable in place
     OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
-    if (is_gap(out.get()))
-      return push_gap(GST_BUFFER_PTS(out.get()), GST_BUFFER_DURATION(out.get()));
     auto target = labels_of(out.get());
     if (target.size() != labels.size()) {
       if (auto* invalid = gst_buffer_get_meta(out.get(), GST_EVENT_CAMERA_LABEL_META_API_TYPE))

@@ -15,9 +15,6 @@
  *
  * Since: 0.1
  */
-#include <cstddef>
-#include <string>
-
 #include "gst/base/named_file.hpp"
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/pixel_mask.hpp"

@@ -36,27 +36,13 @@
  *
  * Since: 0.1
  */
-#include <algorithm>
+#include <atomic>
 #include <map>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
 
-#include "elements/eventcam/filters/merged_timeline.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/event_pool.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/seek_request.hpp"
-#include "gst/eventcamera/eventcamera.h"
+#include "src/filter/event_merge.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_merge_debug);
 #define GST_CAT_DEFAULT event_merge_debug
@@ -65,6 +51,201 @@ using namespace eventcamera;
 
 namespace {
 
+/// Column and row of the merged sensor where a pad's sensor starts.
+struct SensorPosition {
+  guint x = 0;
+  guint y = 0;
+
+  friend bool operator==(const SensorPosition&, const SensorPosition&) = default;
+};
+
+/// Stream of a sink pad.
+struct Stream {
+  Stream() { stop(); }
+
+  void unload() {
+    input.unload();
+    loaded.reset();
+  }
+  void flush() {
+    unload();
+    discontinuous = segment_is_new = goes_back = false;
+  }
+  void stop() {
+    sensor = {};
+    segment_seqnum = GST_SEQNUM_INVALID;
+    gst_segment_init(&*segment.lock(), GST_FORMAT_TIME);
+  }
+  /// Keeps the segment, which a flush resets, for a second seek before the next segment.
+  void handle_segment(GstEvent* event) {
+    const auto last = std::exchange(*segment.lock(), segment_of(event));
+    if (segment_seqnum != GST_SEQNUM_INVALID) segment_is_new |= !continues(last, segment_of(event));
+    segment_seqnum = gst_event_get_seqnum(event);
+  }
+
+  Guarded<SensorPosition> position;  ///< properties xpos and ypos
+  std::atomic<bool> was_linked = false;
+  Guarded<GstSegment> segment;  ///< the last one received; a flush does not reset it
+
+  guint32 segment_seqnum = GST_SEQNUM_INVALID;
+  bool segment_is_new = false;      ///< not the first segment, and none of its events are merged
+  bool goes_back = false;           ///< the loaded interval goes back in a new segment, and waits
+  bool has_output_segment = false;  ///< the output has the segment of this pad
+  SensorSize sensor;                ///< 0x0 before caps
+  SensorPosition placed;            ///< position in the negotiated output
+  MergeInput input;
+  OwnedBuffer loaded;          ///< queued buffer that `input` was loaded from
+  bool discontinuous = false;  ///< that buffer, or one dropped before it, is flagged DISCONT
+};
+
+}  // namespace
+
+#define GST_TYPE_EVENT_MERGE_PAD (gst_event_merge_pad_get_type())
+G_DECLARE_FINAL_TYPE(GstEventMergePad, gst_event_merge_pad, GST, EVENT_MERGE_PAD, GstAggregatorPad)
+
+struct _GstEventMergePad {
+  GstAggregatorPad parent;
+  Stream* stream;
+};
+
+G_DEFINE_TYPE(GstEventMergePad, gst_event_merge_pad, GST_TYPE_AGGREGATOR_PAD)
+
+static Stream& stream_of(gpointer pad) {
+  return *GST_EVENT_MERGE_PAD(pad)->stream;
+}
+static Stream& stream_of(const OwnedAggregatorPad& pad) {
+  return stream_of(pad.get());
+}
+
+static Guarded<SensorPosition>& position_of(GObject* pad) {
+  return stream_of(pad).position;
+}
+
+static void gst_event_merge_pad_init(GstEventMergePad* self) {
+  self->stream = new Stream;
+  const auto linked = +[](gpointer pad, GstPad*, gpointer) { stream_of(pad).was_linked = true; };
+  g_signal_connect(self, "linked", G_CALLBACK(linked), nullptr);
+}
+
+static void gst_event_merge_pad_class_init(GstEventMergePadClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = [](GObject* pad) {
+    delete &stream_of(pad);
+    G_OBJECT_CLASS(gst_event_merge_pad_parent_class)->finalize(pad);
+  };
+  Properties<position_of> properties(object_class);
+  properties.add(&SensorPosition::x, "xpos",
+                 "Column of the output where this sensor starts (pixels)", 0, max_side - 1);
+  properties.add(&SensorPosition::y, "ypos", "Row of the output where this sensor starts (pixels)",
+                 0, max_side - 1);
+}
+
+namespace {
+
+/// Stream time of the output, where 0 is the timestamp at which the first input starts: segments,
+/// seeks, and queries about them.
+class MergedTimeline {
+ public:
+  explicit MergedTimeline(GstElement* element) : element_(element) {}
+
+  /// Forgets the last seek.
+  void reset() { sought_.lock()->reset(); }
+
+  /// Segment of a pad, up to the latest end of all segments.
+  static GstSegment longest_segment(const OwnedAggregatorPad& of,
+                                    std::span<const OwnedAggregatorPad> pads) {
+    GstSegment segment = segment_of(of.get());
+    for (const auto& pad : pads)
+      segment.stop = std::max(segment.stop, segment_of(pad.get()).stop);  // none is the maximum
+    return segment;
+  }
+
+  /// Segment of the output: the longest segment of the stream that starts first. Start and stop of
+  /// the last seek replace its start and stop, which not all streams may reach.
+  GstSegment segment(const OwnedAggregatorPad& first,
+                     std::span<const OwnedAggregatorPad> pads) const {
+    GstSegment segment = longest_segment(first, pads);
+    const auto sought = sought_.copy();
+    const auto has_reached = [&](const OwnedAggregatorPad& pad) {
+      return stream_of(pad).segment_seqnum == sought->seqnum();
+    };
+    // Otherwise a further seek is on its way.
+    if (!sought || std::ranges::none_of(pads, has_reached)) return segment;
+    if (const auto begin = sought->start()) {
+      segment.start = segment.position = timestamp_at(*begin);
+      segment.time = static_cast<GstClockTime>(*begin);
+    }
+    if (const auto end = sought->stop(); end && *end >= 0) segment.stop = timestamp_at(*end);
+    return segment;
+  }
+
+  /// Translates the seek that GstAggregator forwards next to the stream time of each input. Called
+  /// from any thread.
+  void seek(const SeekRequest& request) {
+    const auto last = std::exchange(*sought_.lock(), request);
+    if (last && last->seqnum() == request.seqnum()) return;  // a bin sends one to each of its sinks
+    const auto zero = start();
+    // gst_aggregator_event_forward_func() sends one event to the peer of each pad with
+    // gst_pad_send_event(), past the probes of the pad itself, and calls no virtual function.
+    for_each_sink_pad(element_, [&](GstAggregatorPad* pad) {
+      const OwnedPad peer(gst_pad_get_peer(GST_PAD(pad)));
+      if (!peer) return;
+      OwnedEvent seek = request.in_later_stream(timestamp_in(pad, 0) - zero).event();
+      gst_pad_add_probe(
+          peer.get(), GST_PAD_PROBE_TYPE_EVENT_UPSTREAM, replace_seek, seek.release(),
+          +[](gpointer event) { gst_event_unref(GST_EVENT(event)); });
+    });
+  }
+
+  /// Duration up to the end of the last stream; none if no end is known.
+  std::optional<gint64> duration() const {
+    const auto zero = start();
+    std::optional<gint64> longest;
+    for_each_sink_pad(element_, [&](GstAggregatorPad* pad) {
+      gint64 duration = -1;
+      if (gst_pad_peer_query_duration(GST_PAD(pad), GST_FORMAT_TIME, &duration) && duration >= 0)
+        longest = std::max(longest.value_or(0), timestamp_in(pad, duration) - zero);
+    });
+    return longest;
+  }
+
+ private:
+  /// Timestamp of an input at a stream time; negative before timestamp 0.
+  static GstClockTimeDiff timestamp_in(GstAggregatorPad* pad, gint64 stream_time) {
+    const GstSegment segment = stream_of(pad).segment.copy();
+    guint64 distance = 0;
+    const gint sign = gst_segment_position_from_stream_time_full(
+        &segment, GST_FORMAT_TIME, static_cast<guint64>(stream_time), &distance);
+    return sign * static_cast<GstClockTimeDiff>(distance);
+  }
+
+  /// Timestamp at which the first input starts.
+  GstClockTimeDiff start() const {
+    GstClockTimeDiff start = G_MAXINT64;
+    for_each_sink_pad(
+        element_, [&](GstAggregatorPad* pad) { start = std::min(start, timestamp_in(pad, 0)); });
+    return start;
+  }
+
+  GstClockTime timestamp_at(gint64 stream_time) const {
+    const auto zero = start();
+    if (zero < 0 && stream_time < -zero) return 0;
+    return static_cast<GstClockTime>(zero) + static_cast<GstClockTime>(stream_time);
+  }
+
+  /// Replaces the next seek with `seek` if they have the same sequence number.
+  static GstPadProbeReturn replace_seek(GstPad*, GstPadProbeInfo* info, gpointer seek) {
+    GstEvent* const next = GST_PAD_PROBE_INFO_EVENT(info);
+    if (GST_EVENT_TYPE(next) != GST_EVENT_SEEK) return GST_PAD_PROBE_OK;
+    if (gst_event_get_seqnum(next) == gst_event_get_seqnum(GST_EVENT(seek)))
+      gst_event_replace(reinterpret_cast<GstEvent**>(&info->data), GST_EVENT(seek));
+    return GST_PAD_PROBE_REMOVE;
+  }
+
+  GstElement* element_;
+  Guarded<std::optional<SeekRequest>> sought_;  ///< the latest seek
+};
+
 /// Maximum latency that the length of intervals adds.
 constexpr GstClockTime max_latency = GST_SECOND;
 
@@ -72,16 +253,11 @@ struct Settings {
   guint min_streams = 2;
 };
 
-/// Property `stats`.
 struct Counts {
   guint64 events = 0;    ///< merged
   guint64 late = 0;      ///< dropped, because earlier than those already sent
   guint64 rejected = 0;  ///< dropped, because outside of their sensor, or not sorted
 };
-
-GstEventMergePadPrivate& stream_of(const OwnedAggregatorPad& pad) {
-  return *GST_EVENT_MERGE_PAD(pad.get())->priv;
-}
 
 /// The pads of an element in order of their numbers.
 std::vector<OwnedAggregatorPad> numbered_pads(gpointer element) {
@@ -112,20 +288,17 @@ class EventMerge final : public EventAggregator {
   }
 
   void flush() noexcept override {
-    for_each_sink_pad(element(),
-                      [](GstAggregatorPad* pad) { GST_EVENT_MERGE_PAD(pad)->priv->flush(); });
+    for_each_sink_pad(element(), [](GstAggregatorPad* pad) { stream_of(pad).flush(); });
     merger_.restart();
     segment_chosen_ = false;
     discontinuous_ = true;
     waiting_since_ = 0;
   }
 
-  void release_memory() noexcept override { flush(); }
-
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
-    GstEventCameraInfo info;
-    if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-    GST_EVENT_MERGE_PAD(pad)->priv->sensor = {info.width, info.height};
+    const auto sensor = sensor_of(caps);
+    if (!sensor) return false;
+    stream_of(pad).sensor = *sensor;
     gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
     return true;
   }
@@ -227,22 +400,11 @@ class EventMerge final : public EventAggregator {
       return GST_FLOW_NOT_NEGOTIATED;
     }
     GST_DEBUG_OBJECT(element(), "the sensors need %s", text.c_str());
-    const auto at_least = [](int size) {
-      GValue range = G_VALUE_INIT;
-      g_value_init(&range, GST_TYPE_INT_RANGE);
-      gst_value_set_int_range(&range, size, max_side);
-      return range;
-    };
-    const OwnedCaps ours(event_caps(needed.width, needed.height));
-    GstStructure* const structure = gst_caps_get_structure(ours.get(), 0);
-    if (needed.width < max_side) {
-      GValue width = at_least(needed.width);
-      gst_structure_take_value(structure, "width", &width);
-    }
-    if (needed.height < max_side) {
-      GValue height = at_least(needed.height);
-      gst_structure_take_value(structure, "height", &height);
-    }
+    const OwnedCaps ours(event_caps(needed));
+    for (const auto& [side, size] :
+         {std::pair("width", needed.width), std::pair("height", needed.height)})
+      if (size < max_side)
+        gst_caps_set_simple(ours.get(), side, GST_TYPE_INT_RANGE, size, max_side, nullptr);
     *result = gst_caps_intersect_full(downstream, ours.get(), GST_CAPS_INTERSECT_FIRST);
     if (!gst_caps_is_empty(*result)) return GST_FLOW_OK;
     GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
@@ -255,9 +417,9 @@ class EventMerge final : public EventAggregator {
 
   GstStructure* stats() const {
     const Counts counts = counts_.copy();
-    return gst_structure_new("application/x-event-merge-stats", "events", G_TYPE_UINT64,
-                             counts.events, "late-events", G_TYPE_UINT64, counts.late,
-                             "rejected-events", G_TYPE_UINT64, counts.rejected, nullptr);
+    return new_counters("application/x-event-merge-stats", {{"events", counts.events},
+                                                            {"late-events", counts.late},
+                                                            {"rejected-events", counts.rejected}});
   }
 
   Guarded<Settings> settings;
@@ -299,8 +461,8 @@ class EventMerge final : public EventAggregator {
     while (const auto buffer = next_buffer(pad.get())) {
       if (stream.loaded != buffer) stream.discontinuous |= GST_BUFFER_IS_DISCONT(buffer.get());
       if (const auto interval = interval_of(buffer.get())) {
-        const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
-        const auto end = static_cast<Microseconds>(interval->end / GST_USECOND);
+        const auto start = microseconds(interval->start);
+        const auto end = microseconds(interval->end);
         if (stream.loaded == buffer || load_events(pad, buffer.get(), end - start)) {
           stream.input.place(start, static_cast<int>(stream.placed.x),
                              static_cast<int>(stream.placed.y));
@@ -330,7 +492,7 @@ class EventMerge final : public EventAggregator {
     stream.loaded.reset(gst_buffer_ref(buffer));
     warn(invalid, buffer);
     counts_.lock()->rejected += invalid.outside + invalid.unsorted;
-    if (!mapped.events().empty()) raise_latency(static_cast<GstClockTime>(length) * GST_USECOND);
+    if (!mapped.events().empty()) raise_latency(nanoseconds(length));
     return true;
   }
 
@@ -358,7 +520,6 @@ class EventMerge final : public EventAggregator {
                         std::to_string(interval.start) + " us, up to which events were sent");
   }
 
-  /// Sets the segment of the output, once.
   void choose_segment(std::span<const OwnedAggregatorPad> pads) {
     if (pads.empty() || std::exchange(segment_chosen_, true)) return;
     const auto& first = *std::ranges::min_element(
@@ -370,26 +531,19 @@ class EventMerge final : public EventAggregator {
     set_segment(timeline.segment(first, pads));
   }
 
-  /// Pushes the events of an interval.
   GstFlowReturn push_interval(const MergedInterval& interval, EventMerger::Inputs inputs) {
     if (!gst_pad_has_current_caps(GST_AGGREGATOR_SRC_PAD(element()))) return GST_FLOW_OK;
-    const auto start = static_cast<GstClockTime>(interval.start) * GST_USECOND;
-    const auto duration = static_cast<GstClockTime>(interval.end - interval.start) * GST_USECOND;
+    const auto start = nanoseconds(interval.start);
+    const auto duration = nanoseconds(interval.end - interval.start);
     if (interval.events == 0) return push_empty_interval(start, duration);
-    const gsize size = interval.events * sizeof(Event);
-    OwnedBuffer buffer;
-    const GstFlowReturn result = buffers_.acquire(size, buffer);
-    if (result != GST_FLOW_OK) return result;
+    OwnedBuffer buffer = buffers_.acquire(interval.events * sizeof(Event));
     {
       const WritableBytes mapped(buffer.get());
       LabelledEvents events{.events = mapped.events(), .labels = {}};
       if (interval.labelled) events.labels = add_labels(buffer.get(), interval.events);
       EventMerger::merge(inputs, interval, events);
     }
-    GST_BUFFER_PTS(buffer.get()) = start;
-    GST_BUFFER_DURATION(buffer.get()) = duration;
-    if (std::exchange(discontinuous_, false))
-      GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
+    stamp(buffer.get(), {start, start + duration}, discontinuous_);
     GST_LOG_OBJECT(element(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, interval.events,
                    GST_TIME_ARGS(start));
     return push(std::move(buffer));
@@ -416,14 +570,6 @@ class EventMerge final : public EventAggregator {
 
 }  // namespace
 
-/* type */
-
-G_DECLARE_FINAL_TYPE(GstEventMerge, gst_event_merge, GST, EVENT_MERGE, GstEventAggregator)
-
-struct _GstEventMerge {
-  GstEventAggregator parent;
-};
-
 static const auto failure = events_report("merge");
 
 static guint children_count(GstChildProxy* self) {
@@ -445,11 +591,9 @@ static void child_proxy_init(gpointer interface, gpointer) {
   child_proxy->get_child_by_index = child_by_index;
 }
 
-G_DEFINE_TYPE_WITH_CODE(GstEventMerge, gst_event_merge, GST_TYPE_EVENT_AGGREGATOR,
-                        GST_DEBUG_CATEGORY_INIT(event_merge_debug, "eventmerge", 0,
-                                                "merged event streams");
-                        G_IMPLEMENT_INTERFACE(GST_TYPE_CHILD_PROXY, child_proxy_init))
-GST_ELEMENT_REGISTER_DEFINE(eventmerge, "eventmerge", GST_RANK_NONE, gst_event_merge_get_type())
+DEFINE_EVENT_AGGREGATOR(GstEventMerge, gst_event_merge, EVENT_MERGE, EventMerge, eventmerge,
+                        GST_RANK_NONE, "merged event streams",
+                        implement(g_define_type_id, GST_TYPE_CHILD_PROXY, child_proxy_init))
 #define PARENT_ELEMENT_CLASS GST_ELEMENT_CLASS(gst_event_merge_parent_class)
 #define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_event_merge_parent_class)
 
@@ -460,14 +604,14 @@ static GstPad* request_new_pad(GstElement* element, GstPadTemplate* pad_template
   catch_exceptions(element, failure, [&] {
     const auto position = aggregator_impl<EventMerge>(element).unlinked_positions.lock()->extract(
         GST_OBJECT_NAME(pad));
-    if (position) *GST_EVENT_MERGE_PAD(pad)->priv->position.lock() = position.mapped();
+    if (position) *stream_of(pad).position.lock() = position.mapped();
   });
   gst_child_proxy_child_added(GST_CHILD_PROXY(element), G_OBJECT(pad), GST_OBJECT_NAME(pad));
   return pad;
 }
 
 static void release_pad(GstElement* element, GstPad* pad) {
-  const auto& stream = *GST_EVENT_MERGE_PAD(pad)->priv;
+  const auto& stream = stream_of(pad);
   if (!stream.was_linked)
     catch_exceptions(element, failure, [&] {
       (*aggregator_impl<EventMerge>(element).unlinked_positions.lock())[GST_OBJECT_NAME(pad)] =
@@ -479,7 +623,7 @@ static void release_pad(GstElement* element, GstPad* pad) {
 
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && segment_of(event).format == GST_FORMAT_TIME)
-    GST_EVENT_MERGE_PAD(pad)->priv->handle_segment(event);
+    stream_of(pad).handle_segment(event);
   return PARENT_AGGREGATOR_CLASS->sink_event(aggregator, pad, event);
 }
 
@@ -488,15 +632,19 @@ static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
   GstFormat format = GST_FORMAT_UNDEFINED;
   if (GST_QUERY_TYPE(query) == GST_QUERY_DURATION) {
     gst_query_parse_duration(query, &format, nullptr);
-    if (format == GST_FORMAT_TIME) return timeline.answer_duration(query);
+    const auto duration = format == GST_FORMAT_TIME ? timeline.duration() : std::nullopt;
+    if (duration) gst_query_set_duration(query, format, *duration);
+    if (format == GST_FORMAT_TIME) return duration.has_value();
   }
   if (!PARENT_AGGREGATOR_CLASS->src_query(aggregator, query)) return FALSE;
-  if (GST_QUERY_TYPE(query) == GST_QUERY_SEEKING) timeline.extend_seeking(query);
+  if (GST_QUERY_TYPE(query) == GST_QUERY_SEEKING) {
+    gboolean seekable = FALSE;
+    gst_query_parse_seeking(query, &format, &seekable, nullptr, nullptr);
+    const auto duration = timeline.duration();
+    if (seekable && format == GST_FORMAT_TIME && duration)
+      gst_query_set_seeking(query, format, TRUE, 0, *duration);
+  }
   return TRUE;
-}
-
-static void gst_event_merge_init(GstEventMerge* self) {
-  gst_event_aggregator_make<EventMerge>(GST_EVENT_AGGREGATOR(self));
 }
 
 static void gst_event_merge_class_init(GstEventMergeClass* klass) {

@@ -23,7 +23,6 @@
  *
  * Since: 0.1
  */
-#include <algorithm>
 #include <cmath>
 
 #include "gst/base/owned.hpp"

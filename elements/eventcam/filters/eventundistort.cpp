@@ -22,10 +22,6 @@
  *
  * Since: 0.1
  */
-#include <cstddef>
-#include <stdexcept>
-#include <string>
-
 #include "gst/base/named_file.hpp"
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/camera_calibration.hpp"

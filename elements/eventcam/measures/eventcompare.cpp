@@ -55,16 +55,8 @@
  *
  * Since: 0.1
  */
-#include <optional>
-
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
-#include "gst/eventcamera/eventcamera.h"
-#include "src/core/sensor_size.hpp"
 #include "src/measure/stream_comparison.hpp"
 #include "src/render/rgb_picture.hpp"
 
@@ -79,7 +71,6 @@ const char* name_of(StreamRole role) {
   return role == StreamRole::reference ? "reference" : "candidate";
 }
 
-/// Moves a structure into a field of another one.
 void put_structure(GstStructure* structure, const char* field, GstStructure* value) {
   gst_structure_set(structure, field, GST_TYPE_STRUCTURE, value, nullptr);
   gst_structure_free(value);
@@ -171,13 +162,12 @@ class EventCompare final : public EventAggregator {
   }
 
   void flush() noexcept override { comparison_.reset(); }
-  void release_memory() noexcept override { flush(); }
+  GstClockTime next_time() override { return GST_CLOCK_TIME_NONE; }
 
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
-    GstEventCameraInfo info;
-    if (!gst_event_camera_info_from_caps(&info, caps)) return false;
+    const auto next = sensor_of(caps);
+    if (!next) return false;
     auto& sensor = sensors_[pad == main_pad() ? StreamRole::candidate : StreamRole::reference];
-    const SensorSize next{info.width, info.height};
     if (sensor == next) return true;
     for (GstAggregatorPad* other : {pads_[StreamRole::reference], pads_[StreamRole::candidate]})
       if (!gst_pad_is_linked(GST_PAD(other)))
@@ -251,7 +241,6 @@ class EventCompare final : public EventAggregator {
     return true;
   }
 
-  /// Adds a buffer to the comparison.
   void compare(StreamRole role, GstBuffer* buffer) {
     const MappedEvents mapped(buffer);
     if (!mapped) return warn(event_fault(buffer), buffer);
@@ -269,7 +258,6 @@ class EventCompare final : public EventAggregator {
     warn(skipped, buffer);
   }
 
-  /// Processes the next buffer of either stream.
   GstFlowReturn aggregate_next() {
     begin();
     const auto behind = comparison_ ? comparison_->behind() : StreamRole::candidate;
@@ -295,10 +283,7 @@ class EventCompare final : public EventAggregator {
       if (comparison_ && behind == StreamRole::candidate)
         compare(StreamRole::candidate, buffer.get());
     }
-    OwnedBuffer passed(gst_aggregator_pad_pop_buffer(main_pad()));
-    return is_gap(passed.get())
-               ? push_gap(GST_BUFFER_PTS(passed.get()), GST_BUFFER_DURATION(passed.get()))
-               : push(std::move(passed));
+    return push(OwnedBuffer(gst_aggregator_pad_pop_buffer(main_pad())));
   }
 
   /// Posts and writes the statistics, of empty streams if there is no comparison yet.

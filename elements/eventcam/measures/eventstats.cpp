@@ -41,20 +41,10 @@
  */
 #include <gst/base/gstbasetransform.h>
 
-#include <algorithm>
 #include <limits>
-#include <optional>
 
 #include "elements/eventcam/measures/report.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/eventcamera/eventcamera.h"
-#include "src/core/event_validator.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/render/rgb_picture.hpp"
 
@@ -65,7 +55,6 @@ using namespace eventcamera;
 
 namespace {
 
-/// User-settable values.
 struct Settings : ReportFiles {
   GstClockTime interval = GST_SECOND;
 };
@@ -87,16 +76,14 @@ struct Part {
 
 /// Statistics of the stream of one sensor.
 struct Measurement {
-  Measurement(int sensor_width, int sensor_height)
-      : width(sensor_width),
-        height(sensor_height),
-        validator(width, height),
-        last_times(width, height),
-        cumulative{.statistics = EventStatistics(width, height)},
-        recent{.statistics = EventStatistics(width, height)} {}
+  explicit Measurement(SensorSize of)
+      : sensor(of),
+        validator(of.width, of.height),
+        last_times(of.width, of.height),
+        cumulative{.statistics = EventStatistics(of.width, of.height)},
+        recent{.statistics = EventStatistics(of.width, of.height)} {}
 
-  int width;
-  int height;
+  SensorSize sensor;
   EventValidator validator;
   LastTimes last_times;
   Part cumulative;
@@ -113,8 +100,9 @@ struct Stream {
 };
 
 struct Private {
-  explicit Private(GstBaseTransform* element) : stream(GST_BASE_TRANSFORM_SINK_PAD(element)) {}
+  explicit Private(GstBaseTransform* of) : element(of), stream(GST_BASE_TRANSFORM_SINK_PAD(of)) {}
 
+  GstBaseTransform* const element;
   Guarded<Settings> settings;
   StreamLocked<Stream> stream;
 };
@@ -126,17 +114,10 @@ DEFINE_EVENT_ELEMENT(GstEventStats, gst_event_stats, EVENT_STATS, GstBaseTransfo
                      "statistics of event streams")
 #define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_stats_parent_class)
 
-static Guarded<Settings>& settings_of(GObject* object) {
-  return GST_EVENT_STATS(object)->priv->settings;
-}
-
-/// Runs `work`; reports any exception.
 template <class Work>
-static auto reported(gpointer self, const Work& work) {
-  return catch_exceptions(self, events_report("count"), work);
+static auto reported(Private& self, const Work& work) {
+  return catch_exceptions(self.element, events_report("count"), work);
 }
-
-/* figures */
 
 static GstStructure* figures_of(const Part& part, Nanoseconds end, bool cumulative) {
   const Nanoseconds start = part.start.value_or(end);
@@ -148,49 +129,48 @@ static GstStructure* figures_of(const Part& part, Nanoseconds end, bool cumulati
   return structure;
 }
 
-/// Posts a message. Takes ownership of `structure`.
-static void post(GstEventStats* self, GstStructure* structure) {
-  gst_element_post_message(GST_ELEMENT(self), gst_message_new_element(GST_OBJECT(self), structure));
+static void post(Private& self, GstStructure* structure) {
+  gst_element_post_message(GST_ELEMENT(self.element),
+                           gst_message_new_element(GST_OBJECT(self.element), structure));
 }
 
 /// Reports the statistics of the whole stream, which is empty if no caps were received.
-static void conclude(GstEventStats* self, const ReportFiles& files) {
-  Measurement nothing(1, 1);
-  auto& measurement = self->priv->stream->measurement ? *self->priv->stream->measurement : nothing;
+static void conclude(Private& self, const ReportFiles& files) {
+  Measurement nothing({1, 1});
+  auto& measurement = self.stream->measurement ? *self.stream->measurement : nothing;
   measurement.concluded = true;
   GstStructure* figures = figures_of(measurement.cumulative, measurement.end.value_or(0), true);
-  GST_DEBUG_OBJECT(self, "concluding: %" GST_PTR_FORMAT, figures);
-  report(self, files, figures, [&] { return draw_map(measurement.cumulative.statistics.map()); });
+  GST_DEBUG_OBJECT(self.element, "concluding: %" GST_PTR_FORMAT, figures);
+  report(self.element, files, figures,
+         [&] { return draw_map(measurement.cumulative.statistics.map()); });
 }
 
 /// True if there were events since the last report.
-static bool has_news(Private& priv) {
-  return priv.stream->measurement && !priv.stream->measurement->concluded;
+static bool has_news(Private& self) {
+  return self.stream->measurement && !self.stream->measurement->concluded;
 }
 
-/// Starts measuring a sensor of this size.
-static void measure(GstEventStats* self, int width, int height) {
-  GST_DEBUG_OBJECT(self, "counting the events of %dx%d pixels", width, height);
-  self->priv->stream->measurement.emplace(width, height);
+static void measure(Private& self, SensorSize sensor) {
+  GST_DEBUG_OBJECT(self.element, "counting the events of %dx%d pixels", sensor.width,
+                   sensor.height);
+  self.stream->measurement.emplace(sensor);
 }
 
 /// Starts over with the same sensor, if it is known.
-static void start_over(GstEventStats* self) {
-  if (const auto& measurement = self->priv->stream->measurement)
-    measure(self, measurement->width, measurement->height);
+static void start_over(Private& self) {
+  if (const auto& measurement = self.stream->measurement) measure(self, measurement->sensor);
 }
-
-/* events */
 
 /// Adds an interval. Gaps between intervals count as time without events; if time goes backwards,
 /// no inter-event interval spans the discontinuity.
-static void cover(GstEventStats* self, const EventInterval& interval) {
-  auto& measurement = *self->priv->stream->measurement;
-  const auto& segment = GST_BASE_TRANSFORM(self)->segment;
+static void cover(Private& self, const EventInterval& interval) {
+  auto& measurement = *self.stream->measurement;
+  const auto& segment = self.element->segment;
   const Nanoseconds start = stream_time(segment, interval.start);
   const Nanoseconds end = stream_time(segment, interval.end);
   if (measurement.end && start < *measurement.end - static_cast<Nanoseconds>(event_resolution)) {
-    GST_DEBUG_OBJECT(self, "stream time goes back from %" GST_STIME_FORMAT " to %" GST_STIME_FORMAT,
+    GST_DEBUG_OBJECT(self.element,
+                     "stream time goes back from %" GST_STIME_FORMAT " to %" GST_STIME_FORMAT,
                      GST_STIME_ARGS(*measurement.end), GST_STIME_ARGS(start));
     measurement.validator.restart();
     measurement.last_times.forget();
@@ -205,25 +185,25 @@ static void cover(GstEventStats* self, const EventInterval& interval) {
   measurement.end = std::max(end, from);
 }
 
-static void post_if_due(GstEventStats* self, Measurement& measurement) {
-  const auto interval = static_cast<Nanoseconds>(self->priv->settings.lock()->interval);
+static void post_if_due(Private& self, Measurement& measurement) {
+  const auto interval = static_cast<Nanoseconds>(self.settings.lock()->interval);
   if (interval == 0 || measurement.recent.covered < interval) return;
   post(self, figures_of(measurement.recent, *measurement.end, false));
   measurement.recent.restart();
 }
 
 /// Counts the events of a buffer that are in the clipped part of its interval.
-static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buffer,
+static void count(Private& self, Measurement& measurement, GstBuffer* buffer,
                   const EventInterval& clipped) {
   const MappedEvents mapped(buffer);
   if (!mapped) {
-    self->priv->stream->faults.warn(self, event_fault(buffer), buffer);
+    self.stream->faults.warn(self.element, event_fault(buffer), buffer);
     return;
   }
   const auto [events, labels] = ClippedEvents(mapped, buffer, clipped);
   const bool is_labelled = !labels.empty();
   const auto skipped = measurement.validator.for_each_valid(
-      events, stream_time(GST_BASE_TRANSFORM(self)->segment, mapped.interval().start) / 1000,
+      events, stream_time(self.element->segment, mapped.interval().start) / 1000,
       length_of(mapped.interval()),
       [&](const AbsoluteEvent& event) {
         measurement.concluded = false;
@@ -234,19 +214,19 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
         }
       },
       labels);
-  self->priv->stream->faults.warn(self, skipped, buffer);
+  self.stream->faults.warn(self.element, skipped, buffer);
 }
 
 static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer) {
-  auto* self = GST_EVENT_STATS(transform);
-  auto& measurement = self->priv->stream->measurement;
+  auto& self = priv_of(transform);
+  auto& measurement = self.stream->measurement;
   const auto interval = interval_of(buffer);
   if (!interval) {
-    self->priv->stream->faults.warn(self, event_fault(buffer), buffer);
+    self.stream->faults.warn(self.element, event_fault(buffer), buffer);
     return GST_FLOW_OK;
   }
   if (!measurement) return GST_FLOW_NOT_NEGOTIATED;
-  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+  GST_LOG_OBJECT(self.element, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                  gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent),
                  GST_TIME_ARGS(interval->start));
   const auto clipped = clip(*interval, transform->segment);
@@ -259,39 +239,38 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
   });
 }
 
-static void handle_gap(GstEventStats* self, GstEvent* event) {
-  auto& measurement = self->priv->stream->measurement;
+static void handle_gap(Private& self, GstEvent* event) {
+  auto& measurement = self.stream->measurement;
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
   if (!measurement || !GST_CLOCK_TIME_IS_VALID(duration) || start > G_MAXINT64) return;
   const GstClockTime end = start + std::min(duration, GstClockTime{G_MAXINT64} - start);
-  const auto clipped = clip({start, end}, GST_BASE_TRANSFORM(self)->segment);
+  const auto clipped = clip({start, end}, self.element->segment);
   if (!clipped) return;
   cover(self, *clipped);
   post_if_due(self, *measurement);
 }
 
 static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
-  auto* self = GST_EVENT_STATS(transform);
-  auto& priv = *self->priv;
+  auto& self = priv_of(transform);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_GAP:
       reported(self, [&] { handle_gap(self, event); });
       break;
     case GST_EVENT_SEGMENT:
-      if (!plays_events(self, event, "measure")) return FALSE;
+      if (!plays_events(self.element, event, "measure")) return FALSE;
       break;
     case GST_EVENT_SEGMENT_DONE:
-      priv.stream->segment_reported = true;
+      self.stream->segment_reported = true;
       reported(self, [&] {
-        conclude(self, priv.settings.copy());
+        conclude(self, self.settings.copy());
         start_over(self);
       });
       break;
     case GST_EVENT_EOS:
-      if (!priv.stream->segment_reported || has_news(priv))
-        reported(self, [&] { conclude(self, priv.settings.copy()); });
+      if (!self.stream->segment_reported || has_news(self))
+        reported(self, [&] { conclude(self, self.settings.copy()); });
       break;
     case GST_EVENT_FLUSH_STOP:
       reported(self, [&] { start_over(self); });
@@ -302,38 +281,32 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
 }
 
-/* negotiation, states */
-
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
-  auto* self = GST_EVENT_STATS(transform);
-  auto& measurement = self->priv->stream->measurement;
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, in)) return FALSE;
-  if (measurement && measurement->width == info.width && measurement->height == info.height)
-    return TRUE;
+  auto& self = priv_of(transform);
+  auto& measurement = self.stream->measurement;
+  const auto sensor = sensor_of(in);
+  if (!sensor) return FALSE;
+  if (measurement && measurement->sensor == *sensor) return TRUE;
   // Each sensor size is measured separately.
   const bool is_measured = reported(self, [&] {
     if (measurement) conclude(self, {});
-    measure(self, info.width, info.height);
+    measure(self, *sensor);
   });
   return is_measured ? TRUE : FALSE;
 }
 
 static gboolean start(GstBaseTransform* transform) {
-  auto* self = GST_EVENT_STATS(transform);
-  return reported(self, [&] { return can_report(self, self->priv->settings.copy()); }) ? TRUE
-                                                                                       : FALSE;
+  auto& self = priv_of(transform);
+  return reported(self, [&] { return can_report(self.element, self.settings.copy()); }) ? TRUE
+                                                                                        : FALSE;
 }
 
 static gboolean stop(GstBaseTransform* transform) {
-  auto* self = GST_EVENT_STATS(transform);
-  auto& priv = *self->priv;
-  if (has_news(priv)) reported(self, [&] { conclude(self, priv.settings.copy()); });
-  priv.stream.reset();
+  auto& self = priv_of(transform);
+  if (has_news(self)) reported(self, [&] { conclude(self, self.settings.copy()); });
+  self.stream.reset();
   return TRUE;
 }
-
-/* type */
 
 static void gst_event_stats_init(GstEventStats* self) {
   self->priv = new Private(GST_BASE_TRANSFORM(self));
@@ -345,7 +318,7 @@ static void gst_event_stats_class_init(GstEventStatsClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
 
-  Properties<settings_of> properties(object_class);
+  Properties<field_of<&Private::settings>> properties(object_class);
   properties.add(&Settings::interval, "interval",
                  "Time between statistics messages, in stream time (ns; 0 = at the end only)", 0,
                  std::numeric_limits<gint64>::max());

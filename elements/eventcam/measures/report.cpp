@@ -3,12 +3,6 @@
 
 #include <json-glib/json-glib.h>
 
-#include <algorithm>
-#include <array>
-#include <exception>
-#include <memory>
-#include <optional>
-
 #include "gst/base/named_file.hpp"
 
 using namespace eventcamera;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <functional>
@@ -10,9 +8,8 @@
 #include <span>
 #include <string>
 
+#include "gst/base/element.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/properties.hpp"
-#include "src/core/event.hpp"
 #include "src/measure/cause_counts.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/render/rgb_picture.hpp"
@@ -61,10 +58,8 @@ void add_report_properties(Properties& properties, const char* map_blurb) {
   properties.add_fixed(&ReportFiles::map, "map", map_blurb);
 }
 
-/// Converts a timestamp of a segment to stream time.
 eventcamera::Nanoseconds stream_time(const GstSegment& segment, GstClockTime time);
 
-/// Sets the fields for the statistics of one stream.
 void put_figures(GstStructure* structure, const eventcamera::StreamFigures& figures);
 
 /// Sets the fields of labelled events by cause; none if no event has a label.

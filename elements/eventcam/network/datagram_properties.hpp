@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <bit>
 
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
+#include "gst/base/element.hpp"
 #include "src/wire/datagrams.hpp"
 
 /// Counts of datagrams. Losses are known only if datagrams have a sequence number.

@@ -35,27 +35,14 @@
  *
  * Since: 0.1
  */
-#include <gst/gst.h>
 #include <gst/net/gstnetaddressmeta.h>
-
-#include <memory>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "elements/eventcam/network/reception_reports.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/owned.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "src/core/sensor_size.hpp"
 #include "src/wire/datagrams.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_depay_debug);
@@ -121,7 +108,6 @@ struct State {
   bool has_caps = false;
 };
 
-/// User-settable values.
 struct Settings : DatagramSettings {
   GstClockTime latency = 10 * GST_MSECOND;
 };
@@ -134,14 +120,12 @@ struct Stream {
   RepeatLevel late_level;
 };
 
-struct Private {
-  explicit Private(const std::pair<GstPad*, GstPad*>& pads) : sink(pads.first), src(pads.second) {}
+struct Private : ElementPads {
+  using ElementPads::ElementPads;
 
   Guarded<Settings> settings;
   Guarded<DatagramCounts> counts;
   ReceptionReports reports;
-  GstPad* const sink;
-  GstPad* const src;
   StreamLocked<Stream> stream{sink};
 };
 
@@ -151,52 +135,27 @@ DEFINE_EVENT_ELEMENT(GstEventDatagramDepay, gst_event_datagram_depay, EVENT_DATA
                      GstElement, GST_TYPE_ELEMENT, eventdatagramdepay, GST_RANK_NONE,
                      "datagrams of events from other tools")
 
-static Guarded<Settings>& settings_of(GObject* object) {
-  return GST_EVENT_DATAGRAM_DEPAY(object)->priv->settings;
-}
-
-/* output */
-
-static GstClockTime nanoseconds(Microseconds t) {
-  return static_cast<GstClockTime>(t) * GST_USECOND;
-}
-
-static bool push_caps(GstEventDatagramDepay* self) {
-  auto& state = *self->priv->stream->state;
+static bool push_caps(Private& self) {
+  auto& state = *self.stream->state;
   if (state.has_caps) return true;
-  const OwnedCaps caps = event_caps(state.settings.width, state.settings.height);
-  GST_DEBUG_OBJECT(self, "the stream begins, with %" GST_PTR_FORMAT, caps.get());
-  state.has_caps = gst_pad_push_event(self->priv->src, gst_event_new_caps(caps.get())) != FALSE;
+  const OwnedCaps caps = event_caps({state.settings.width, state.settings.height});
+  GST_DEBUG_OBJECT(self.element, "the stream begins, with %" GST_PTR_FORMAT, caps.get());
+  state.has_caps = gst_pad_push_event(self.src, gst_event_new_caps(caps.get())) != FALSE;
   return state.has_caps;
 }
 
-/// Buffer of the events of the interval from start to end.
-static GstBuffer* buffer_of(std::span<const AbsoluteEvent> events, Microseconds start,
-                            Microseconds end) {
-  std::vector<Event> stream;
-  stream.reserve(events.size());
-  for (const auto& event : events)
-    stream.push_back({static_cast<std::uint32_t>(event.t - start), event.x, event.y_p});
-  GstBuffer* const buffer = copied_buffer(std::as_bytes(std::span(stream)));
-  GST_BUFFER_PTS(buffer) = nanoseconds(start);
-  GST_BUFFER_DURATION(buffer) = nanoseconds(end - start);
-  return buffer;
-}
-
-/// Pushes the events of a datagram.
-static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& reception,
-                          GstClockTime arrival) {
-  auto& priv = *self->priv;
-  auto& state = *priv.stream->state;
+static GstFlowReturn push(Private& self, const Reception& reception, GstClockTime arrival) {
+  auto& state = *self.stream->state;
   const auto first = state.events.front().t;
   if (!push_caps(self))
-    return GST_PAD_IS_FLUSHING(priv.src) ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED;
+    return GST_PAD_IS_FLUSHING(self.src) ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED;
   if (reception.restarted || !state.segment.continues(nanoseconds(first), arrival)) {
-    GST_DEBUG_OBJECT(
-        self, "the sender's %" GST_TIME_FORMAT " arrives at running time %" GST_TIME_FORMAT "%s",
-        GST_TIME_ARGS(nanoseconds(first)), GST_TIME_ARGS(arrival),
-        reception.restarted ? ": the sender starts over" : "");
-    state.segment.begin(priv.src, state.segment_seqnum, nanoseconds(first), arrival,
+    GST_DEBUG_OBJECT(self.element,
+                     "the sender's %" GST_TIME_FORMAT " arrives at running time %" GST_TIME_FORMAT
+                     "%s",
+                     GST_TIME_ARGS(nanoseconds(first)), GST_TIME_ARGS(arrival),
+                     reception.restarted ? ": the sender starts over" : "");
+    state.segment.begin(self.src, state.segment_seqnum, nanoseconds(first), arrival,
                         nanoseconds(first));
     state.end = first;
     state.is_discontinuous = true;
@@ -204,28 +163,29 @@ static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& receptio
     GstEvent* const gap =
         gst_event_new_gap(nanoseconds(state.end), nanoseconds(first - 1 - state.end));
     if (reception.lost > 0) gst_event_set_gap_flags(gap, GST_GAP_FLAG_MISSING_DATA);
-    gst_pad_push_event(priv.src, gap);
+    gst_pad_push_event(self.src, gap);
     state.end = first - 1;
   }
-  GstBuffer* const buffer = buffer_of(state.events, state.end, state.events.back().t);
+  std::vector<Event> events;
+  events.reserve(state.events.size());
+  for (const auto& event : state.events)
+    events.push_back({static_cast<std::uint32_t>(event.t - state.end), event.x, event.y_p});
+  const EventInterval interval{nanoseconds(state.end), nanoseconds(state.events.back().t)};
   state.end = state.events.back().t;
-  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
-                 state.events.size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)),
-                 GST_TIME_ARGS(GST_BUFFER_DURATION(buffer)));
-  state.segment.extend_to(nanoseconds(state.end));
-  if (std::exchange(state.is_discontinuous, false))
-    GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
-  return gst_pad_push(priv.src, buffer);
+  GST_LOG_OBJECT(
+      self.element, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
+      events.size(), GST_TIME_ARGS(interval.start), GST_TIME_ARGS(interval.end - interval.start));
+  state.segment.extend_to(interval.end);
+  GstBuffer* const buffer = copied_buffer(std::as_bytes(std::span(events)));
+  stamp(buffer, interval, state.is_discontinuous);
+  return gst_pad_push(self.src, buffer);
 }
 
-/* data */
-
-static void reject(GstEventDatagramDepay* self, const char* fault, gsize size,
-                   GstClockTime arrival) {
+static void reject(Private& self, const char* fault, gsize size, GstClockTime arrival) {
   gchar* cause = g_strdup_printf("%" G_GSIZE_FORMAT " bytes at running time %" GST_TIME_FORMAT,
                                  size, GST_TIME_ARGS(arrival));
-  self->priv->stream->warn_of_rejected(
-      self,
+  self.stream->warn_of_rejected(
+      self.element,
       {GST_STREAM_ERROR_DECODE, std::string("Rejected a datagram: ") + fault +
                                     ". Set format, width and height to match the sender; stats "
                                     "counts the rejected datagrams."},
@@ -234,13 +194,13 @@ static void reject(GstEventDatagramDepay* self, const char* fault, gsize size,
 }
 
 /// Counts a datagram of another sender, whose clock and sensor differ.
-static void reject_second_sender(GstEventDatagramDepay* self, GstClockTime arrival) {
-  ++self->priv->counts.lock()->rejected;
+static void reject_second_sender(Private& self, GstClockTime arrival) {
+  ++self.counts.lock()->rejected;
   gchar* cause =
       g_strdup_printf("a datagram at running time %" GST_TIME_FORMAT " is from another address",
                       GST_TIME_ARGS(arrival));
-  self->priv->stream->warn_of_second_sender(
-      self,
+  self.stream->warn_of_second_sender(
+      self.element,
       {GST_RESOURCE_ERROR_BUSY,
        "Rejected the datagrams of a second sender, until the first is silent for a second; stats "
        "counts them. Give each sender its own port."},
@@ -248,26 +208,16 @@ static void reject_second_sender(GstEventDatagramDepay* self, GstClockTime arriv
   g_free(cause);
 }
 
-static void log_late(GstEventDatagramDepay* self, GstClockTime arrival) {
-  const auto level = self->priv->stream->late_level.next();
-  GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self,
-                    "dropped the datagram of running time %" GST_TIME_FORMAT
-                    ": later events arrived before it",
-                    GST_TIME_ARGS(arrival));
-}
-
-/// Receives a datagram with these bytes.
-static GstFlowReturn receive(GstEventDatagramDepay* self, GstBuffer* datagram,
+static GstFlowReturn receive(Private& self, GstBuffer* datagram,
                              std::span<const std::uint8_t> bytes, GstClockTime arrival) {
-  auto& priv = *self->priv;
-  auto& state = *priv.stream->state;
-  priv.reports.packet_arrived();
+  auto& state = *self.stream->state;
+  self.reports.packet_arrived();
   std::optional<Microseconds> time;
-  if (GST_CLOCK_TIME_IS_VALID(arrival)) time = static_cast<Microseconds>(arrival / GST_USECOND);
+  if (GST_CLOCK_TIME_IS_VALID(arrival)) time = microseconds(arrival);
   const auto reception = state.unpacker->unpack(bytes, time, state.events);
   const bool accepted = reception.fault == nullptr && !reception.late;
   {
-    const auto counts = priv.counts.lock();
+    const auto counts = self.counts.lock();
     counts->packets += accepted ? 1 : 0;
     counts->events += state.events.size();
     counts->bytes += accepted ? bytes.size() : 0;
@@ -279,33 +229,34 @@ static GstFlowReturn receive(GstEventDatagramDepay* self, GstBuffer* datagram,
     reject(self, reception.fault, bytes.size(), arrival);
   else
     state.sender.follow(datagram, arrival);
-  if (reception.late) log_late(self, arrival);
+  if (reception.late)
+    GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, self.stream->late_level.next(), self.element,
+                      "dropped the datagram of running time %" GST_TIME_FORMAT
+                      ": later events arrived before it",
+                      GST_TIME_ARGS(arrival));
   if (reception.lost > 0) {
-    GST_DEBUG_OBJECT(self,
+    GST_DEBUG_OBJECT(self.element,
                      "lost %" G_GUINT64_FORMAT
                      " datagrams before the one of running time %" GST_TIME_FORMAT,
                      guint64{reception.lost}, GST_TIME_ARGS(arrival));
-    priv.reports.packets_lost(GST_ELEMENT(self), reception.lost);
+    self.reports.packets_lost(self.element, reception.lost);
   }
   // A datagram without events, such as one with jAER's frame samples, may reveal a loss, too.
   state.is_discontinuous |= GST_BUFFER_IS_DISCONT(datagram) || reception.lost > 0;
   return state.events.empty() ? GST_FLOW_OK : push(self, reception, arrival);
 }
 
-/// Running time at which a datagram arrived, if its buffer has a PTS.
-static GstClockTime arrival_of(const State& state, GstBuffer* buffer) {
-  if (state.upstream.format != GST_FORMAT_TIME) return GST_CLOCK_TIME_NONE;
-  return gst_segment_to_running_time(&state.upstream, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
-}
-
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
-  auto* self = GST_EVENT_DATAGRAM_DEPAY(parent);
+  auto& self = priv_of(parent);
   OwnedBuffer buffer(received);
-  auto& state = self->priv->stream->state;
+  auto& state = self.stream->state;
   if (!state) return GST_FLOW_FLUSHING;
-  const auto arrival = arrival_of(*state, received);
+  const auto arrival = state->upstream.format != GST_FORMAT_TIME
+                           ? GST_CLOCK_TIME_NONE
+                           : gst_segment_to_running_time(&state->upstream, GST_FORMAT_TIME,
+                                                         GST_BUFFER_PTS(received));
   if (!GST_CLOCK_TIME_IS_VALID(arrival) && state->settings.format == DatagramFormat::spif) {
-    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
+    GST_ELEMENT_ERROR(self.element, STREAM, FORMAT,
                       ("SPIF events have no timestamps, and their datagrams no arrival time. Set "
                        "do-timestamp=true on the source, or format=spif-timestamps."),
                       ("a buffer has no PTS in a segment of times"));
@@ -315,35 +266,35 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
     reject_second_sender(self, arrival);
     return GST_FLOW_OK;
   }
-  const MappedBytes bytes(GST_ELEMENT(self), std::move(buffer));
+  const MappedBytes bytes(self.element, std::move(buffer));
   if (!bytes.is_mapped()) return GST_FLOW_ERROR;
   return catch_exceptions(
-      self, Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."},
+      self.element,
+      Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."},
       [&] { return receive(self, received, bytes.get(), arrival); });
 }
 
 /// Starts a new stream with the next datagram.
-static bool start_stream(GstEventDatagramDepay* self, const DatagramSettings& settings) {
-  GST_DEBUG_OBJECT(self, "expecting datagrams of %dx%d pixels of format %s", settings.width,
+static bool start_stream(Private& self, const DatagramSettings& settings) {
+  GST_DEBUG_OBJECT(self.element, "expecting datagrams of %dx%d pixels of format %s", settings.width,
                    settings.height, name_of(settings.format));
   const auto report = [](const std::exception& error) {
     return Report{GST_RESOURCE_ERROR_SETTINGS,
                   std::string("Cannot receive events of this sensor in this format: ") +
                       error.what() + ". Select another format, or correct width and height."};
   };
-  return catch_exceptions(self, report, [&] {
-    auto unpacker = make_datagram_unpacker(settings);
-    auto& state = self->priv->stream->state;
-    state.emplace(State{.settings = settings, .unpacker = std::move(unpacker)});
+  return catch_exceptions(self.element, report, [&] {
+    self.stream->state.emplace(
+        State{.settings = settings, .unpacker = make_datagram_unpacker(settings)});
   });
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
-  auto* self = GST_EVENT_DATAGRAM_DEPAY(parent);
-  auto& state = self->priv->stream->state;
+  auto& self = priv_of(parent);
+  auto& state = self.stream->state;
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_SEGMENT:
-      if (!plays_forwards(self, event, "receive")) return FALSE;
+      if (!plays_forwards(self.element, event, "receive")) return FALSE;
       if (state) {
         gst_event_copy_segment(event, &state->upstream);
         state->segment_seqnum = gst_event_get_seqnum(event);
@@ -356,10 +307,10 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       gst_event_unref(event);
       return TRUE;
     case GST_EVENT_EOS:
-      GST_DEBUG_OBJECT(self, "the stream ends");
+      GST_DEBUG_OBJECT(self.element, "the stream ends");
       break;
     case GST_EVENT_FLUSH_STOP:
-      GST_DEBUG_OBJECT(self, "flushed: the next datagram begins a stream");
+      GST_DEBUG_OBJECT(self.element, "flushed: the next datagram begins a stream");
       if (state) start_stream(self, state->settings);
       break;
     default:
@@ -368,20 +319,11 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   return gst_pad_event_default(pad, parent, event);
 }
 
-static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
-  auto& priv = *GST_EVENT_DATAGRAM_DEPAY(parent)->priv;
-  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(GST_CAT_DEFAULT, priv.sink, query, priv.settings.copy().latency);
-  return gst_pad_query_default(pad, parent, query);
-}
-
-/* states */
-
-static bool start(GstEventDatagramDepay* self) {
-  const auto settings = self->priv->settings.copy();
-  *self->priv->counts.lock() = {};
+static bool start(Private& self) {
+  const auto settings = self.settings.copy();
+  *self.counts.lock() = {};
   if (settings.width > 0 && settings.height > 0) return start_stream(self, settings);
-  GST_ELEMENT_ERROR(self, RESOURCE, SETTINGS,
+  GST_ELEMENT_ERROR(self.element, RESOURCE, SETTINGS,
                     ("Cannot receive events: their datagrams do not contain the sensor size. Set "
                      "width and height to match the sender."),
                     ("width=%d height=%d", settings.width, settings.height));
@@ -389,29 +331,27 @@ static bool start(GstEventDatagramDepay* self) {
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
-  auto* self = GST_EVENT_DATAGRAM_DEPAY(element);
+  auto& self = priv_of(element);
   if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !start(self))
     return GST_STATE_CHANGE_FAILURE;
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_datagram_depay_parent_class)->change_state(element, transition);
-  self->priv->reports.follow(transition, self->priv->sink);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    self->priv->stream.reset();
-  }
+  self.reports.follow(transition, self.sink);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) self.stream.reset();
   return result;
 }
 
-/* type */
-
 static void gst_event_datagram_depay_init(GstEventDatagramDepay* self) {
-  self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));
+  self->priv = new Private(GST_ELEMENT(self), chain, sink_event);
+  answer_latency_queries<[](gpointer element) { return priv_of(element).settings.copy().latency; }>(
+      self->priv->src);
 }
 
 static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
 
-  Properties<settings_of> properties(object_class);
+  Properties<field_of<&Private::settings>> properties(object_class);
   add_datagram_properties(properties);
   properties.add_fixed(&DatagramSettings::width, "width",
                        "Width of the sender's sensor (pixels); required", 0, max_side);
@@ -424,12 +364,14 @@ static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klas
   install_stats(
       object_class,
       [](GObject* object) {
-        const DatagramCounts counts = GST_EVENT_DATAGRAM_DEPAY(object)->priv->counts.copy();
-        return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
-                                 counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",
-                                 G_TYPE_UINT64, counts.bytes, "lost-packets", G_TYPE_UINT64,
-                                 counts.lost, "late-packets", G_TYPE_UINT64, counts.late,
-                                 "rejected-packets", G_TYPE_UINT64, counts.rejected, nullptr);
+        const DatagramCounts counts = priv_of(object).counts.copy();
+        return new_counters("application/x-event-datagram-stats",
+                            {{"packets", counts.packets},
+                             {"events", counts.events},
+                             {"bytes", counts.bytes},
+                             {"lost-packets", counts.lost},
+                             {"late-packets", counts.late},
+                             {"rejected-packets", counts.rejected}});
       },
       "Counters since the start: packets, events and bytes received; lost packets, if they have a "
       "sequence number; late packets, older than earlier ones and dropped; rejected packets, "

@@ -24,26 +24,13 @@
  *
  * Since: 0.1
  */
-#include <gst/gst.h>
-
 #include <limits>
-#include <memory>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "elements/eventcam/network/flush_timer.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
 #include "src/wire/datagrams.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_pay_debug);
@@ -58,12 +45,11 @@ using namespace eventcamera;
 
 namespace {
 
-/// User-settable values.
 struct Settings : DatagramSettings, PayloaderSettings {};
 
 /// State from start to stop.
 struct Stream {
-  GstEventCameraInfo info{};
+  SensorSize sensor;
   std::unique_ptr<DatagramPacker> packer;
   std::vector<AbsoluteEvent> events;   ///< of the current buffer
   std::vector<OwnedBuffer> datagrams;  ///< complete but not yet pushed
@@ -71,13 +57,11 @@ struct Stream {
   std::optional<Microseconds> timed;  ///< first event of the datagram that the timer is set for
 };
 
-struct Private {
-  explicit Private(const std::pair<GstPad*, GstPad*>& pads) : sink(pads.first), src(pads.second) {}
+struct Private : ElementPads {
+  using ElementPads::ElementPads;
 
   Guarded<Settings> settings;
   Guarded<DatagramCounts> counts;
-  GstPad* const sink;
-  GstPad* const src;
   StreamLocked<Stream> stream{sink};
   FlushTimer timer;
 };
@@ -88,12 +72,6 @@ DEFINE_EVENT_ELEMENT(GstEventDatagramPay, gst_event_datagram_pay, EVENT_DATAGRAM
                      GST_TYPE_ELEMENT, eventdatagrampay, GST_RANK_NONE,
                      "datagrams of events for other tools")
 
-static Guarded<Settings>& settings_of(GObject* object) {
-  return GST_EVENT_DATAGRAM_PAY(object)->priv->settings;
-}
-
-/* datagrams */
-
 static Report report_of(const std::exception& error) {
   if (is_a<std::invalid_argument>(error))
     return {GST_STREAM_ERROR_FORMAT,
@@ -103,169 +81,147 @@ static Report report_of(const std::exception& error) {
 }
 
 /// Keeps a datagram until push().
-static void keep(Private& priv, const Datagram& datagram) {
+static void keep(Private& self, const Datagram& datagram) {
   OwnedBuffer buffer(copied_buffer(std::as_bytes(datagram.bytes)));
-  GST_BUFFER_PTS(buffer.get()) = static_cast<GstClockTime>(datagram.first) * GST_USECOND;
-  GST_BUFFER_DURATION(buffer.get()) =
-      static_cast<GstClockTime>(datagram.last - datagram.first) * GST_USECOND;
-  priv.stream->datagrams.push_back(std::move(buffer));
-  {
-    const auto counts = priv.counts.lock();
-    ++counts->packets;
-    counts->events += datagram.events;
-    counts->bytes += datagram.bytes.size();
-  }
+  GST_BUFFER_PTS(buffer.get()) = nanoseconds(datagram.first);
+  GST_BUFFER_DURATION(buffer.get()) = nanoseconds(datagram.last - datagram.first);
+  self.stream->datagrams.push_back(std::move(buffer));
+  const auto counts = self.counts.lock();
+  ++counts->packets;
+  counts->events += datagram.events;
+  counts->bytes += datagram.bytes.size();
 }
 
 /// Pushes the kept datagrams as a list, which udpsink sends with one system call.
-static GstFlowReturn push(Private& priv) {
-  if (priv.stream->datagrams.empty()) return GST_FLOW_OK;
-  GST_LOG_OBJECT(priv.src, "%" G_GSIZE_FORMAT " datagrams, the first at %" GST_TIME_FORMAT,
-                 priv.stream->datagrams.size(),
-                 GST_TIME_ARGS(GST_BUFFER_PTS(priv.stream->datagrams.front().get())));
+static GstFlowReturn push(Private& self) {
+  if (self.stream->datagrams.empty()) return GST_FLOW_OK;
+  GST_LOG_OBJECT(self.src, "%" G_GSIZE_FORMAT " datagrams, the first at %" GST_TIME_FORMAT,
+                 self.stream->datagrams.size(),
+                 GST_TIME_ARGS(GST_BUFFER_PTS(self.stream->datagrams.front().get())));
   GstBufferList* const list =
-      gst_buffer_list_new_sized(static_cast<guint>(priv.stream->datagrams.size()));
-  for (auto& datagram : priv.stream->datagrams) gst_buffer_list_add(list, datagram.release());
-  priv.stream->datagrams.clear();
-  return gst_pad_push_list(priv.src, list);
+      gst_buffer_list_new_sized(static_cast<guint>(self.stream->datagrams.size()));
+  for (auto& datagram : self.stream->datagrams) gst_buffer_list_add(list, datagram.release());
+  self.stream->datagrams.clear();
+  return gst_pad_push_list(self.src, list);
 }
 
 static void flush_late(GstObject* element);
 
 /// Limits the time that a new incomplete datagram waits.
-static void set_timer(Private& priv) {
-  const auto since = priv.stream->packer ? priv.stream->packer->waiting_since() : std::nullopt;
-  if (since == priv.stream->timed) return;
-  priv.stream->timed = since;
+static void set_timer(Private& self) {
+  const auto since = self.stream->packer ? self.stream->packer->waiting_since() : std::nullopt;
+  if (since == self.stream->timed) return;
+  self.stream->timed = since;
   if (since)
-    priv.timer.set(priv.settings.copy().max_latency, priv.sink, flush_late);
+    self.timer.set(self.settings.copy().max_latency, self.sink, flush_late);
   else
-    priv.timer.cancel();
+    self.timer.cancel();
 }
 
 /// Runs `work`, which packs events, and pushes the datagrams that they complete.
 template <class Work>
-static GstFlowReturn pack(GstEventDatagramPay* self, const Work& work) {
-  auto& priv = *self->priv;
-  const bool packed = catch_exceptions(self, report_of, [&] {
-    if (priv.stream->packer)
-      work(*priv.stream->packer, [&](const Datagram& datagram) { keep(priv, datagram); });
-    set_timer(priv);
+static GstFlowReturn pack(Private& self, const Work& work) {
+  const bool packed = catch_exceptions(self.element, report_of, [&] {
+    if (self.stream->packer)
+      work(*self.stream->packer, [&](const Datagram& datagram) { keep(self, datagram); });
+    set_timer(self);
   });
-  if (packed) return push(priv);
-  priv.stream->datagrams.clear();
+  if (packed) return push(self);
+  self.stream->datagrams.clear();
   return GST_FLOW_ERROR;
 }
 
-static GstFlowReturn flush(GstEventDatagramPay* self) {
+static GstFlowReturn flush(Private& self) {
   return pack(self, [](DatagramPacker& packer, const auto& send) { packer.flush(send); });
 }
 
-/// Drops the events that wait.
-static void drop(Private& priv) noexcept {
-  if (priv.stream->packer) priv.stream->packer->drop();
-  priv.stream->timed.reset();
-  priv.timer.cancel();
+static void drop(Private& self) noexcept {
+  if (self.stream->packer) self.stream->packer->drop();
+  self.stream->timed.reset();
+  self.timer.cancel();
 }
 
 /// Sends events that have waited for max-latency.
 static void flush_late(GstObject* element) {
   GST_LOG_OBJECT(element, "max-latency elapsed: sending an incomplete datagram");
-  flush(GST_EVENT_DATAGRAM_PAY(element));
+  flush(priv_of(element));
 }
 
 /// True if events would wait for too long in the incomplete datagram. `interval` is the current
 /// buffer's; the next one is expected to be as long.
-static bool is_flush_due(GstEventDatagramPay* self, const EventInterval& interval) {
-  auto& priv = *self->priv;
-  const auto since = priv.stream->packer->waiting_since();
+static bool is_flush_due(Private& self, const EventInterval& interval) {
+  const auto since = self.stream->packer->waiting_since();
   if (!since) return false;
   const auto next = interval.end + (interval.end - interval.start);
-  return next >= static_cast<GstClockTime>(*since) * GST_USECOND + priv.settings.copy().max_latency;
+  return next >= nanoseconds(*since) + self.settings.copy().max_latency;
 }
 
-/* data */
-
-/// Maximum time between two events of a datagram; not limited if each buffer is sent at once.
-static Microseconds max_span(GstClockTime max_latency) {
-  if (max_latency == 0) return std::numeric_limits<Microseconds>::max();
-  return static_cast<Microseconds>(max_latency / GST_USECOND);
-}
-
-/// Collects the events of a buffer.
-static void collect(GstEventDatagramPay* self, GstBuffer* buffer, const MappedEvents& mapped) {
-  auto& priv = *self->priv;
-  GST_LOG_OBJECT(priv.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+static void collect(Private& self, GstBuffer* buffer, const MappedEvents& mapped) {
+  GST_LOG_OBJECT(self.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                  mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
-  const auto stream = priv.stream.lock();
+  const auto stream = self.stream.lock();
   stream->events.clear();
-  for (const auto& event : mapped.events()) {
-    if (event.x < stream->info.width && event.y() < stream->info.height)
+  for (const auto& event : mapped.events())
+    if (event.x < stream->sensor.width && event.y() < stream->sensor.height)
       stream->events.push_back({mapped.start() + event.t, event.x, event.y_p});
-  }
   if (stream->events.size() < mapped.events().size())
-    stream->faults.warn(self, EventFault::beyond_sensor, buffer);
+    stream->faults.warn(self.element, EventFault::beyond_sensor, buffer);
 }
 
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
-  auto* self = GST_EVENT_DATAGRAM_PAY(parent);
-  auto& priv = *self->priv;
+  auto& self = priv_of(parent);
   const OwnedBuffer buffer(received);
-  if (!priv.stream->packer) return GST_FLOW_NOT_NEGOTIATED;
+  if (!self.stream->packer) return GST_FLOW_NOT_NEGOTIATED;
   const MappedEvents mapped(received);
   if (!mapped) {
-    priv.stream->faults.warn(self, event_fault(received), received);
+    self.stream->faults.warn(self.element, event_fault(received), received);
     return GST_FLOW_OK;
   }
   return pack(self, [&](DatagramPacker& packer, const auto& send) {
     collect(self, received, mapped);
-    packer.set_max_span(max_span(priv.settings.copy().max_latency));
-    packer.pack(priv.stream->events, send);
+    const auto max_latency = self.settings.copy().max_latency;  // 0: each buffer is sent at once
+    packer.set_max_span(max_latency == 0 ? std::numeric_limits<Microseconds>::max()
+                                         : microseconds(max_latency));
+    packer.pack(self.stream->events, send);
     if (is_flush_due(self, mapped.interval())) packer.flush(send);
   });
 }
 
-static void handle_gap(GstEventDatagramPay* self, GstEvent* event) {
+static void handle_gap(Private& self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
-  if (!self->priv->stream->packer) return;
+  if (!self.stream->packer) return;
   if (!GST_CLOCK_TIME_IS_VALID(duration) || start > G_MAXINT64 || duration > G_MAXINT64 / 2 ||
       is_flush_due(self, {start, start + duration}))
     flush(self);
 }
 
-static gboolean handle_caps(GstEventDatagramPay* self, GstEvent* event) {
-  auto& priv = *self->priv;
-  GstCaps* caps = nullptr;
-  gst_event_parse_caps(event, &caps);
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
-  if (priv.stream->packer && priv.stream->info.width == info.width &&
-      priv.stream->info.height == info.height)
-    return TRUE;
+static gboolean handle_caps(Private& self, const GstCaps* caps) {
+  const auto sensor = sensor_of(caps);
+  if (!sensor) return FALSE;
+  if (self.stream->packer && self.stream->sensor == *sensor) return TRUE;
   flush(self);
-  Settings settings = priv.settings.copy();
-  settings.width = info.width;
-  settings.height = info.height;
-  if (!catch_exceptions(self, report_of,
-                        [&] { priv.stream->packer = make_datagram_packer(settings); }))
+  Settings settings = self.settings.copy();
+  settings.width = sensor->width;
+  settings.height = sensor->height;
+  if (!catch_exceptions(self.element, report_of,
+                        [&] { self.stream->packer = make_datagram_packer(settings); }))
     return FALSE;
-  priv.stream->info = info;
+  self.stream->sensor = *sensor;
   const OwnedCaps out(gst_caps_new_simple("application/x-event-datagram", "format", G_TYPE_STRING,
                                           name_of(settings.format), nullptr));
-  GST_DEBUG_OBJECT(self, "sending the events of %dx%d pixels as %" GST_PTR_FORMAT, info.width,
-                   info.height, out.get());
-  return gst_pad_push_event(priv.src, gst_event_new_caps(out.get()));
+  GST_DEBUG_OBJECT(self.element, "sending the events of %dx%d pixels as %" GST_PTR_FORMAT,
+                   sensor->width, sensor->height, out.get());
+  return gst_pad_push_event(self.src, gst_event_new_caps(out.get()));
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
-  auto* self = GST_EVENT_DATAGRAM_PAY(parent);
+  auto& self = priv_of(parent);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CAPS: {
-      const gboolean handled = handle_caps(self, event);
-      gst_event_unref(event);
-      return handled;
+      const OwnedEvent owned(event);
+      return handle_caps(self, caps_of(event));
     }
     case GST_EVENT_GAP:
       handle_gap(self, event);
@@ -275,12 +231,12 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
     case GST_EVENT_EOS:
       GST_DEBUG_OBJECT(pad, "sending the waiting events before %s", GST_EVENT_TYPE_NAME(event));
       flush(self);
-      if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_events(self, event, "send"))
+      if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_events(self.element, event, "send"))
         return FALSE;
       break;
     case GST_EVENT_FLUSH_STOP:
       GST_DEBUG_OBJECT(pad, "flushed: dropping events that wait");
-      drop(*self->priv);
+      drop(self);
       break;
     default:
       break;
@@ -288,48 +244,42 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   return gst_pad_event_default(pad, parent, event);
 }
 
-static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
-  auto& priv = *GST_EVENT_DATAGRAM_PAY(parent)->priv;
-  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(GST_CAT_DEFAULT, priv.sink, query, priv.settings.copy().max_latency);
-  return gst_pad_query_default(pad, parent, query);
+static GstClockTime latency_of(gpointer element) {
+  return priv_of(element).settings.copy().max_latency;
 }
 
-/* states */
-
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
-  auto& priv = *GST_EVENT_DATAGRAM_PAY(element)->priv;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *priv.counts.lock() = {};
+  auto& self = priv_of(element);
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *self.counts.lock() = {};
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_datagram_pay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    priv.timer.stop();
-    priv.stream.reset();
+    self.timer.stop();
+    self.stream.reset();
   }
   return result;
 }
 
-/* type */
-
 static void gst_event_datagram_pay_init(GstEventDatagramPay* self) {
-  self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));
-  announce_latency(GST_CAT_DEFAULT, self, "max-latency");
+  self->priv = new Private(GST_ELEMENT(self), chain, sink_event);
+  answer_latency_queries<latency_of>(self->priv->src);
+  announce_max_latency(self);
 }
 
 static void gst_event_datagram_pay_class_init(GstEventDatagramPayClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
 
-  Properties<settings_of> properties(object_class);
+  Properties<field_of<&Private::settings>> properties(object_class);
   add_datagram_properties(properties);
   add_max_latency(properties);
   install_stats(
       object_class,
       [](GObject* object) {
-        const DatagramCounts counts = GST_EVENT_DATAGRAM_PAY(object)->priv->counts.copy();
-        return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
-                                 counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",
-                                 G_TYPE_UINT64, counts.bytes, nullptr);
+        const DatagramCounts counts = priv_of(object).counts.copy();
+        return new_counters(
+            "application/x-event-datagram-stats",
+            {{"packets", counts.packets}, {"events", counts.events}, {"bytes", counts.bytes}});
       },
       "Counters since the start: packets, events and bytes packed");
 

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <optional>
 #include <thread>
 
-#include "gst/base/properties.hpp"
+#include "gst/base/element.hpp"
 
 /// Settings of payloaders, which hold events to fill packets.
 struct PayloaderSettings {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <atomic>
 
 #include "elements/eventcam/network/flush_timer.hpp"
@@ -30,7 +28,6 @@ class ReceptionReports {
     }
   }
 
-  /// Call for each packet.
   void packet_arrived() {
     if (!is_heard_.exchange(true)) timer_.cancel();
   }

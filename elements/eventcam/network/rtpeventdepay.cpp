@@ -45,25 +45,14 @@
 #include <gst/rtp/gstrtpbuffer.h>
 
 #include <charconv>
-#include <exception>
-#include <optional>
-#include <string>
 #include <string_view>
-#include <utility>
 
 #include "elements/eventcam/network/reception_reports.hpp"
 #include "elements/eventcam/network/rtp_events.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "src/core/sensor_size.hpp"
 #include "src/wire/rtp_unpacker.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(rtp_event_depay_debug);
@@ -105,9 +94,10 @@ struct Stream {
 };
 
 struct Private {
-  explicit Private(GstRTPBaseDepayload* element)
-      : stream(GST_RTP_BASE_DEPAYLOAD_SINKPAD(element)) {}
+  explicit Private(GstRTPBaseDepayload* of)
+      : element(of), stream(GST_RTP_BASE_DEPAYLOAD_SINKPAD(of)) {}
 
+  GstRTPBaseDepayload* const element;
   StreamLocked<Stream> stream;
   Guarded<RtpStatistics> statistics;
   ReceptionReports reports;
@@ -120,83 +110,51 @@ DEFINE_EVENT_ELEMENT(GstRtpEventDepay, gst_rtp_event_depay, RTP_EVENT_DEPAY, Gst
                      "RTP depayloader of events")
 #define PARENT_DEPAYLOAD_CLASS GST_RTP_BASE_DEPAYLOAD_CLASS(gst_rtp_event_depay_parent_class)
 
-/* output */
-
 /// Maps the sender's time `start` to the running time of its packet, unless the segment already
 /// does.
-static void update_segment(GstRtpEventDepay* self, GstClockTime start, GstClockTime arrival) {
-  const GstSegment& in = GST_RTP_BASE_DEPAYLOAD(self)->segment;
+static void update_segment(Private& self, GstClockTime start, GstClockTime arrival) {
+  const GstSegment& in = self.element->segment;
   if (in.format != GST_FORMAT_TIME) arrival = GST_CLOCK_TIME_NONE;
   const guint64 running = gst_segment_to_running_time(&in, in.format, arrival);
-  auto& segment = self->priv->stream->state->segment;
+  auto& segment = self.stream->state->segment;
   if (segment.continues(start, running)) return;
-  GST_DEBUG_OBJECT(self,
+  GST_DEBUG_OBJECT(self.element,
                    "the sender's %" GST_TIME_FORMAT " arrives at running time %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(start), GST_TIME_ARGS(running));
-  segment.begin(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), self->priv->stream->segment_seqnum, start,
+  segment.begin(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self.element), self.stream->segment_seqnum, start,
                 running, gst_segment_to_stream_time(&in, in.format, arrival));
 }
 
-static Report no_memory(const std::exception&) {
-  return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
-}
+static const Report no_memory{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+                              "Not enough memory to receive events."};
 
-static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
+static void push(Private& self, const RtpInterval& interval) {
   const auto start = static_cast<GstClockTime>(interval.start);
   const auto duration = static_cast<GstClockTime>(interval.duration);
   update_segment(self, start, interval.arrival);
-  auto& state = *self->priv->stream->state;
+  auto& state = *self.stream->state;
   state.segment.extend_to(start + duration);
   state.is_discontinuous |= interval.is_discontinuous;
-  GST_LOG_OBJECT(self,
+  GST_LOG_OBJECT(self.element,
                  "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT "%s",
                  interval.events.size(), GST_TIME_ARGS(start), GST_TIME_ARGS(duration),
                  interval.is_discontinuous ? ", after a loss" : "");
   if (interval.events.empty()) {
-    gst_pad_push_event(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), gst_event_new_gap(start, duration));
+    gst_pad_push_event(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self.element),
+                       gst_event_new_gap(start, duration));
     return;
   }
   GstBuffer* buffer = copied_buffer(std::as_bytes(interval.events));
-  GST_BUFFER_PTS(buffer) = start;
+  stamp(buffer, {start, start + duration}, state.is_discontinuous);
   GST_BUFFER_DTS(buffer) = start;  // else the base class sets the packet's, in receiver time
-  GST_BUFFER_DURATION(buffer) = duration;
-  if (std::exchange(state.is_discontinuous, false))
-    GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
-  gst_rtp_base_depayload_push(GST_RTP_BASE_DEPAYLOAD(self), buffer);
+  gst_rtp_base_depayload_push(self.element, buffer);
 }
 
-static void flush(GstRtpEventDepay* self) {
-  catch_exceptions(self, no_memory, [&] {
-    if (auto& state = self->priv->stream->state)
+static void flush(Private& self) {
+  catch_exceptions(self.element, no_memory, [&] {
+    if (auto& state = self.stream->state)
       state->unpacker.flush([&](const RtpInterval& interval) { push(self, interval); });
   });
-}
-
-/* input */
-
-static void warn_of_rejected(GstRtpEventDepay* self, guint number) {
-  self->priv->stream->warn_of_rejected(
-      self,
-      {GST_STREAM_ERROR_DECODE,
-       "Rejected a packet: it is corrupt, or of another sensor or format. Set width, height and "
-       "format in the caps to match the sender; stats counts the rejected packets."},
-      "packet number " + std::to_string(number));
-}
-
-static void warn_of_second_sender(GstRtpEventDepay* self, guint number) {
-  self->priv->stream->warn_of_second_sender(
-      self,
-      {GST_RESOURCE_ERROR_BUSY,
-       "Rejected the packets of a second sender; stats counts them. Let each sender use a port of "
-       "its own, or separate them by rtpssrcdemux or rtpbin."},
-      "packet number " + std::to_string(number) + " has an SSRC beside the current one");
-}
-
-static void log_late(GstRtpEventDepay* self, guint number) {
-  const auto level = self->priv->stream->late_level.next();
-  GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self,
-                    "dropped packet number %u: later ones arrived before it, or it came twice",
-                    number);
 }
 
 static RtpPacket packet_of(GstRTPBuffer* rtp) {
@@ -211,27 +169,40 @@ static RtpPacket packet_of(GstRTPBuffer* rtp) {
 }
 
 /// Publishes the statistics after packet `number`, and logs how it changed them.
-static void update_statistics(GstRtpEventDepay* self, guint number) {
-  auto& priv = *self->priv;
-  const auto& counted = priv.stream->state->unpacker.statistics();
-  const auto before = std::exchange(*priv.statistics.lock(), counted);
+static void update_statistics(Private& self, guint number) {
+  const auto& counted = self.stream->state->unpacker.statistics();
+  const auto before = std::exchange(*self.statistics.lock(), counted);
   if (const guint64 lost = counted.lost_packets - before.lost_packets; lost > 0) {
-    GST_DEBUG_OBJECT(self, "lost %" G_GUINT64_FORMAT " packets before number %u", lost, number);
-    priv.reports.packets_lost(GST_ELEMENT(self), lost);
+    GST_DEBUG_OBJECT(self.element, "lost %" G_GUINT64_FORMAT " packets before number %u", lost,
+                     number);
+    self.reports.packets_lost(GST_ELEMENT(self.element), lost);
   }
   if (counted.second_sender_packets > before.second_sender_packets)
-    warn_of_second_sender(self, number);
+    self.stream->warn_of_second_sender(
+        self.element,
+        {GST_RESOURCE_ERROR_BUSY,
+         "Rejected the packets of a second sender; stats counts them. Let each sender use a port "
+         "of its own, or separate them by rtpssrcdemux or rtpbin."},
+        "packet number " + std::to_string(number) + " has an SSRC beside the current one");
   else if (counted.rejected_packets > before.rejected_packets)
-    warn_of_rejected(self, number);
-  if (counted.late_packets > before.late_packets) log_late(self, number);
+    self.stream->warn_of_rejected(
+        self.element,
+        {GST_STREAM_ERROR_DECODE,
+         "Rejected a packet: it is corrupt, or of another sensor or format. Set width, height and "
+         "format in the caps to match the sender; stats counts the rejected packets."},
+        "packet number " + std::to_string(number));
+  if (counted.late_packets > before.late_packets)
+    GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, self.stream->late_level.next(), self.element,
+                      "dropped packet number %u: later ones arrived before it, or it came twice",
+                      number);
 }
 
 static GstBuffer* process_packet(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
-  auto* self = GST_RTP_EVENT_DEPAY(depayload);
+  auto& self = priv_of(depayload);
   const auto packet = packet_of(rtp);
-  self->priv->reports.packet_arrived();
-  auto& unpacker = self->priv->stream->state->unpacker;
-  catch_exceptions(self, no_memory, [&] {
+  self.reports.packet_arrived();
+  auto& unpacker = self.stream->state->unpacker;
+  catch_exceptions(self.element, no_memory, [&] {
     unpacker.push(packet, [&](const RtpInterval& interval) { push(self, interval); });
   });
   update_statistics(self, packet.sequence_number);
@@ -239,27 +210,27 @@ static GstBuffer* process_packet(GstRTPBaseDepayload* depayload, GstRTPBuffer* r
 }
 
 static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
-  auto* self = GST_RTP_EVENT_DEPAY(depayload);
-  auto& state = self->priv->stream->state;
+  auto& self = priv_of(depayload);
+  auto& state = self.stream->state;
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_GAP:  // its times are not the sender's
       gst_event_unref(event);
       return TRUE;
     case GST_EVENT_FLUSH_STOP:
-      GST_DEBUG_OBJECT(self, "flushed: the next packet begins a stream");
+      GST_DEBUG_OBJECT(self.element, "flushed: the next packet begins a stream");
       if (state) {
         state->unpacker.reset();
         state->segment.reset();
       }
       break;
     case GST_EVENT_EOS:
-      GST_DEBUG_OBJECT(self, "the stream ends");
+      GST_DEBUG_OBJECT(self.element, "the stream ends");
       flush(self);
       break;
     case GST_EVENT_SEGMENT:
       flush(self);
-      if (!plays_forwards(self, event, "receive")) return FALSE;
-      self->priv->stream->segment_seqnum = gst_event_get_seqnum(event);
+      if (!plays_forwards(self.element, event, "receive")) return FALSE;
+      self.stream->segment_seqnum = gst_event_get_seqnum(event);
       break;
     default:
       break;
@@ -274,8 +245,6 @@ static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
 static gboolean packet_lost(GstRTPBaseDepayload*, GstEvent*) {
   return TRUE;
 }
-
-/* negotiation, states */
 
 /// Value of a parameter, an integer or a string from SDP, within 1 ... max_side.
 static std::optional<int> side_of(const GstStructure* caps, const char* name) {
@@ -298,14 +267,9 @@ static std::optional<RtpEventFormat> format_of(const GstStructure* caps) {
   return std::nullopt;
 }
 
-static bool send_caps(GstRtpEventDepay* self, SensorSize sensor) {
-  const OwnedCaps caps = event_caps(sensor.width, sensor.height);
-  return gst_pad_set_caps(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), caps.get()) != FALSE;
-}
-
 static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
-  auto* self = GST_RTP_EVENT_DEPAY(depayload);
-  auto& state = self->priv->stream->state;
+  auto& self = priv_of(depayload);
+  auto& state = self.stream->state;
   depayload->clock_rate = rtp_clock_rate;
   const auto* structure = gst_caps_get_structure(caps, 0);
   const auto width = side_of(structure, "width");
@@ -313,7 +277,7 @@ static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
   const auto format = format_of(structure);
   if (!width || !height || !format) {
     gchar* cause = gst_caps_to_string(caps);
-    post_message(self, GST_MESSAGE_ERROR,
+    post_message(self.element, GST_MESSAGE_ERROR,
                  {GST_STREAM_ERROR_FORMAT,
                   "Cannot receive events without the size of the sensor, or in another format than "
                   "EVT3 and XYTP; set width, height and format in the RTP caps, for example on "
@@ -325,35 +289,31 @@ static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
   const SensorSize sensor{*width, *height};
   if (state && state->sensor == sensor && state->format == *format) return TRUE;
   flush(self);
-  GST_DEBUG_OBJECT(self, "receiving the events of %dx%d pixels as %s", sensor.width, sensor.height,
-                   rtp_event_formats[static_cast<std::size_t>(*format)]);
-  const auto follow = [&] {
+  GST_DEBUG_OBJECT(self.element, "receiving the events of %dx%d pixels as %s", sensor.width,
+                   sensor.height, rtp_event_formats[static_cast<std::size_t>(*format)]);
+  const bool follows = catch_exceptions(self.element, no_memory, [&] {
     if (state)
       state->change(sensor, *format);
     else
       state.emplace(sensor, *format);
-  };
-  if (!catch_exceptions(self, no_memory, follow)) return FALSE;
-  return send_caps(self, sensor);
+  });
+  if (!follows) return FALSE;
+  return gst_pad_set_caps(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self.element), event_caps(sensor).get());
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
-  auto& priv = *GST_RTP_EVENT_DEPAY(element)->priv;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *priv.statistics.lock() = {};
+  auto& self = priv_of(element);
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *self.statistics.lock() = {};
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_rtp_event_depay_parent_class)->change_state(element, transition);
-  priv.reports.follow(transition, GST_RTP_BASE_DEPAYLOAD_SINKPAD(element));
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    priv.stream.reset();
-  }
+  self.reports.follow(transition, GST_RTP_BASE_DEPAYLOAD_SINKPAD(element));
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) self.stream.reset();
   return result;
 }
 
-/* type */
-
 static GstStructure* stats_of(GObject* object) {
   GstStructure* stats = base_rtp_stats(object, GST_TYPE_RTP_BASE_DEPAYLOAD);
-  const auto counted = *GST_RTP_EVENT_DEPAY(object)->priv->statistics.lock();
+  const auto counted = *priv_of(object).statistics.lock();
   gst_structure_set(
       stats, "packets", G_TYPE_UINT64, guint64{counted.packets}, "bytes", G_TYPE_UINT64,
       guint64{counted.bytes}, "events", G_TYPE_UINT64, guint64{counted.events}, "lost-packets",

@@ -30,26 +30,12 @@
 #include <gst/rtp/gstrtpbuffer.h>
 #include <gst/rtp/gstrtphdrext.h>
 
-#include <algorithm>
-#include <memory>
-#include <optional>
-#include <string>
 #include <string_view>
 
 #include "elements/eventcam/network/flush_timer.hpp"
 #include "elements/eventcam/network/rtp_events.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
-#include "gst/base/guarded.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
-#include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/sensor_events.hpp"
 #include "src/wire/rtp_packer.hpp"
 
@@ -122,12 +108,10 @@ class RtpHeaderExtensions {
   gsize size_ = 0;
 };
 
-/// User-settable values.
 struct Settings : PayloaderSettings {
   RtpEventFormat format = RtpEventFormat::evt3;
 };
 
-/// Stream of one sensor.
 struct State {
   State(SensorSize size, RtpEventFormat events_format, std::uint32_t first_event)
       : sensor(size), format(events_format), packer(size, format, first_event), pending(size) {}
@@ -155,8 +139,9 @@ struct Stream {
 };
 
 struct Private {
-  explicit Private(GstRTPBasePayload* element) : stream(GST_RTP_BASE_PAYLOAD_SINKPAD(element)) {}
+  explicit Private(GstRTPBasePayload* of) : element(of), stream(GST_RTP_BASE_PAYLOAD_SINKPAD(of)) {}
 
+  GstRTPBasePayload* const element;
   Guarded<Settings> settings;
   Guarded<Sent> sent;
   StreamLocked<Stream> stream;
@@ -170,29 +155,22 @@ DEFINE_EVENT_ELEMENT(GstRtpEventPay, gst_rtp_event_pay, RTP_EVENT_PAY, GstRTPBas
                      "RTP payloader of events")
 #define PARENT_PAYLOAD_CLASS GST_RTP_BASE_PAYLOAD_CLASS(gst_rtp_event_pay_parent_class)
 
-static Guarded<Settings>& settings_of(GObject* object) {
-  return GST_RTP_EVENT_PAY(object)->priv->settings;
-}
-
-/* packets */
-
 /// Maximum size of the RTP header, with the CSRCs and header extensions that the base class writes.
-static gsize max_header_size(GstRtpEventPay* self) {
-  const OwnedCaps caps(gst_pad_get_current_caps(GST_RTP_BASE_PAYLOAD_SRCPAD(self)));
-  return gst_rtp_buffer_calc_header_len(self->priv->stream->csrc_count) +
-         (caps ? self->priv->stream->extensions.max_size(caps) : 0);
+static gsize max_header_size(Private& self) {
+  const OwnedCaps caps(gst_pad_get_current_caps(GST_RTP_BASE_PAYLOAD_SRCPAD(self.element)));
+  return gst_rtp_buffer_calc_header_len(self.stream->csrc_count) +
+         (caps ? self.stream->extensions.max_size(caps) : 0);
 }
 
-/// Maximum size of a payload.
-static gsize max_payload_size(GstRtpEventPay* self) {
+static gsize max_payload_size(Private& self) {
   const gsize header = max_header_size(self);
-  return std::max<gsize>(GST_RTP_BASE_PAYLOAD_MTU(self), header) - header;
+  return std::max<gsize>(GST_RTP_BASE_PAYLOAD_MTU(self.element), header) - header;
 }
 
-static GstBuffer* make_packet(GstRtpEventPay* self, std::span<const std::uint8_t> payload,
-                              bool is_last, GstClockTime pts) {
+static GstBuffer* make_packet(Private& self, std::span<const std::uint8_t> payload, bool is_last,
+                              GstClockTime pts) {
   GstBuffer* packet = gst_rtp_base_payload_allocate_output_buffer(
-      GST_RTP_BASE_PAYLOAD(self), static_cast<guint>(payload.size()), 0, 0);
+      self.element, static_cast<guint>(payload.size()), 0, 0);
   GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
   gst_rtp_buffer_map(packet, GST_MAP_WRITE, &rtp);
   std::ranges::copy(payload, static_cast<std::uint8_t*>(gst_rtp_buffer_get_payload(&rtp)));
@@ -202,84 +180,75 @@ static GstBuffer* make_packet(GstRtpEventPay* self, std::span<const std::uint8_t
   return packet;
 }
 
-/// Sends the pending interval.
-static void send(GstRtpEventPay* self) {
-  auto& priv = *self->priv;
-  if (!priv.stream->state || priv.stream->state->pending.empty()) return;
-  auto& pending = priv.stream->state->pending;
+static void send(Private& self) {
+  if (!self.stream->state || self.stream->state->pending.empty()) return;
+  auto& pending = self.stream->state->pending;
   Sent sent;
-  GstBufferList* list = gst_buffer_list_new();
-  try {
-    priv.stream->state->packer.pack(
-        pending.start(), pending.end() - pending.start(), pending.events(), max_payload_size(self),
-        [&](std::span<const std::uint8_t> payload, bool is_last) {
-          gst_buffer_list_add(list, make_packet(self, payload, is_last,
-                                                static_cast<GstClockTime>(pending.start())));
-          ++sent.packets;
-          sent.bytes += payload.size();
-        });
-  } catch (...) {
-    gst_buffer_list_unref(list);
-    throw;
-  }
+  std::unique_ptr<GstBufferList, Unref> list(gst_buffer_list_new());
+  self.stream->state->packer.pack(
+      pending.start(), pending.end() - pending.start(), pending.events(), max_payload_size(self),
+      [&](std::span<const std::uint8_t> payload, bool is_last) {
+        gst_buffer_list_add(list.get(), make_packet(self, payload, is_last,
+                                                    static_cast<GstClockTime>(pending.start())));
+        ++sent.packets;
+        sent.bytes += payload.size();
+      });
   sent.events = pending.events().size();
-  GST_LOG_OBJECT(self,
+  GST_LOG_OBJECT(self.element,
                  "%" G_GUINT64_FORMAT " events from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT
                  " in %" G_GUINT64_FORMAT " packets",
                  guint64{sent.events}, GST_TIME_ARGS(static_cast<GstClockTime>(pending.start())),
                  GST_TIME_ARGS(static_cast<GstClockTime>(pending.end())), guint64{sent.packets});
   pending.clear();
-  priv.timer.cancel();
+  self.timer.cancel();
   {
-    const auto total = priv.sent.lock();
+    const auto total = self.sent.lock();
     total->packets += sent.packets;
     total->bytes += sent.bytes;
     total->events += sent.events;
   }
-  const GstFlowReturn flow = gst_rtp_base_payload_push_list(GST_RTP_BASE_PAYLOAD(self), list);
-  if (priv.stream->flow == GST_FLOW_OK) priv.stream->flow = flow;
+  const GstFlowReturn flow = gst_rtp_base_payload_push_list(self.element, list.release());
+  if (self.stream->flow == GST_FLOW_OK) self.stream->flow = flow;
 }
 
 /// Runs `work`, which may throw, and returns the result of the packets that it sent.
 template <class Work>
-static GstFlowReturn reported(GstRtpEventPay* self, const Work& work) {
-  auto& priv = *self->priv;
-  priv.stream->flow = GST_FLOW_OK;
+static GstFlowReturn reported(Private& self, const Work& work) {
+  self.stream->flow = GST_FLOW_OK;
   const auto failure = [&](const std::exception& error) -> Report {
     if (is_a<std::invalid_argument>(error))
       return {GST_STREAM_ERROR_FORMAT,
-              "An RTP packet of " + std::to_string(GST_RTP_BASE_PAYLOAD_MTU(self)) +
+              "An RTP packet of " + std::to_string(GST_RTP_BASE_PAYLOAD_MTU(self.element)) +
                   " bytes has no space for events; set mtu to at least " +
                   std::to_string(RtpPacker::min_size + max_header_size(self)) + "."};
     return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to send the events."};
   };
-  if (!catch_exceptions(self, failure, work)) return GST_FLOW_ERROR;
-  return priv.stream->flow;
+  if (!catch_exceptions(self.element, failure, work)) return GST_FLOW_ERROR;
+  return self.stream->flow;
 }
 
 /// Sends events that have waited for max-latency.
 static void send_late(GstObject* element) {
-  auto* self = GST_RTP_EVENT_PAY(element);
-  GST_LOG_OBJECT(self, "max-latency elapsed: sending an incomplete packet");
+  auto& self = priv_of(element);
+  GST_LOG_OBJECT(self.element, "max-latency elapsed: sending an incomplete packet");
   reported(self, [&] { send(self); });
 }
 
 /// True if the pending events fill a packet, or cannot wait for another interval as long as the
 /// last one.
-static bool is_due(GstRtpEventPay* self, Nanoseconds last_duration) {
-  const auto& [sensor, format, packer, pending] = *self->priv->stream->state;
+static bool is_due(Private& self, Nanoseconds last_duration) {
+  const auto& [sensor, format, packer, pending] = *self.stream->state;
   const std::size_t event_size = format == RtpEventFormat::evt3 ? 4 : sizeof(Event);
   const auto waiting = static_cast<GstClockTime>(pending.end() - pending.start() + last_duration);
   return pending.events().size() * event_size >= max_payload_size(self) ||
-         waiting >= self->priv->settings.copy().max_latency;
+         waiting >= self.settings.copy().max_latency;
 }
 
 /// Adds an interval, and sends the pending events if they are due. Returns the events that cannot
 /// be sent.
-static InvalidEvents add_interval(GstRtpEventPay* self, EventInterval interval,
+static InvalidEvents add_interval(Private& self, EventInterval interval,
                                   std::span<const Event> events) {
-  auto& priv = *self->priv;
-  auto& pending = priv.stream->state->pending;
+  auto& pending = self.stream->state->pending;
   const auto start = static_cast<Nanoseconds>(interval.start);
   const auto end = static_cast<Nanoseconds>(interval.end);
   if (!pending.empty() && pending.end() != start) send(self);
@@ -288,42 +257,40 @@ static InvalidEvents add_interval(GstRtpEventPay* self, EventInterval interval,
   if (is_due(self, end - start)) {
     send(self);
   } else if (is_first) {
-    priv.timer.set(priv.settings.copy().max_latency, GST_RTP_BASE_PAYLOAD_SINKPAD(self), send_late);
+    self.timer.set(self.settings.copy().max_latency, GST_RTP_BASE_PAYLOAD_SINKPAD(self.element),
+                   send_late);
   }
   return rejected;
 }
 
-/* streaming */
-
 static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* received) {
-  auto* self = GST_RTP_EVENT_PAY(payload);
-  auto& priv = *self->priv;
+  auto& self = priv_of(payload);
   const OwnedBuffer buffer(received);
-  if (!priv.stream->state) return GST_FLOW_NOT_NEGOTIATED;
+  if (!self.stream->state) return GST_FLOW_NOT_NEGOTIATED;
   constexpr guint max_csrc_count = 15;
-  priv.stream->csrc_count = static_cast<guint8>(
+  self.stream->csrc_count = static_cast<guint8>(
       std::min(gst_rtp_base_payload_get_source_count(payload, received), max_csrc_count));
   const MappedEvents mapped(received);
   if (!mapped || mapped.interval().start > static_cast<GstClockTime>(max_rtp_start)) {
-    priv.stream->faults.warn(self, event_fault(received), received);
-    priv.sent.lock()->rejected += gst_buffer_get_size(received) / sizeof(Event);
+    self.stream->faults.warn(self.element, event_fault(received), received);
+    self.sent.lock()->rejected += gst_buffer_get_size(received) / sizeof(Event);
     return GST_FLOW_OK;
   }
-  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, mapped.events().size(),
-                 GST_TIME_ARGS(mapped.interval().start));
+  GST_LOG_OBJECT(self.element, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+                 mapped.events().size(), GST_TIME_ARGS(mapped.interval().start));
   return reported(self, [&] {
     const auto rejected = add_interval(self, mapped.interval(), mapped.events());
-    priv.sent.lock()->rejected += rejected.outside + rejected.unsorted;
-    priv.stream->faults.warn(self, rejected, received);
+    self.sent.lock()->rejected += rejected.outside + rejected.unsorted;
+    self.stream->faults.warn(self.element, rejected, received);
   });
 }
 
 /// Sends a GAP event as an interval without events; at once if its duration is unknown.
-static void handle_gap(GstRtpEventPay* self, GstEvent* event) {
+static void handle_gap(Private& self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
-  if (!self->priv->stream->state || start > static_cast<GstClockTime>(max_rtp_start)) return;
+  if (!self.stream->state || start > static_cast<GstClockTime>(max_rtp_start)) return;
   const bool is_known = GST_CLOCK_TIME_IS_VALID(duration);
   const GstClockTime end =
       is_known ? start + std::min(duration, GstClockTime{max_interval}) : start;
@@ -334,27 +301,26 @@ static void handle_gap(GstRtpEventPay* self, GstEvent* event) {
 }
 
 static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
-  auto* self = GST_RTP_EVENT_PAY(payload);
-  auto& priv = *self->priv;
+  auto& self = priv_of(payload);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_GAP:
       handle_gap(self, event);
       gst_event_unref(event);
       return TRUE;
     case GST_EVENT_FLUSH_STOP:
-      if (priv.stream->state) {
-        GST_DEBUG_OBJECT(self, "flushed: dropping %" G_GSIZE_FORMAT " events that wait",
-                         priv.stream->state->pending.events().size());
-        priv.sent.lock()->rejected += priv.stream->state->pending.events().size();
-        priv.stream->state->pending.clear();
+      if (self.stream->state) {
+        GST_DEBUG_OBJECT(self.element, "flushed: dropping %" G_GSIZE_FORMAT " events that wait",
+                         self.stream->state->pending.events().size());
+        self.sent.lock()->rejected += self.stream->state->pending.events().size();
+        self.stream->state->pending.clear();
       }
       break;
     case GST_EVENT_SEGMENT:
       reported(self, [&] { send(self); });
-      if (!plays_events(self, event, "send")) return FALSE;
+      if (!plays_events(self.element, event, "send")) return FALSE;
       break;
     case GST_EVENT_EOS:
-      GST_DEBUG_OBJECT(self, "the stream ends");
+      GST_DEBUG_OBJECT(self.element, "the stream ends");
       [[fallthrough]];
     default:
       // Triggers and IMU samples precede each buffer, and may precede the interval that it joins.
@@ -364,37 +330,30 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
   return PARENT_PAYLOAD_CLASS->sink_event(payload, event);
 }
 
-/// Answers latency queries: adds the time for which events wait here.
-static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
-  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(GST_CAT_DEFAULT, GST_RTP_BASE_PAYLOAD_SINKPAD(parent), query,
-                          GST_RTP_EVENT_PAY(parent)->priv->settings.copy().max_latency);
-  return gst_pad_query_default(pad, parent, query);
+static GstClockTime latency_of(gpointer element) {
+  return priv_of(element).settings.copy().max_latency;
 }
 
-/* negotiation, states */
-
 static gboolean set_caps(GstRTPBasePayload* payload, GstCaps* caps) {
-  auto* self = GST_RTP_EVENT_PAY(payload);
-  auto& priv = *self->priv;
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
-  const SensorSize sensor{info.width, info.height};
-  const auto format = priv.settings.copy().format;
-  const std::string width = std::to_string(info.width);
-  const std::string height = std::to_string(info.height);
-  if (!priv.stream->state || priv.stream->state->sensor != sensor) {
-    const auto first_event = priv.stream->state ? priv.stream->state->packer.next_event() : 0;
+  auto& self = priv_of(payload);
+  const auto sensor = sensor_of(caps);
+  if (!sensor) return FALSE;
+  const std::string width = std::to_string(sensor->width);
+  const std::string height = std::to_string(sensor->height);
+  auto& state = self.stream->state;
+  if (!state || state->sensor != *sensor) {
+    const auto first_event = state ? state->packer.next_event() : 0;
     const Report too_large{GST_STREAM_ERROR_FORMAT,
                            "EVT3 words support sensors of 1x1 to 2048x2048 pixels, not " + width +
                                "x" + height + "; set format=XYTP."};
-    if (!catch_exceptions(self, too_large,
-                          [&] { priv.stream->state.emplace(sensor, format, first_event); }))
+    if (!catch_exceptions(self.element, too_large, [&] {
+          state.emplace(*sensor, self.settings.copy().format, first_event);
+        }))
       return FALSE;
   }
-  const char* format_name = rtp_event_formats[static_cast<std::size_t>(priv.stream->state->format)];
-  GST_DEBUG_OBJECT(self, "sending the events of %dx%d pixels as %s", info.width, info.height,
-                   format_name);
+  const char* format_name = rtp_event_formats[static_cast<std::size_t>(state->format)];
+  GST_DEBUG_OBJECT(self.element, "sending the events of %dx%d pixels as %s", sensor->width,
+                   sensor->height, format_name);
   gst_rtp_base_payload_set_options(payload, "application", TRUE, "X-EVENT-CAMERA", rtp_clock_rate);
   return gst_rtp_base_payload_set_outcaps(payload, "width", G_TYPE_STRING, width.c_str(), "height",
                                           G_TYPE_STRING, height.c_str(), "format", G_TYPE_STRING,
@@ -402,22 +361,20 @@ static gboolean set_caps(GstRTPBasePayload* payload, GstCaps* caps) {
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
-  auto& priv = *GST_RTP_EVENT_PAY(element)->priv;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *priv.sent.lock() = {};
+  auto& self = priv_of(element);
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *self.sent.lock() = {};
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_rtp_event_pay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    priv.timer.stop();
-    priv.stream.reset();
+    self.timer.stop();
+    self.stream.reset();
   }
   return result;
 }
 
-/* type */
-
 static GstStructure* stats_of(GObject* object) {
   GstStructure* stats = base_rtp_stats(object, GST_TYPE_RTP_BASE_PAYLOAD);
-  const auto sent = *GST_RTP_EVENT_PAY(object)->priv->sent.lock();
+  const auto sent = *priv_of(object).sent.lock();
   gst_structure_set(stats, "packets", G_TYPE_UINT64, guint64{sent.packets}, "bytes", G_TYPE_UINT64,
                     guint64{sent.bytes}, "events", G_TYPE_UINT64, guint64{sent.events},
                     "rejected-events", G_TYPE_UINT64, guint64{sent.rejected}, nullptr);
@@ -426,15 +383,15 @@ static GstStructure* stats_of(GObject* object) {
 
 static void gst_rtp_event_pay_init(GstRtpEventPay* self) {
   self->priv = new Private(GST_RTP_BASE_PAYLOAD(self));
-  gst_pad_set_query_function(GST_RTP_BASE_PAYLOAD_SRCPAD(self), src_query);
-  announce_latency(GST_CAT_DEFAULT, self, "max-latency");
+  answer_latency_queries<latency_of>(GST_RTP_BASE_PAYLOAD_SRCPAD(self));
+  announce_max_latency(self);
 }
 
 static void gst_rtp_event_pay_class_init(GstRtpEventPayClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
 
-  Properties<settings_of> properties(object_class);
+  Properties<field_of<&Private::settings>> properties(object_class);
   properties.add_fixed(
       &Settings::format, "format", "Format of the events in packets; read when the stream begins",
       enum_type<RtpEventFormat>(

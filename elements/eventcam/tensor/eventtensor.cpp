@@ -56,27 +56,18 @@
  *
  * Since: 0.1
  */
-#include <gst/gst.h>
-
-#include <algorithm>
-#include <optional>
-#include <string>
-#include <utility>
-
-#include "elements/eventcam/tensor/tensor_format.hpp"
+#include "features.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/errors.hpp"
+#include "gst/base/element.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/event_faults.hpp"
 #include "gst/base/event_pool.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
-#include "gst/base/played_segment.hpp"
-#include "src/core/sensor_size.hpp"
 #include "src/tensor/event_tensor.hpp"
 #include "src/tensor/window_queue.hpp"
+#ifdef HAVE_TENSOR_META
+#include <gst/analytics/analytics.h>
+
+#endif
 
 GST_DEBUG_CATEGORY_STATIC(event_tensor_debug);
 #define GST_CAT_DEFAULT event_tensor_debug
@@ -84,6 +75,169 @@ GST_DEBUG_CATEGORY_STATIC(event_tensor_debug);
 using namespace eventcamera;
 
 namespace {
+
+/// Maximum gap between buffers that windows by time continue through; no interval is longer.
+constexpr GstClockTime max_tensor_gap = GstClockTime{G_MAXUINT32} * GST_USECOND;
+
+/// Times beyond this are not used: the ends of windows would not fit into 64 bits.
+constexpr GstClockTime max_tensor_time = GstClockTime{1} << 62;
+
+struct TensorProperties {
+  Representation representation = Representation::voxel_grid;
+  guint bins = 5;
+  Decay decay = Decay::exponential;
+  GstClockTime time_constant = 50 * GST_MSECOND;
+  Normalization normalization = Normalization::none;
+  ElementType type = ElementType::float32;
+  guint event_count = 0;
+  GstClockTime accumulation_time = 0;
+  guint frame_count = 1;
+  gdouble overlap = 0;
+
+  TensorSettings of_tensors() const {
+    return {
+        .representation = representation,
+        .bins = static_cast<int>(bins),
+        .decay = decay,
+        .time_constant = static_cast<Microseconds>(std::max(time_constant / 1000, GstClockTime{1})),
+        .normalization = normalization,
+        .type = type};
+  }
+
+  WindowSettings of_windows() const {
+    const auto duration = accumulation_time > 0 ? std::max(accumulation_time, event_resolution) : 0;
+    return {.events = event_count,
+            .duration = static_cast<Nanoseconds>(duration),
+            .intervals = frame_count,
+            .overlap = overlap};
+  }
+};
+
+GType tensor_data_type() {
+  return enum_type<ElementType>("GstEventTensorDataType",
+                                {{ElementType::float32, "32-bit floating point", "float32"},
+                                 {ElementType::float16, "16-bit floating point", "float16"},
+                                 {ElementType::uint8, "Unsigned bytes", "uint8"}});
+}
+
+struct TensorFormat {
+  TensorFormat(const GstEventCameraInfo& input, const TensorProperties& properties)
+      : sensor(input), tensors(properties.of_tensors()), windows(properties.of_windows()) {}
+
+  TensorShape shape() const { return {sensor.width, sensor.height, tensors}; }
+  OwnedCaps caps() const {
+    const auto of = shape();
+    const auto dimensions = std::to_string(of.width) + ":" + std::to_string(of.height) + ":" +
+                            std::to_string(of.channels) + ":1";
+    const auto [fps_n, fps_d] = framerate();
+    const auto* const type =
+        g_enum_get_value(static_cast<GEnumClass*>(g_type_class_peek(tensor_data_type())),
+                         static_cast<gint>(tensors.type));
+    return OwnedCaps(gst_caps_new_simple(
+        "other/tensors", "format", G_TYPE_STRING, "static", "num_tensors", G_TYPE_INT, 1,
+        "dimensions", G_TYPE_STRING, dimensions.c_str(), "types", G_TYPE_STRING, type->value_nick,
+        "framerate", GST_TYPE_FRACTION, fps_n, fps_d, nullptr));
+  }
+
+  /// Time from the start of a window to its end, as far as it is known.
+  GstClockTime latency() const {
+    if (windows.events > 0) return 0;
+    if (windows.duration > 0) return static_cast<GstClockTime>(windows.duration);
+    if (sensor.fps_n <= 0) return 0;
+    return gst_util_uint64_scale((windows.intervals - 1) * GST_SECOND,
+                                 static_cast<guint64>(sensor.fps_d),
+                                 static_cast<guint64>(sensor.fps_n));
+  }
+
+  GstEventCameraInfo sensor;
+  TensorSettings tensors;
+  WindowSettings windows;
+
+ private:
+  /// Framerate of the tensors: 0/1 if it varies or is not a fraction of integers.
+  std::pair<gint, gint> framerate() const {
+    gint n = 0;
+    gint d = 1;
+    if (windows.events > 0) return {n, d};
+    const auto hop = windows.duration > 0
+                         ? windows.hop(windows.duration)
+                         : static_cast<Nanoseconds>(windows.hop(windows.intervals));
+    if (hop > G_MAXINT) return {n, d};
+    const gboolean fits = windows.duration > 0
+                              ? gst_util_fraction_multiply(static_cast<gint>(GST_SECOND), 1, 1,
+                                                           static_cast<gint>(hop), &n, &d)
+                              : gst_util_fraction_multiply(sensor.fps_n, sensor.fps_d, 1,
+                                                           static_cast<gint>(hop), &n, &d);
+    return fits ? std::pair(n, d) : std::pair(0, 1);
+  }
+};
+
+/// Caps fields, and the properties that determine them.
+constexpr std::pair<const char*, const char*> advice[] = {
+    {"types", "set data-type"},
+    {"dimensions", "set representation or bins, or scale the events"},
+    {"framerate", "set accumulation-time, frame-count or overlap"}};
+
+/// Text: the fields in which `wanted` differs from fixed caps, and the properties to set.
+std::string mismatch_text(GstCaps* wanted, GstCaps* made) {
+  std::string wishes;
+  if (gst_caps_get_size(wanted) == 0) return wishes;
+  for (const auto& [field, remedy] : advice) {
+    const auto* value = gst_structure_get_value(gst_caps_get_structure(wanted, 0), field);
+    if (value == nullptr ||
+        gst_value_intersect(nullptr, value,
+                            gst_structure_get_value(gst_caps_get_structure(made, 0), field)))
+      continue;
+    gchar* const text = gst_value_serialize(value);
+    wishes +=
+        (wishes.empty() ? ": " : ", ") + (std::string(field) + "=") + text + " (" + remedy + ")";
+    g_free(text);
+  }
+  return wishes;
+}
+
+#ifdef HAVE_TENSOR_META
+
+GstTensorDataType data_type_of(ElementType type) {
+  switch (type) {
+    case ElementType::float32:
+      return GST_TENSOR_DATA_TYPE_FLOAT32;
+    case ElementType::float16:
+      return GST_TENSOR_DATA_TYPE_FLOAT16;
+    case ElementType::uint8:
+      break;
+  }
+  return GST_TENSOR_DATA_TYPE_UINT8;
+}
+
+/// Returns a buffer of the same memory, because a meta that refers to its own buffer is never
+/// freed.
+GstBuffer* same_memory(GstBuffer* buffer) {
+  GstBuffer* const same = gst_buffer_new();
+  for (guint i = 0; i < gst_buffer_n_memory(buffer); ++i)
+    gst_buffer_append_memory(same, gst_buffer_get_memory(buffer, i));
+  return same;
+}
+
+/// Describes the bytes of a buffer in a GstTensorMeta, with its dimensions in C order: 1, channels,
+/// rows, columns.
+void add_tensor_meta(GstBuffer* buffer, const TensorShape& shape, const TensorSettings& settings) {
+  static const GQuark id = g_quark_from_static_string("event-tensor");
+  std::array<gsize, 4> dimensions = {1, static_cast<gsize>(shape.channels),
+                                     static_cast<gsize>(shape.height),
+                                     static_cast<gsize>(shape.width)};
+  auto** const tensors = g_new(GstTensor*, 1);
+  tensors[0] =
+      gst_tensor_new_simple(id, data_type_of(settings.type), same_memory(buffer),
+                            GST_TENSOR_DIM_ORDER_ROW_MAJOR, dimensions.size(), dimensions.data());
+  gst_tensor_meta_set(gst_buffer_add_tensor_meta(buffer), 1, tensors);
+}
+
+#else
+
+void add_tensor_meta(GstBuffer*, const TensorShape&, const TensorSettings&) {}
+
+#endif
 
 /// Maximum memory of a tensor and its intermediate values.
 constexpr gsize max_tensor_bytes = gsize{1} << 30;
@@ -95,7 +249,6 @@ struct State {
         tensor(of.sensor.width, of.sensor.height, of.tensors),
         windows(of.sensor.width, of.sensor.height, of.windows) {}
 
-  /// Forgets all events.
   void start_over() {
     windows.reset();
     tensor.reset();
@@ -120,13 +273,11 @@ struct Stream {
   WarnOnce warn_of_pause{GST_CAT_DEFAULT};
 };
 
-struct Private {
-  explicit Private(const std::pair<GstPad*, GstPad*>& pads) : sink(pads.first), src(pads.second) {}
+struct Private : ElementPads {
+  using ElementPads::ElementPads;
 
   Guarded<TensorProperties> settings;
   Guarded<GstClockTime> latency;
-  GstPad* const sink;
-  GstPad* const src;
   StreamLocked<Stream> stream{sink};
 };
 
@@ -134,10 +285,6 @@ struct Private {
 
 DEFINE_EVENT_ELEMENT(GstEventTensor, gst_event_tensor, EVENT_TENSOR, GstElement, GST_TYPE_ELEMENT,
                      eventtensor, GST_RANK_NONE, "windows of events as tensors")
-
-static Guarded<TensorProperties>& settings_of(GObject* object) {
-  return GST_EVENT_TENSOR(object)->priv->settings;
-}
 
 static const Report no_memory{
     GST_RESOURCE_ERROR_NO_SPACE_LEFT,
@@ -151,78 +298,68 @@ static GstClockTime max_pause_of(const State& state) {
   return std::max(duration, std::min(max_pause, max_windows * duration));
 }
 
-/* tensors */
-
-static GstFlowReturn push_tensor(GstEventTensor* self, const WindowQueue::Window& window) {
-  auto& priv = *self->priv;
-  auto& tensor = priv.stream->state->tensor;
-  OwnedBuffer buffer;
-  const GstFlowReturn result = priv.stream->buffers.acquire(tensor.bytes(), buffer);
-  if (result != GST_FLOW_OK) return result;
+static GstFlowReturn push_tensor(Private& self, const WindowQueue::Window& window) {
+  auto& tensor = self.stream->state->tensor;
+  OwnedBuffer buffer = self.stream->buffers.acquire(tensor.bytes());
   GstBuffer* const acquired = buffer.get();
   tensor.write(window.events, window.end / static_cast<Nanoseconds>(GST_USECOND),
                WritableBytes(acquired).get().data());
-  GST_BUFFER_PTS(acquired) = static_cast<GstClockTime>(window.start);
-  GST_BUFFER_DTS(acquired) = GST_CLOCK_TIME_NONE;
-  GST_BUFFER_DURATION(acquired) = static_cast<GstClockTime>(window.end - window.start);
-  GST_BUFFER_FLAG_UNSET(acquired, GST_BUFFER_FLAG_DISCONT);
-  if (std::exchange(priv.stream->discontinuous, false))
-    GST_BUFFER_FLAG_SET(acquired, GST_BUFFER_FLAG_DISCONT);
-  add_tensor_meta(acquired, tensor.shape(), priv.stream->state->format.tensors);
-  GST_LOG_OBJECT(
-      self, "tensor of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
-      window.events.size(), GST_TIME_ARGS(static_cast<GstClockTime>(window.start)),
-      GST_TIME_ARGS(static_cast<GstClockTime>(window.end)));
-  return gst_pad_push(priv.src, buffer.release());
+  const EventInterval interval{static_cast<GstClockTime>(window.start),
+                               static_cast<GstClockTime>(window.end)};
+  stamp(acquired, interval, self.stream->discontinuous);
+  add_tensor_meta(acquired, tensor.shape(), self.stream->state->format.tensors);
+  GST_LOG_OBJECT(self.element,
+                 "tensor of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT
+                 " to %" GST_TIME_FORMAT,
+                 window.events.size(), GST_TIME_ARGS(interval.start), GST_TIME_ARGS(interval.end));
+  return gst_pad_push(self.src, buffer.release());
 }
 
 /// Ends the current windows: pushes the last tensor and forgets all events.
-static GstFlowReturn drain(GstEventTensor* self) {
-  auto& priv = *self->priv;
-  if (!priv.stream->state) return GST_FLOW_OK;
-  const GstFlowReturn result = catch_exceptions(self, no_memory, [&] {
-    const auto window = priv.stream->state->windows.finish();
+static GstFlowReturn drain(Private& self) {
+  if (!self.stream->state) return GST_FLOW_OK;
+  const GstFlowReturn result = catch_exceptions(self.element, no_memory, [&] {
+    const auto window = self.stream->state->windows.finish();
     return window ? push_tensor(self, *window) : GST_FLOW_OK;
   });
-  priv.stream->state->start_over();
-  priv.stream->discontinuous = true;
+  self.stream->state->start_over();
+  self.stream->discontinuous = true;
   return result;
 }
 
 /// Ends the current windows if an interval is too far from the last one.
-static GstFlowReturn drain_before_jump(GstEventTensor* self, const EventInterval& interval) {
-  const auto last = self->priv->stream->state->windows.reached();
+static GstFlowReturn drain_before_jump(Private& self, const EventInterval& interval) {
+  const auto last = self.stream->state->windows.reached();
   if (!last) return GST_FLOW_OK;
   const auto reached = static_cast<GstClockTime>(*last);
   const bool returns = interval.start + event_resolution < reached;
-  const bool leaps = interval.start > reached + max_pause_of(*self->priv->stream->state);
+  const bool leaps = interval.start > reached + max_pause_of(*self.stream->state);
   if (!returns && !leaps) return GST_FLOW_OK;
-  GST_DEBUG_OBJECT(self, "starting over: time %s from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
-                   returns ? "goes back" : "leaps", GST_TIME_ARGS(reached),
-                   GST_TIME_ARGS(interval.start));
+  GST_DEBUG_OBJECT(
+      self.element, "starting over: time %s from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
+      returns ? "goes back" : "leaps", GST_TIME_ARGS(reached), GST_TIME_ARGS(interval.start));
   return drain(self);
 }
 
 /// Adds an interval, and pushes the tensors of the windows that it completes.
-static GstFlowReturn add(GstEventTensor* self, std::span<const Event> events, Microseconds base,
+static GstFlowReturn add(Private& self, std::span<const Event> events, Microseconds base,
                          const EventInterval& interval, GstBuffer* buffer) {
-  auto& priv = *self->priv;
-  const GstClockTime start = std::max(interval.start, priv.stream->segment.start);
+  const GstClockTime start = std::max(interval.start, self.stream->segment.start);
   if (interval.end < start || (interval.end == start && interval.start < start)) return GST_FLOW_OK;
   const GstFlowReturn result = drain_before_jump(self, {start, interval.end});
   if (result != GST_FLOW_OK) return result;
   do {
-    const auto added = priv.stream->state->windows.add(
+    const auto added = self.stream->state->windows.add(
         events, base, static_cast<Nanoseconds>(start), static_cast<Nanoseconds>(interval.end));
-    priv.stream->faults.warn(self, added.invalid, buffer);
+    self.stream->faults.warn(self.element, added.invalid, buffer);
     if (added.excess > 0)
-      priv.stream->warn_of_excess(
-          self,
+      self.stream->warn_of_excess(
+          self.element,
           {GST_STREAM_ERROR_FAILED, "Cannot use all events: there are more than " +
                                         std::to_string(WindowQueue::max_events) +
                                         " in a window; skipping the rest. Shorten the windows."},
           std::to_string(added.excess) + " events skipped");
-    while (const auto window = priv.stream->state->windows.next()) {
+    while (const auto window = self.stream->state->windows.next()) {
       const GstFlowReturn pushed = push_tensor(self, *window);
       if (pushed != GST_FLOW_OK) return pushed;
     }
@@ -231,61 +368,56 @@ static GstFlowReturn add(GstEventTensor* self, std::span<const Event> events, Mi
   return GST_FLOW_OK;
 }
 
-/* data */
-
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* received) {
-  auto* self = GST_EVENT_TENSOR(parent);
-  auto& priv = *self->priv;
+  auto& self = priv_of(parent);
   const OwnedBuffer buffer(received);
-  if (!priv.stream->state) return GST_FLOW_NOT_NEGOTIATED;
-  priv.stream->discontinuous |= GST_BUFFER_IS_DISCONT(received);
-  const auto gap_result = std::exchange(priv.stream->gap_result, GST_FLOW_OK);
+  if (!self.stream->state) return GST_FLOW_NOT_NEGOTIATED;
+  self.stream->discontinuous |= GST_BUFFER_IS_DISCONT(received);
+  const auto gap_result = std::exchange(self.stream->gap_result, GST_FLOW_OK);
   if (gap_result != GST_FLOW_OK) return gap_result;
   const MappedEvents mapped(received);
   if (!mapped || mapped.interval().end > max_tensor_time) {
-    priv.stream->faults.warn(self, event_fault(received), received);
+    self.stream->faults.warn(self.element, event_fault(received), received);
     return GST_FLOW_OK;
   }
-  GST_LOG_OBJECT(priv.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+  GST_LOG_OBJECT(self.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                  mapped.events().size(), GST_TIME_ARGS(mapped.interval().start));
-  return catch_exceptions(self, no_memory, [&] {
+  return catch_exceptions(self.element, no_memory, [&] {
     return add(self, mapped.events(), mapped.start(), mapped.interval(), received);
   });
 }
 
 /// Returns true if the gap is not forwarded, because tensors cover it. The next buffer returns a
 /// failure to push them.
-static bool handle_gap(GstEventTensor* self, GstEvent* event) {
-  auto& priv = *self->priv;
+static bool handle_gap(Private& self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
-  if (!priv.stream->state) return false;
-  if (priv.stream->state->format.windows.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
+  if (!self.stream->state) return false;
+  if (self.stream->state->format.windows.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
       start > max_tensor_time || duration > max_tensor_time - start)
-    return priv.stream->state->windows.is_open();
-  if (duration > max_pause_of(*priv.stream->state)) {
-    priv.stream->warn_of_pause(
-        self, {GST_STREAM_ERROR_FAILED, "The events pause; skipping the tensors of long pauses."},
+    return self.stream->state->windows.is_open();
+  if (duration > max_pause_of(*self.stream->state)) {
+    self.stream->warn_of_pause(
+        self.element,
+        {GST_STREAM_ERROR_FAILED, "The events pause; skipping the tensors of long pauses."},
         "pause of " + std::to_string(duration / GST_SECOND) + " s");
     // Ends the current window; the next events start over.
-    duration = static_cast<GstClockTime>(priv.stream->state->format.windows.duration);
+    duration = static_cast<GstClockTime>(self.stream->state->format.windows.duration);
   }
-  priv.stream->gap_result = catch_exceptions(self, no_memory, [&] {
+  self.stream->gap_result = catch_exceptions(self.element, no_memory, [&] {
     return add(self, {}, 0, {start, start + duration}, nullptr);
   });
   return true;
 }
 
-/* negotiation */
-
 /// Returns true if downstream accepts the caps; otherwise posts an error message.
-static bool post_unless_accepted(GstEventTensor* self, GstCaps* caps) {
-  const OwnedCaps wanted(gst_pad_peer_query_caps(self->priv->src, nullptr));
+static bool post_unless_accepted(Private& self, GstCaps* caps) {
+  const OwnedCaps wanted(gst_pad_peer_query_caps(self.src, nullptr));
   if (gst_caps_can_intersect(wanted.get(), caps)) return true;
   gchar* const cause = gst_info_strdup_printf(
       "downstream accepts %" GST_PTR_FORMAT ", not %" GST_PTR_FORMAT, wanted.get(), caps);
-  post_message(self, GST_MESSAGE_ERROR,
+  post_message(self.element, GST_MESSAGE_ERROR,
                {GST_STREAM_ERROR_FORMAT, "Downstream does not accept these tensors" +
                                              mismatch_text(wanted.get(), caps) + "."},
                cause);
@@ -293,14 +425,12 @@ static bool post_unless_accepted(GstEventTensor* self, GstCaps* caps) {
   return false;
 }
 
-/// Starts over for a sensor.
-static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
-  auto& priv = *self->priv;
-  priv.stream->state.reset();
-  const TensorFormat format(info, priv.settings.copy());
+static bool make_state(Private& self, const GstEventCameraInfo& info) {
+  self.stream->state.reset();
+  const TensorFormat format(info, self.settings.copy());
   const auto bytes = EventTensor::memory(format.shape(), format.tensors);
   if (bytes > max_tensor_bytes) {
-    post_message(self, GST_MESSAGE_ERROR,
+    post_message(self.element, GST_MESSAGE_ERROR,
                  {GST_STREAM_ERROR_FORMAT,
                   "Cannot make tensors that take more than 1 GiB; lower bins or the resolution."},
                  in_pixels({info.width, info.height}) + " and " +
@@ -308,62 +438,58 @@ static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
                      " bytes");
     return false;
   }
-  priv.stream->state.emplace(format);
+  self.stream->state.emplace(format);
   return true;
 }
 
-static gboolean handle_caps(GstEventTensor* self, GstEvent* event) {
-  auto& priv = *self->priv;
-  GstCaps* caps = nullptr;
-  gst_event_parse_caps(event, &caps);
+static gboolean handle_caps(Private& self, const GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
-  if (priv.stream->state && priv.stream->state->format.sensor.width == info.width &&
-      priv.stream->state->format.sensor.height == info.height) {
-    priv.stream->state->format.sensor = info;
+  if (self.stream->state && self.stream->state->format.sensor.width == info.width &&
+      self.stream->state->format.sensor.height == info.height) {
+    self.stream->state->format.sensor = info;
   } else {
     drain(self);
-    if (!catch_exceptions(self, no_memory, [&] { return make_state(self, info); })) return FALSE;
+    if (!catch_exceptions(self.element, no_memory, [&] { return make_state(self, info); }))
+      return FALSE;
   }
-  *priv.latency.lock() = priv.stream->state->format.latency();
-  const OwnedCaps out = priv.stream->state->format.caps();
-  GST_DEBUG_OBJECT(self, "events of %dx%d pixels become %" GST_PTR_FORMAT, info.width, info.height,
-                   out.get());
+  *self.latency.lock() = self.stream->state->format.latency();
+  const OwnedCaps out = self.stream->state->format.caps();
+  GST_DEBUG_OBJECT(self.element, "events of %dx%d pixels become %" GST_PTR_FORMAT, info.width,
+                   info.height, out.get());
   if (!post_unless_accepted(self, out.get())) return FALSE;
-  const gboolean handled = gst_pad_push_event(priv.src, gst_event_new_caps(out.get()));
-  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
+  const gboolean handled = gst_pad_push_event(self.src, gst_event_new_caps(out.get()));
+  post_latency(self.element);
   return handled;
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
-  auto* self = GST_EVENT_TENSOR(parent);
-  auto& priv = *self->priv;
+  auto& self = priv_of(parent);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_CAPS: {
-      const gboolean handled = handle_caps(self, event);
-      gst_event_unref(event);
-      return handled;
+      const OwnedEvent owned(event);
+      return handle_caps(self, caps_of(event));
     }
     case GST_EVENT_GAP:
       if (handle_gap(self, event)) {
         gst_event_unref(event);
-        return priv.stream->gap_result == GST_FLOW_OK ? TRUE : FALSE;
+        return self.stream->gap_result == GST_FLOW_OK ? TRUE : FALSE;
       }
       break;
     case GST_EVENT_SEGMENT:
-      if (!plays_events(self, event, "make tensors of")) return FALSE;
-      if (!continues(priv.stream->segment, segment_of(event))) drain(self);
-      priv.stream->segment = segment_of(event);
+      if (!plays_events(self.element, event, "make tensors of")) return FALSE;
+      if (!continues(self.stream->segment, segment_of(event))) drain(self);
+      self.stream->segment = segment_of(event);
       break;
     case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_EOS:
       drain(self);
       break;
     case GST_EVENT_FLUSH_STOP:
-      gst_segment_init(&priv.stream->segment, GST_FORMAT_UNDEFINED);
-      priv.stream->gap_result = GST_FLOW_OK;
-      if (priv.stream->state) priv.stream->state->start_over();
-      priv.stream->discontinuous = true;
+      gst_segment_init(&self.stream->segment, GST_FORMAT_UNDEFINED);
+      self.stream->gap_result = GST_FLOW_OK;
+      if (self.stream->state) self.stream->state->start_over();
+      self.stream->discontinuous = true;
       break;
     default:
       break;
@@ -371,36 +497,27 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   return gst_pad_event_default(pad, parent, event);
 }
 
-static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
-  auto& priv = *GST_EVENT_TENSOR(parent)->priv;
-  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(GST_CAT_DEFAULT, priv.sink, query, priv.latency.copy());
-  return gst_pad_query_default(pad, parent, query);
-}
-
-/* states */
-
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
-  auto& priv = *GST_EVENT_TENSOR(element)->priv;
+  auto& self = priv_of(element);
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_tensor_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    priv.stream.reset();
-    *priv.latency.lock() = 0;
+    self.stream.reset();
+    *self.latency.lock() = 0;
   }
   return result;
 }
 
-/* type */
-
 static void gst_event_tensor_init(GstEventTensor* self) {
-  self->priv = new Private(add_pads(GST_ELEMENT(self), chain, sink_event, src_query));
+  self->priv = new Private(GST_ELEMENT(self), chain, sink_event);
+  answer_latency_queries<[](gpointer element) { return priv_of(element).latency.copy(); }>(
+      self->priv->src);
 }
 
 static void gst_event_tensor_class_init(GstEventTensorClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  Properties<settings_of> properties(object_class);
+  Properties<field_of<&Private::settings>> properties(object_class);
   constexpr guint max_frame_count = 10'000;
   properties.add_fixed(
       &TensorProperties::representation, "representation", "Content of a tensor",

@@ -29,15 +29,9 @@
  */
 #include <gst/video/video.h>
 
-#include <optional>
-#include <string>
 #include <string_view>
-#include <utility>
 
 #include "gst/aggregator/eventaggregator.hpp"
-#include "gst/base/element_type.hpp"
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/event_caps.hpp"
 #include "gst/base/video_frame.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(flow_join_debug);
@@ -66,7 +60,6 @@ class FlowJoin final : public EventAggregator {
   }
 
   void flush() noexcept override {}
-  void release_memory() noexcept override {}
 
   bool handle_caps(GstAggregatorPad* pad, GstCaps* caps) override {
     const GstStructure* const structure = gst_caps_get_structure(caps, 0);
@@ -105,9 +98,7 @@ class FlowJoin final : public EventAggregator {
     }
     frame.reset();  // otherwise it would not be writable in place
     OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
-    if (is_gap(out.get()))
-      return is_segment_sent() ? push_gap(GST_BUFFER_PTS(out.get()), GST_BUFFER_DURATION(out.get()))
-                               : GST_FLOW_OK;
+    if (is_gap(out.get())) return push(std::move(out));
     if (flow && !add_flow(out.get(), flow.get())) return GST_FLOW_ERROR;
     if (!flow && !has_ended(flow_pad_))
       warn_of_no_flow_(element(),
@@ -117,10 +108,6 @@ class FlowJoin final : public EventAggregator {
                        "no matching buffer on flow_sink");
     return push(std::move(out));
   }
-
-  /// Time at which a live frame is pushed without waiting for flow: at once if it has no time, and
-  /// at the end of the video.
-  GstClockTime next_time() override { return next_main_time(); }
 
  private:
   struct Size {

@@ -1,20 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/reader/reader_output.hpp"
 
-#include <gst/gst.h>
 #include <gst/video/video.h>
 
-#include <algorithm>
-#include <array>
 #include <cstddef>
-#include <mutex>
-#include <optional>
-#include <string>
-#include <utility>
 
-#include "gst/base/event_buffer.hpp"
-#include "gst/base/owned.hpp"
-#include "gst/base/pads.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/sensor_events.hpp"
 
@@ -30,8 +20,8 @@ GstEvent* with_seqnum(GstEvent* event, guint32 seqnum) {
 
 namespace {
 
-/// Memory of event buffers that were freed, in any thread, for further buffers. It is kept while
-/// buffers need as much, and up to a limit.
+/// Recycles the memory of freed event buffers, from any thread: up to a limit, and only as long as
+/// buffers need as much.
 class SpareMemory {
  public:
   std::vector<Event> pop() {
@@ -66,49 +56,32 @@ class SpareMemory {
 }  // namespace
 
 /// Source pad for one stream of a file, with the state of its events: stream-start, caps, tags and
-/// segment.
-class ReaderPad {
- public:
-  /// Creates the pad without adding it to an element. Logs in `category`.
-  ReaderPad(GstPadTemplate* templ, const std::string& name, GstDebugCategory* category)
-      : pad_(gst_pad_new_from_template(templ, name.c_str())), name_(name), category_(category) {
-    gst_object_ref_sink(pad_);
-    gst_pad_use_fixed_caps(pad_);
+/// segment. Not added to the element at first.
+struct ReaderPad {
+  ReaderPad(GstPadTemplate* templ, const std::string& pad_name)
+      : pad(GST_PAD(gst_object_ref_sink(gst_pad_new_from_template(templ, pad_name.c_str())))),
+        name(pad_name) {
+    gst_pad_use_fixed_caps(pad.get());
   }
 
-  ~ReaderPad() {
-    reset();
-    gst_object_unref(pad_);
-  }
-
-  ReaderPad(const ReaderPad&) = delete;
-  ReaderPad& operator=(const ReaderPad&) = delete;
-
-  GstPad* get() const { return pad_; }
-  const std::string& name() const { return name_; }
-  bool is_added() const { return GST_OBJECT_PARENT(pad_) != nullptr; }
+  bool is_added() const { return GST_OBJECT_PARENT(pad.get()) != nullptr; }
 
   /// Forgets what was sent, for a new stream.
   void reset() {
     interrupt();
-    started_ = false;
-    size_ = {};
-    video_.reset();
+    is_started = false;
+    size = {};
+    video.reset();
   }
 
   /// Marks the next data as discontinuous; a new segment is due.
-  void interrupt() {
-    segment_due_ = true;
-    discontinuous_ = true;
-  }
-
-  /// Marks the next data as discontinuous, in the same segment.
-  void interrupt_data() { discontinuous_ = true; }
+  void interrupt() { is_segment_due = is_discontinuous = true; }
 
   /// Starts a new stream. Event streams have type video, because players draw them.
   void start_stream(GstElement* element, guint group) {
-    const bool is_only = name_ == "src";
-    gchar* const id = gst_pad_create_stream_id(pad_, element, is_only ? nullptr : name_.c_str());
+    const bool is_only = name == "src";
+    gchar* const id =
+        gst_pad_create_stream_id(pad.get(), element, is_only ? nullptr : name.c_str());
     GstStream* const stream =
         gst_stream_new(id, nullptr, GST_STREAM_TYPE_VIDEO, GST_STREAM_FLAG_NONE);
     GstEvent* const event = gst_event_new_stream_start(id);
@@ -119,15 +92,13 @@ class ReaderPad {
     start_stream(event);
   }
 
-  /// Starts a stream with upstream's stream-start event. Takes ownership of `upstream`.
-  void start_stream(GstEvent* upstream) {
+  /// Starts a stream with a stream-start event, which it takes.
+  void start_stream(GstEvent* event) {
     reset();
-    started_ = true;
-    if (!GST_PAD_IS_ACTIVE(pad_)) gst_pad_set_active(pad_, TRUE);
-    gst_pad_push_event(pad_, upstream);
+    is_started = true;
+    if (!GST_PAD_IS_ACTIVE(pad.get())) gst_pad_set_active(pad.get(), TRUE);
+    gst_pad_push_event(pad.get(), event);
   }
-
-  bool is_started() const { return started_; }
 
   /// Sends tags with the file format and the camera model.
   void send_tags(const std::string& format, const std::string& camera) {
@@ -135,45 +106,31 @@ class ReaderPad {
       GstTagList* const container =
           gst_tag_list_new(GST_TAG_CONTAINER_FORMAT, format.c_str(), nullptr);
       gst_tag_list_set_scope(container, GST_TAG_SCOPE_GLOBAL);
-      gst_pad_push_event(pad_, gst_event_new_tag(container));
+      gst_pad_push_event(pad.get(), gst_event_new_tag(container));
     }
     if (!camera.empty() &&
         g_utf8_validate(camera.data(), static_cast<gssize>(camera.size()), nullptr))
-      gst_pad_push_event(
-          pad_, gst_event_new_tag(gst_tag_list_new(GST_TAG_DEVICE_MODEL, camera.c_str(), nullptr)));
+      gst_pad_push_event(pad.get(), gst_event_new_tag(gst_tag_list_new(GST_TAG_DEVICE_MODEL,
+                                                                       camera.c_str(), nullptr)));
   }
 
   /// Sends caps unless already sent. False if they are refused.
-  bool send_caps(SensorSize size) {
-    if (size == size_) return true;
-    const OwnedCaps caps = event_caps(size.width, size.height);
-    const bool accepted = push_caps(caps.get());
-    if (accepted) size_ = size;
+  bool send_caps(SensorSize next) {
+    if (next != size && push_caps(event_caps(next).get())) size = next;
+    return next == size;
+  }
+  bool send_caps(const GstVideoInfo& next) {
+    if (video && gst_video_info_is_equal(&*video, &next)) return true;
+    const bool accepted = push_caps(OwnedCaps(gst_video_info_to_caps(&next)).get());
+    if (accepted) video = next;
     return accepted;
   }
-
-  bool send_caps(const GstVideoInfo& info) {
-    if (video_ && gst_video_info_is_equal(&*video_, &info)) return true;
-    const OwnedCaps caps(gst_video_info_to_caps(&info));
-    const bool accepted = push_caps(caps.get());
-    if (accepted) video_ = info;
-    return accepted;
-  }
-
-  bool has_video() const { return video_.has_value(); }
-
-  /// Sends a segment if one is due.
-  void send_segment(const GstSegment& segment, guint32 seqnum) {
-    if (std::exchange(segment_due_, false))
-      gst_pad_push_event(pad_, with_seqnum(gst_event_new_segment(&segment), seqnum));
-  }
-
-  void need_segment(bool due) { segment_due_ = due; }
 
   GstFlowReturn push(GstBuffer* buffer, GstClockTime pts) {
     GST_BUFFER_PTS(buffer) = pts;
-    if (std::exchange(discontinuous_, false)) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
-    return gst_pad_push(pad_, buffer);
+    if (std::exchange(is_discontinuous, false))
+      GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
+    return gst_pad_push(pad.get(), buffer);
   }
 
   /// Pushes the first `count` events of `memory`, at least one, without copying them, and their
@@ -184,52 +141,46 @@ class ReaderPad {
       std::shared_ptr<SpareMemory> spare;
       std::vector<Event> memory;
     };
-    auto owner = std::make_unique<Owner>(Owner{spare_, std::move(memory)});
+    auto owner = std::make_unique<Owner>(Owner{spare, std::move(memory)});
     auto* const events = owner->memory.data();
-    const gsize size = count * sizeof(Event);
-    OwnedBuffer buffer(gst_buffer_new_wrapped_full(
-        static_cast<GstMemoryFlags>(0), events, size, 0, size, owner.release(), [](gpointer data) {
-          const std::unique_ptr<Owner> last(static_cast<Owner*>(data));
-          last->spare->push(std::move(last->memory));
-        }));
+    const gsize bytes = count * sizeof(Event);
+    OwnedBuffer buffer(gst_buffer_new_wrapped_full(static_cast<GstMemoryFlags>(0), events, bytes, 0,
+                                                   bytes, owner.release(), [](gpointer data) {
+                                                     const std::unique_ptr<Owner> last(
+                                                         static_cast<Owner*>(data));
+                                                     last->spare->push(std::move(last->memory));
+                                                   }));
     if (!labels.empty()) std::ranges::copy(labels, add_labels(buffer.get(), count).begin());
     GST_BUFFER_DURATION(buffer.get()) = duration;
     return push(buffer.release(), pts);
   }
 
-  /// Memory of a buffer that was freed, or none.
-  std::vector<Event> spare_memory() { return spare_->pop(); }
-
-  GstFlowReturn push_gap(GstClockTime pts, GstClockTime duration) {
-    return push_event(pad_, gst_event_new_gap(pts, duration));
-  }
-
   /// Flow return after send_caps() failed.
   GstFlowReturn refusal() const {
-    return GST_PAD_IS_FLUSHING(pad_) || gst_pad_get_last_flow_return(pad_) == GST_FLOW_FLUSHING
+    return GST_PAD_IS_FLUSHING(pad.get()) ||
+                   gst_pad_get_last_flow_return(pad.get()) == GST_FLOW_FLUSHING
                ? GST_FLOW_FLUSHING
                : GST_FLOW_NOT_NEGOTIATED;
   }
 
+  OwnedPad pad;
+  std::string name;
+  std::shared_ptr<SpareMemory> spare = std::make_shared<SpareMemory>();
+  bool is_started = false;
+  bool is_segment_due = true;
+  bool is_discontinuous = true;       ///< before the next data
+  SensorSize size;                    ///< in the caps sent last
+  std::optional<GstVideoInfo> video;  ///< in the caps sent last
+
  private:
   bool push_caps(GstCaps* caps) {
-    GST_CAT_DEBUG_OBJECT(category_, pad_, "sending %" GST_PTR_FORMAT, caps);
-    if (GstStream* const stream = gst_pad_get_stream(pad_)) {
+    GST_DEBUG_OBJECT(pad.get(), "sending %" GST_PTR_FORMAT, caps);
+    if (GstStream* const stream = gst_pad_get_stream(pad.get())) {
       gst_stream_set_caps(stream, caps);
       gst_object_unref(stream);
     }
-    return gst_pad_push_event(pad_, gst_event_new_caps(caps)) != FALSE;
+    return gst_pad_push_event(pad.get(), gst_event_new_caps(caps)) != FALSE;
   }
-
-  GstPad* pad_;
-  std::string name_;
-  GstDebugCategory* category_;
-  std::shared_ptr<SpareMemory> spare_ = std::make_shared<SpareMemory>();
-  bool started_ = false;
-  bool segment_due_ = true;
-  bool discontinuous_ = true;
-  SensorSize size_;  ///< size in the caps sent last
-  std::optional<GstVideoInfo> video_;
 };
 
 ReaderOutput::ReaderOutput(GstElement* element, GstPad* sink, const EventReaderFormat& format,
@@ -244,32 +195,24 @@ ReaderOutput::ReaderOutput(GstElement* element, GstPad* sink, const EventReaderF
       src_query_(src_query),
       warn_of_assumption_(event_reader_debug) {}
 
-ReaderOutput::~ReaderOutput() {
-  drop_waiting();
-  gst_clear_event(&stream_start_);
-  gst_flow_combiner_free(combiner_);
-}
-
-void ReaderOutput::drop_waiting() {
-  for (GstEvent* event : std::exchange(waiting_, {})) gst_event_unref(event);
-}
+ReaderOutput::~ReaderOutput() = default;
 
 void ReaderOutput::reset() {
-  drop_waiting();
-  gst_clear_event(&stream_start_);
+  waiting_.clear();
+  stream_start_.reset();
   set_recording(nullptr);
   warn_of_assumption_.reset();
   for (auto& pad : pads_) {
     pad->reset();
     if (!format_.has_many_streams) continue;
-    gst_flow_combiner_remove_pad(combiner_, pad->get());
-    if (pad->is_added()) gst_element_remove_pad(element_, pad->get());
+    gst_flow_combiner_remove_pad(combiner_.get(), pad->pad.get());
+    if (pad->is_added()) gst_element_remove_pad(element_, pad->pad.get());
   }
   if (format_.has_many_streams) {
     pads_.clear();
     has_no_more_pads_ = false;
   }
-  gst_flow_combiner_reset(combiner_);
+  gst_flow_combiner_reset(combiner_.get());
   group_ = GST_GROUP_ID_INVALID;
   seqnum_ = GST_SEQNUM_INVALID;
 }
@@ -281,7 +224,7 @@ void ReaderOutput::set_recording(std::shared_ptr<RecordingReader> recording) {
 }
 
 void ReaderOutput::start_stream(GstEvent* stream_start) {
-  gst_event_replace(&stream_start_, stream_start);
+  stream_start_.reset(stream_start);
   for (auto& pad : pads_) pad->reset();
   group_ = GST_GROUP_ID_INVALID;
   is_due_ = true;
@@ -293,17 +236,17 @@ void ReaderOutput::interrupt() {
 }
 
 void ReaderOutput::interrupt_data() {
-  for (auto& pad : pads_) pad->interrupt_data();
+  for (auto& pad : pads_) pad->is_discontinuous = true;
 }
 
 void ReaderOutput::flush() {
-  drop_waiting();
-  gst_flow_combiner_reset(combiner_);
+  waiting_.clear();
+  gst_flow_combiner_reset(combiner_.get());
   interrupt();
 }
 
 void ReaderOutput::expect_segment() {
-  for (auto& pad : pads_) pad->need_segment(false);
+  for (auto& pad : pads_) pad->is_segment_due = false;
 }
 
 /// New streams are known.
@@ -318,11 +261,12 @@ GstFlowReturn ReaderOutput::push(const RecordingReader::Chunk& chunk) {
   if (!send_caps(chunk.stream)) return handle_refused_size(chunk.stream);
   const GstClockTime pts = nanoseconds(recording_->origin()) + nanoseconds(chunk.start);
   const GstClockTime duration = nanoseconds(chunk.duration);
-  GST_LOG_OBJECT(pad.get(),
+  GST_LOG_OBJECT(pad.pad.get(),
                  "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
                  chunk.events.size(), GST_TIME_ARGS(pts), GST_TIME_ARGS(duration));
-  if (chunk.events.empty()) return combined(pad, pad.push_gap(pts, duration));
-  auto memory = pad.spare_memory();
+  if (chunk.events.empty())
+    return combined(pad, push_event(pad.pad.get(), gst_event_new_gap(pts, duration)));
+  auto memory = pad.spare->pop();
   recording_->swap_memory(chunk.stream, memory);
   const auto count = chunk.events.size();
   return combined(pad, pad.push(std::move(memory), count, chunk.labels, pts, duration));
@@ -333,9 +277,9 @@ GstFlowReturn ReaderOutput::push(const RecordingReader::TimedFrame& item) {
   auto& pad = *pad_of_stream_.at(item.stream);
   GstVideoInfo info;
   if (!frame_video_info(item.frame, &info)) return GST_FLOW_OK;
-  if (!pad.send_caps(info) && GST_PAD_IS_FLUSHING(pad.get())) return GST_FLOW_FLUSHING;
+  if (!pad.send_caps(info) && GST_PAD_IS_FLUSHING(pad.pad.get())) return GST_FLOW_FLUSHING;
   const GstClockTime pts = nanoseconds(recording_->origin()) + nanoseconds(item.time);
-  GST_LOG_OBJECT(pad.get(), "frame at %" GST_TIME_FORMAT, GST_TIME_ARGS(pts));
+  GST_LOG_OBJECT(pad.pad.get(), "frame at %" GST_TIME_FORMAT, GST_TIME_ARGS(pts));
   return combined(pad, pad.push(frame_buffer(item.frame, &info), pts));
 }
 
@@ -351,7 +295,7 @@ GstFlowReturn ReaderOutput::push_to_first(std::span<const Sample> samples) {
   });
   if (first == streams.end()) return GST_FLOW_OK;
   auto& pad = pad_of(static_cast<std::size_t>(first - streams.begin()));
-  gst_pad_push_event(pad.get(), new_sensor_event(std::span<const Sample>(of_stream)));
+  gst_pad_push_event(pad.pad.get(), new_sensor_event(std::span<const Sample>(of_stream)));
   return GST_FLOW_OK;
 }
 
@@ -364,7 +308,7 @@ GstFlowReturn ReaderOutput::push(const ImuItem& item) {
 }
 
 GstFlowReturn ReaderOutput::combined(ReaderPad& pad, GstFlowReturn result) {
-  return gst_flow_combiner_update_pad_flow(combiner_, pad.get(), result);
+  return gst_flow_combiner_update_pad_flow(combiner_.get(), pad.pad.get(), result);
 }
 
 ReaderPad& ReaderOutput::pad_of(std::size_t index) {
@@ -374,13 +318,13 @@ ReaderPad& ReaderOutput::pad_of(std::size_t index) {
   const char* const kind = stream.info.kind == StreamKind::frames ? "video_" : "events_";
   const auto name = format_.has_many_streams ? kind + std::to_string(stream.number) : "src";
   for (auto& pad : pads_)
-    if (pad->name() == name) return *(found = pad.get());
+    if (pad->name == name) return *(found = pad.get());
   auto* const templ = gst_element_class_get_pad_template(
       GST_ELEMENT_GET_CLASS(element_),
       format_.has_many_streams ? (kind + std::string("%u")).c_str() : "src");
-  found = pads_.emplace_back(std::make_unique<ReaderPad>(templ, name, GST_CAT_DEFAULT)).get();
-  gst_pad_set_event_function(found->get(), src_event_);
-  gst_pad_set_query_function(found->get(), src_query_);
+  found = pads_.emplace_back(std::make_unique<ReaderPad>(templ, name)).get();
+  gst_pad_set_event_function(found->pad.get(), src_event_);
+  gst_pad_set_query_function(found->pad.get(), src_query_);
   return *found;
 }
 
@@ -397,7 +341,7 @@ GstFlowReturn ReaderOutput::begin() {
     }
     send_segment(pad_of(i));
   }
-  for (GstEvent* event : std::exchange(waiting_, {})) push_to_pads(event);
+  for (auto& event : std::exchange(waiting_, {})) push_to_pads(event.release());
   // Writers must know these streams before the first buffer.
   if (format_.has_triggers) push(TriggerItem{});
   if (std::ranges::any_of(streams,
@@ -410,12 +354,12 @@ GstFlowReturn ReaderOutput::begin() {
 /// except where the linked element may determine the sensor size, as with a single pad.
 void ReaderOutput::start_streams() {
   const auto& streams = recording_->streams();
-  const bool is_upstreams = timeline_.is_timed() && stream_start_ != nullptr;
+  const bool is_upstreams = timeline_.is_timed() && stream_start_;
   bool is_any_new = false;
   for (std::size_t i = 0; i < streams.size(); ++i) {
     if (!streams[i].shown) continue;
     auto& pad = pad_of(i);
-    if (pad.is_started()) continue;
+    if (pad.is_started) continue;
     is_any_new = true;
     if (group_ == GST_GROUP_ID_INVALID) {
       GstEvent* const sticky = gst_pad_get_sticky_event(sink_, GST_EVENT_STREAM_START, 0);
@@ -424,10 +368,10 @@ void ReaderOutput::start_streams() {
       if (sticky != nullptr) gst_event_unref(sticky);
     }
     if (is_upstreams)
-      pad.start_stream(gst_event_ref(stream_start_));
+      pad.start_stream(gst_event_ref(stream_start_.get()));
     else
       pad.start_stream(element_, group_);
-    if (timeline_.is_timed()) pad.need_segment(false);
+    if (timeline_.is_timed()) pad.is_segment_due = false;
     if (!format_.has_many_streams) continue;
     if (streams[i].size_from == RecordingReader::SizeFrom::file) {
       send_caps(i);
@@ -439,22 +383,21 @@ void ReaderOutput::start_streams() {
   if (!is_upstreams) post_collection();
   for (auto& pad : pads_) {
     if (pad->is_added()) continue;
-    gst_flow_combiner_add_pad(combiner_, pad->get());
-    gst_element_add_pad(element_, pad->get());
+    gst_flow_combiner_add_pad(combiner_.get(), pad->pad.get());
+    gst_element_add_pad(element_, pad->pad.get());
   }
   if (!std::exchange(has_no_more_pads_, true)) gst_element_no_more_pads(element_);
 }
 
-/// Announces the streams to applications and downstream.
 void ReaderOutput::post_collection() {
   GstStreamCollection* const collection = gst_stream_collection_new(nullptr);
   for (auto& pad : pads_)
-    if (GstStream* const stream = gst_pad_get_stream(pad->get()))
+    if (GstStream* const stream = gst_pad_get_stream(pad->pad.get()))
       gst_stream_collection_add_stream(collection, stream);
   gst_element_post_message(element_,
                            gst_message_new_stream_collection(GST_OBJECT(element_), collection));
   for (auto& pad : pads_)
-    gst_pad_push_event(pad->get(), gst_event_new_stream_collection(collection));
+    gst_pad_push_event(pad->pad.get(), gst_event_new_stream_collection(collection));
   gst_object_unref(collection);
 }
 
@@ -467,7 +410,7 @@ bool ReaderOutput::find_size(std::size_t index) {
     recording_->set_size(index, size);
     return true;
   }
-  GstPad* const pad = pad_of(index).get();
+  GstPad* const pad = pad_of(index).pad.get();
   const OwnedCaps templ(gst_pad_get_pad_template_caps(pad));
   const OwnedCaps peer(gst_pad_peer_query_caps(pad, templ.get()));
   SensorSize size;
@@ -506,12 +449,12 @@ bool ReaderOutput::send_caps(std::size_t index) {
   if (stream.info.kind == StreamKind::events) {
     const bool accepted = pad.send_caps(stream.info.size);
     if (!accepted)
-      GST_DEBUG_OBJECT(pad.get(), "a sensor of %dx%d pixels is refused", stream.info.size.width,
+      GST_DEBUG_OBJECT(pad.pad.get(), "a sensor of %dx%d pixels is refused", stream.info.size.width,
                        stream.info.size.height);
     return accepted;
   }
   GstVideoInfo info;
-  return pad.has_video() || !frame_video_info(*stream.first_frame, &info) || pad.send_caps(info);
+  return pad.video || !frame_video_info(*stream.first_frame, &info) || pad.send_caps(info);
 }
 
 /// Handles downstream's refusal of a sensor size that has grown.
@@ -528,16 +471,17 @@ GstFlowReturn ReaderOutput::handle_refused_size(std::size_t index) {
   return GST_FLOW_ERROR;
 }
 
+/// Sends the segment if it is due.
 void ReaderOutput::send_segment(ReaderPad& pad) {
+  if (!std::exchange(pad.is_segment_due, false)) return;
   GstSegment segment = timeline_.segment();
   const GstClockTime origin = nanoseconds(recording_->origin());
   segment.start += origin;
   segment.position += origin;
   if (GST_CLOCK_TIME_IS_VALID(segment.stop)) segment.stop += origin;
-  pad.send_segment(segment, seqnum_);
+  gst_pad_push_event(pad.pad.get(), with_seqnum(gst_event_new_segment(&segment), seqnum_));
 }
 
-/// Posts a message with the seqnum of the current seek.
 void ReaderOutput::post_with_seqnum(GstMessage* message) {
   if (seqnum_ != GST_SEQNUM_INVALID) gst_message_set_seqnum(message, seqnum_);
   gst_element_post_message(element_, message);
@@ -564,13 +508,13 @@ void ReaderOutput::end(bool failed) {
 
 /// Takes ownership of `event`.
 void ReaderOutput::push_to_pads(GstEvent* event) {
-  for (auto& pad : pads_) gst_pad_push_event(pad->get(), gst_event_ref(event));
+  for (auto& pad : pads_) gst_pad_push_event(pad->pad.get(), gst_event_ref(event));
   gst_event_unref(event);
 }
 
 void ReaderOutput::forward(GstEvent* event) {
   if (is_due_)
-    waiting_.push_back(event);
+    waiting_.emplace_back(event);
   else
     push_to_pads(event);
 }

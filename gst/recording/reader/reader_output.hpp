@@ -8,9 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "gst/base/errors.hpp"
-#include "gst/base/event_caps.hpp"
-#include "gst/base/guarded.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/recording/eventreader.hpp"
 #include "gst/recording/reader/reader_timeline.hpp"
 #include "src/formats/recording_reader.hpp"
@@ -38,25 +36,25 @@ class ReaderOutput {
   /// Forgets the file; pads of demuxers are removed.
   void reset();
 
-  /// The next output is that recording's; null: there is none until the next call.
+  /// Sets the recording that output comes from; null: no output until the next call.
   void set_recording(std::shared_ptr<eventcamera::RecordingReader> recording);
 
-  /// Upstream begins a new stream.
+  /// Upstream begins a new stream. Takes ownership of the event.
   void start_stream(GstEvent* stream_start);
 
-  /// The next output follows a segment of its own.
+  /// Starts the next output with a new segment.
   void interrupt();
 
-  /// The next output is discontinuous, in the same segment.
+  /// Flags the next output as discontinuous, in the same segment.
   void interrupt_data();
 
-  /// Drops events that wait, and flow returns.
+  /// Drops waiting events and flow returns.
   void flush();
 
-  /// Upstream sends the segment.
+  /// Leaves the next segment to upstream.
   void expect_segment();
 
-  /// Segments and messages have this seqnum from now on.
+  /// Sets the seqnum of further segments and messages.
   void set_seqnum(guint32 seqnum) { seqnum_ = seqnum; }
 
   /// True once all pads of the first streams were added.
@@ -94,7 +92,6 @@ class ReaderOutput {
   GstFlowReturn combined(ReaderPad& pad, GstFlowReturn result);
   void post_with_seqnum(GstMessage* message);
   void push_to_pads(GstEvent* event);
-  void drop_waiting();
 
   GstElement* element_;
   GstPad* sink_;
@@ -107,12 +104,15 @@ class ReaderOutput {
 
   std::vector<std::unique_ptr<ReaderPad>> pads_;
   std::map<std::size_t, ReaderPad*> pad_of_stream_;
-  GstFlowCombiner* combiner_ = gst_flow_combiner_new();
+  struct UnrefCombiner {
+    void operator()(GstFlowCombiner* combiner) const { gst_flow_combiner_unref(combiner); }
+  };
+  std::unique_ptr<GstFlowCombiner, UnrefCombiner> combiner_{gst_flow_combiner_new()};
   bool has_no_more_pads_ = false;
-  bool is_due_ = true;                ///< caps, segments or waiting events precede the next data
-  GstEvent* stream_start_ = nullptr;  ///< upstream's
+  bool is_due_ = true;       ///< caps, segments or waiting events precede the next data
+  OwnedEvent stream_start_;  ///< upstream's
   guint group_ = GST_GROUP_ID_INVALID;
   guint32 seqnum_ = GST_SEQNUM_INVALID;
-  std::vector<GstEvent*> waiting_;  ///< serialized events that follow caps and segments
+  std::vector<OwnedEvent> waiting_;  ///< serialized events that follow caps and segments
   WarnOnce warn_of_assumption_;
 };

@@ -1,23 +1,18 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
 
-#include "gst/base/errors.hpp"
-#include "gst/base/guarded.hpp"
 #include "gst/recording/reader/reader_timeline.hpp"
 #include "src/formats/recording_reader.hpp"
 
 GST_DEBUG_CATEGORY_EXTERN(event_reader_debug);
 
-/// What a reader tells users about a recording: statistics, and messages about corrupt, dropped and
-/// unread content.
+/// Statistics of a recording, and messages about its corrupt, dropped and unread content.
 class ReaderReports {
  public:
   ReaderReports(GstElement* element, bool has_many_streams)
@@ -40,7 +35,6 @@ class ReaderReports {
     corrupt_places_ = 0;
   }
 
-  /// Updates the counts, and reports new corruption and dropped events.
   void update(const eventcamera::RecordingReader& recording) {
     const auto counts = recording.counts();
     auto before = counts;
@@ -77,12 +71,15 @@ class ReaderReports {
   /// The property `stats`. May be called from any thread.
   GstStructure* stats() const {
     const auto counts = counts_.copy();
-    GstStructure* const stats = gst_structure_new(
+    GstStructure* const stats = new_counters(
         has_many_streams_ ? "application/x-event-demux-stats" : "application/x-event-decoder-stats",
-        "events", G_TYPE_UINT64, counts.events, "triggers", G_TYPE_UINT64, counts.triggers,
-        "corrupt-places", G_TYPE_UINT64, counts.corrupt_places, "outside-events", G_TYPE_UINT64,
-        counts.outside, "late-items", G_TYPE_UINT64, counts.late, "stray-items", G_TYPE_UINT64,
-        counts.stray, "skipped-items", G_TYPE_UINT64, counts.skipped, nullptr);
+        {{"events", counts.events},
+         {"triggers", counts.triggers},
+         {"corrupt-places", counts.corrupt_places},
+         {"outside-events", counts.outside},
+         {"late-items", counts.late},
+         {"stray-items", counts.stray},
+         {"skipped-items", counts.skipped}});
     if (has_many_streams_)
       gst_structure_set(stats, "frames", G_TYPE_UINT64, counts.frames, "imu-samples", G_TYPE_UINT64,
                         counts.imu_samples, nullptr);

@@ -1,21 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <algorithm>
 #include <memory>
 #include <optional>
 #include <utility>
 
-#include "gst/base/guarded.hpp"
+#include "gst/base/element.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/seek_request.hpp"
 #include "src/formats/recording_reader.hpp"
-
-inline GstClockTime nanoseconds(eventcamera::Microseconds t) {
-  return static_cast<GstClockTime>(std::max<eventcamera::Microseconds>(t, 0)) * GST_USECOND;
-}
 
 /// Size of the upstream file in bytes; 0 if unknown.
 inline guint64 upstream_bytes(GstPad* sink) {
@@ -26,15 +20,15 @@ inline guint64 upstream_bytes(GstPad* sink) {
 
 /// Bounds of a segment in whole microseconds, rounded outwards.
 inline eventcamera::Microseconds position_of(const GstSegment& segment) {
-  return static_cast<eventcamera::Microseconds>(segment.position / GST_USECOND);
+  return microseconds(segment.position);
 }
 inline std::optional<eventcamera::Microseconds> stop_of(const GstSegment& segment) {
   if (!GST_CLOCK_TIME_IS_VALID(segment.stop)) return std::nullopt;
-  return static_cast<eventcamera::Microseconds>((segment.stop + GST_USECOND - 1) / GST_USECOND);
+  return microseconds(segment.stop + GST_USECOND - 1);
 }
 
-/// Where a reader is: the segment that it plays, its position and duration, and a seek that
-/// upstream was asked for. Answers queries. May be used from any thread.
+/// Playback state of a reader: segment, position, duration, and a pending seek upstream. Answers
+/// queries. May be used from any thread.
 class ReaderTimeline {
  public:
   using Recording = std::shared_ptr<const eventcamera::RecordingReader>;
@@ -191,7 +185,7 @@ class ReaderTimeline {
   guint32 last_seek() { return state_.lock()->last_seek; }
   void set_last_seek(guint32 seqnum) { state_.lock()->last_seek = seqnum; }
 
-  /// Push mode: a seek to `segment` waits for upstream from now on.
+  /// Push mode: begins a seek to `segment`, which upstream completes with a BYTES segment.
   Restart begin_restart(const SeekRequest& request, const GstSegment& segment) {
     Restart restart{.segment = segment, .seek_point = {}, .seqnum = request.seqnum()};
     Recording recording;

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
 #include "src/flow/scratch.hpp"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/flow/dis/inverse_search.cpp"
+#define HWY_TARGET_INCLUDE "src/flow/dis/patches.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
 #include "src/flow/product_sum-inl.hpp"
@@ -23,10 +23,10 @@ namespace {
 using Words = hn::CappedTag<std::int16_t, 16>;
 using Word = hn::Vec<Words>;
 
-/// Lanes of a sum once its halves are added.
+/// Lanes of a sum after its halves are added.
 using Quarters = hn::CappedTag<std::int32_t, 4>;
 
-/// One lane per patch.
+/// One lane per patch or pixel.
 using Floats = hn::CappedTag<float, row_padding>;
 using Vector = hn::Vec<Floats>;
 
@@ -35,18 +35,18 @@ constexpr double min_determinant = 1e-3;
 
 using WordSum = ProductSum<Words>;
 
-/// Adds the halves of a sum, if it has more lanes than Quarters.
 template <class Sum>
 HWY_INLINE hn::Vec<Quarters> quarters(Sum sum) {
 #if HWY_TARGET != HWY_SCALAR
   if constexpr (hn::MaxLanes(hn::DFromV<Sum>()) > hn::MaxLanes(Quarters()))
-    return hn::Add(hn::LowerHalf(Quarters(), sum), hn::UpperHalf(Quarters(), sum));
+    return hn::LowerHalf(Quarters(), sum) + hn::UpperHalf(Quarters(), sum);
   else
 #endif
     return sum;
 }
 
-/// Sums at one of the four pixels of a patch's cell, of the differences there.
+/// Sums over the differences of a patch from the other image, with the patch at one corner of its
+/// cell of four pixels.
 struct Corner {
   // Not defaulted: see ProductSum.
   Corner() {}  // NOLINT(modernize-use-equals-default)
@@ -65,10 +65,10 @@ struct Corner {
   WordSum along_y;
 };
 
-/// What the sums of a cell are for.
+/// Quantities to compute from the sums of a cell.
 enum class Sums { error, error_and_step };
 
-/// Stores the totals of four sums.
+/// Adds up the lanes of four sums.
 HWY_INLINE void store_totals(const WordSum& sum0, const WordSum& sum1, const WordSum& sum2,
                              const WordSum& sum3, std::int32_t* out) {
 #if HWY_TARGET == HWY_SCALAR
@@ -83,9 +83,9 @@ HWY_INLINE void store_totals(const WordSum& sum0, const WordSum& sum1, const Wor
 
 /// Searches for up to `capacity` patches of a row, one lane per patch.
 ///
-/// Between four pixels of the other image, the differences of a patch are the bilinear mean of its
-/// differences at these four, and their sums are polynomials of the four weights. So pixels are
-/// read only when a patch enters another cell of four pixels.
+/// In a cell of four pixels of the other image, the differences of a patch are the bilinear mean of
+/// its differences at the four corners, and their sums are polynomials of the four weights. So
+/// pixels are read only when a patch enters another cell.
 template <int side>
 class Search {
  public:
@@ -114,16 +114,15 @@ class Search {
     }
   }
 
-  /// Starts patches from the best of their neighbours' flows, and stops those whose own is hardly
-  /// worse.
+  /// Starts patches from the best flow of their neighbours; deactivates patches whose own flow is
+  /// about as good.
   void start_from(const Image<Flow>& found, int row) {
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
     move_to(flow_x_, flow_y_);
     read_moved<Sums::error>();
     for (int i = 0; i < count_; i += lanes)
-      hn::Store(hn::Sub(hn::Mul(hn::Set(floats, better_share), Cell(*this, i).error()),
-                        hn::Set(floats, better_by)),
+      hn::Store(hn::Set(floats, better_share) * Cell(*this, i).error() - hn::Set(floats, better_by),
                 floats, previous_ + i);
     const int first = left_ / stride_;
     for (int y = std::max(row - 1, 0); y <= std::min(row + 1, found.height() - 1); ++y) {
@@ -140,7 +139,7 @@ class Search {
         read_moved<Sums::error>();
         for (int i = 0; i < count_; i += lanes) {
           const auto error = Cell(*this, i).error();
-          const auto is_better = hn::Lt(error, hn::Load(floats, previous_ + i));
+          const auto is_better = error < hn::Load(floats, previous_ + i);
           hn::BlendedStore(error, is_better, floats, previous_ + i);
           hn::BlendedStore(hn::Load(floats, flow_x + i), is_better, floats, flow_x_ + i);
           hn::BlendedStore(hn::Load(floats, flow_y + i), is_better, floats, flow_y_ + i);
@@ -166,7 +165,7 @@ class Search {
       read_moved<Sums::error_and_step>();
       bool any = false;
       for (int i = 0; i < count_; i += lanes) {
-        const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
+        const auto active = hn::Load(floats, active_ + i) != hn::Zero(floats);
         if (hn::AllFalse(floats, active)) continue;
         any = true;
         descend(i, active);
@@ -242,13 +241,13 @@ class Search {
     mean_y_[i] = static_cast<float>(totals[5]) / pixels;
   }
 
-  /// Marks the sums of a patch to be read at its next position.
+  /// Makes locate() queue a patch at its next position.
   void leave_cell(int i) {
     cell_x_[i] = cell_y_[i] = std::numeric_limits<float>::max();
   }
 
-  /// Computes the sums at the four pixels of a patch's cell, of the differences d0 ... d3 and their
-  /// products.
+  /// Computes the sums of the differences d0 ... d3 at the four corners of a patch's cell, and of
+  /// their products.
   template <Sums sums>
   void read_cell(int i) {
     const int x = left_ + i * stride_;
@@ -266,10 +265,10 @@ class Search {
     WordSum d23;
     for (int first = 0; first < side * side; first += vector_size) {
       const auto here = load_words(from_, x, top_, first);
-      const auto d0 = hn::Sub(load_words(to_, to_x, to_y, first), here);
-      const auto d1 = hn::Sub(load_words(to_, to_x + 1, to_y, first), here);
-      const auto d2 = hn::Sub(load_words(to_, to_x, to_y + 1, first), here);
-      const auto d3 = hn::Sub(load_words(to_, to_x + 1, to_y + 1, first), here);
+      const auto d0 = load_words(to_, to_x, to_y, first) - here;
+      const auto d1 = load_words(to_, to_x + 1, to_y, first) - here;
+      const auto d2 = load_words(to_, to_x, to_y + 1, first) - here;
+      const auto d3 = load_words(to_, to_x + 1, to_y + 1, first) - here;
       c0.add(d0);
       c1.add(d1);
       c2.add(d2);
@@ -310,17 +309,16 @@ class Search {
       return hn::Min(hn::Max(place, hn::Set(floats, float{1 - side})),
                      hn::Set(floats, static_cast<float>(size - 1)));
     };
-    const auto x = clamped(hn::Add(hn::Load(floats, left_of_ + i), flow_x), to_.width());
-    const auto y =
-        clamped(hn::Add(hn::Set(floats, static_cast<float>(top_)), flow_y), to_.height());
+    const auto x = clamped(hn::Load(floats, left_of_ + i) + flow_x, to_.width());
+    const auto y = clamped(hn::Set(floats, static_cast<float>(top_)) + flow_y, to_.height());
     const auto cell_x = hn::Floor(x);
     const auto cell_y = hn::Floor(y);
-    const auto moved = hn::And(active, hn::Or(hn::Ne(cell_x, hn::Load(floats, cell_x_ + i)),
-                                              hn::Ne(cell_y, hn::Load(floats, cell_y_ + i))));
+    const auto moved = hn::And(active, hn::Or(cell_x != hn::Load(floats, cell_x_ + i),
+                                              cell_y != hn::Load(floats, cell_y_ + i)));
     hn::Store(cell_x, floats, cell_x_ + i);
     hn::Store(cell_y, floats, cell_y_ + i);
-    hn::Store(hn::Sub(x, cell_x), floats, right_ + i);
-    hn::Store(hn::Sub(y, cell_y), floats, down_ + i);
+    hn::Store(x - cell_x, floats, right_ + i);
+    hn::Store(y - cell_y, floats, down_ + i);
     hn::Store(hn::IfThenElseZero(active, hn::Set(floats, 1.0F)), floats, active_ + i);
     std::uint8_t bytes[8] = {};
     hn::StoreMaskBits(floats, moved, bytes);
@@ -328,65 +326,59 @@ class Search {
       moved_[moved_count_++] = static_cast<std::int16_t>(i + std::countr_zero(bits));
   }
 
-  /// Moves active patches to these flows.
   void move_to(const float* flow_x, const float* flow_y) {
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
     for (int i = 0; i < count_; i += lanes)
-      locate(i, hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats)),
-             hn::Load(floats, flow_x + i), hn::Load(floats, flow_y + i));
+      locate(i, hn::Load(floats, active_ + i) != hn::Zero(floats), hn::Load(floats, flow_x + i),
+             hn::Load(floats, flow_y + i));
   }
 
-  /// Reads the cells that patches entered.
   template <Sums sums>
   void read_moved() {
     for (int k = 0; k < moved_count_; ++k) read_cell<sums>(moved_[k]);
     moved_count_ = 0;
   }
 
-  /// Where in their cells a vector of patches are.
+  /// Bilinear weights of a vector of patches in their cells.
   class Cell {
    public:
     HWY_INLINE Cell(const Search& search, int i) : search_(search), i_(i) {
       const auto one = hn::Set(Floats(), 1.0F);
       const auto right = load(search.right_);
       const auto down = load(search.down_);
-      const auto left = hn::Sub(one, right);
-      const auto up = hn::Sub(one, down);
-      w0_ = hn::Mul(up, left);
-      w1_ = hn::Mul(up, right);
-      w2_ = hn::Mul(down, left);
-      w3_ = hn::Mul(down, right);
+      const auto left = one - right;
+      const auto up = one - down;
+      w0_ = up * left;
+      w1_ = up * right;
+      w2_ = down * left;
+      w3_ = down * right;
       all_ = weighted(sum);
     }
 
     /// The sum of the differences times a gradient, less its mean.
     HWY_INLINE Vector along(int k, const float* mean) const {
-      return hn::Sub(weighted(k), hn::Mul(all_, load(mean)));
+      return weighted(k) - all_ * load(mean);
     }
 
     /// The sum of the squared deviations of the differences from their mean.
     HWY_INLINE Vector error() const {
-      const auto cross0 =
-          hn::Add(hn::Add(hn::Mul(w1_, total(4)), hn::Mul(w2_, total(5))), hn::Mul(w3_, total(6)));
-      const auto cross1 = hn::Add(hn::Mul(w2_, total(7)), hn::Mul(w3_, total(8)));
-      const auto cross2 = hn::Mul(w3_, total(9));
+      const auto cross0 = w1_ * total(4) + w2_ * total(5) + w3_ * total(6);
+      const auto cross1 = w2_ * total(7) + w3_ * total(8);
+      const auto cross2 = w3_ * total(9);
       const auto part = [&](Vector weight, int square, Vector cross) {
-        return hn::Mul(weight, hn::Add(hn::Mul(weight, total(square)),
-                                       hn::Mul(hn::Set(Floats(), 2.0F), cross)));
+        return weight * (weight * total(square) + hn::Set(Floats(), 2.0F) * cross);
       };
-      const auto squares =
-          hn::Add(hn::Add(part(w0_, 0, cross0), part(w1_, 1, cross1)),
-                  hn::Add(part(w2_, 2, cross2), hn::Mul(w3_, hn::Mul(w3_, total(3)))));
-      return hn::Sub(squares, hn::Mul(all_, hn::Mul(all_, hn::Set(Floats(), 1 / pixels))));
+      const auto squares = part(w0_, 0, cross0) + part(w1_, 1, cross1) +
+                           (part(w2_, 2, cross2) + w3_ * (w3_ * total(3)));
+      return squares - all_ * (all_ * hn::Set(Floats(), 1 / pixels));
     }
 
    private:
     HWY_INLINE Vector load(const float* values) const { return hn::Load(Floats(), values + i_); }
     HWY_INLINE Vector total(int k) const { return load(search_.sums_[k]); }
     HWY_INLINE Vector weighted(int k) const {
-      return hn::Add(hn::Add(hn::Mul(w0_, total(k)), hn::Mul(w1_, total(k + 1))),
-                     hn::Add(hn::Mul(w2_, total(k + 2)), hn::Mul(w3_, total(k + 3))));
+      return w0_ * total(k) + w1_ * total(k + 1) + (w2_ * total(k + 2) + w3_ * total(k + 3));
     }
 
     const Search& search_;
@@ -410,21 +402,21 @@ class Search {
     const auto xx = load(inverse_xx_);
     const auto xy = load(inverse_xy_);
     const auto yy = load(inverse_yy_);
-    const auto step_x = hn::Add(hn::Mul(xx, along_x), hn::Mul(xy, along_y));
-    const auto step_y = hn::Add(hn::Mul(xy, along_x), hn::Mul(yy, along_y));
+    const auto step_x = xx * along_x + xy * along_y;
+    const auto step_y = xy * along_x + yy * along_y;
     const auto old_x = load(flow_x_);
     const auto old_y = load(flow_y_);
-    const auto flow_x = hn::IfThenElse(active, hn::Sub(old_x, step_x), old_x);
-    const auto flow_y = hn::IfThenElse(active, hn::Sub(old_y, step_y), old_y);
+    const auto flow_x = hn::IfThenElse(active, old_x - step_x, old_x);
+    const auto flow_y = hn::IfThenElse(active, old_y - step_y, old_y);
     hn::Store(flow_x, floats, flow_x_ + i);
     hn::Store(flow_y, floats, flow_y_ + i);
-    const auto goes_on = hn::And(active, hn::Lt(error, load(previous_)));
+    const auto goes_on = hn::And(active, error < load(previous_));
     hn::Store(error, floats, previous_ + i);
     locate(i, goes_on, flow_x, flow_y);
   }
 
-  // Indices of sums: the squares of d0 ... d3; d0 with d1, d2, d3, d1 with d2, d3, d2 with d3; and
-  // d0 ... d3, alone and times each gradient.
+  // Indices of sums: 0 to 3 are the squares of d0 ... d3; 4 to 9 the products d0 d1, d0 d2, d0 d3,
+  // d1 d2, d1 d3 and d2 d3; then follow d0 ... d3, alone and times each gradient.
   static constexpr int sum = 12;
   static constexpr int sum_x = 16;
   static constexpr int sum_y = 20;
@@ -458,7 +450,6 @@ class Search {
   HWY_ALIGN float sums_[max_sums][capacity];
 };
 
-/// Searches from `found`, of all patches, if there are any, else from `flows`.
 template <int side>
 void search(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradients& gradients,
             const Image<std::uint8_t>& to, int row, int iterations, const Image<Flow>* found,
@@ -482,6 +473,125 @@ void search_one_row(const PatchGrid& grid, const Image<std::uint8_t>& from,
     search<8>(grid, from, gradients, to, row, iterations, found, flows);
 }
 
+using Field = VariationalRefinement::Field;
+
+/// Weighted sums over the patches that cover the pixels of a row.
+struct SumRow {
+  float* x;
+  float* y;
+  float* weight;
+};
+
+/// Adds rows [first, last) of a patch at (x, y) with this flow. sums_of(row) returns the sums of a
+/// row.
+template <int side, class SumsOf>
+HWY_INLINE void add_patch(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, int x,
+                          int y, int width, int first, int last, const Flow& flow,
+                          const SumsOf& sums_of) {
+  const hn::CappedTag<float, side> floats;
+  const hn::RebindToSigned<decltype(floats)> ints;
+  const hn::Rebind<std::uint8_t, decltype(floats)> bytes;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  // Past these limits, all pixels would be replicated ones.
+  const float to_x = std::clamp(static_cast<float>(x) + flow.x, static_cast<float>(-width),
+                                static_cast<float>(to.width()));
+  const float to_y = std::clamp(static_cast<float>(y) + flow.y, static_cast<float>(y - last),
+                                static_cast<float>(to.height()));
+  const int left = static_cast<int>(std::floor(to_x));
+  const int top = static_cast<int>(std::floor(to_y));
+  const auto right = hn::Set(floats, to_x - static_cast<float>(left));
+  const auto down = hn::Set(floats, to_y - static_cast<float>(top));
+  const auto flow_x = hn::Set(floats, flow.x);
+  const auto flow_y = hn::Set(floats, flow.y);
+  const auto one = hn::Set(floats, 1.0F);
+  const auto load = [&](const std::uint8_t* pixels) {
+    return hn::ConvertTo(floats, hn::PromoteTo(ints, hn::LoadU(bytes, pixels)));
+  };
+  for (int k = 0; k < width; k += lanes) {
+    const auto along = [&](int row) {
+      const std::uint8_t* pixels = to.row(row - y + top) + left + k;
+      return lerp(load(pixels), load(pixels + 1), right);
+    };
+    auto above = along(first);
+    for (int row = first; row < last; ++row) {
+      const auto below = along(row + 1);
+      const auto there = lerp(above, below, down);
+      above = below;
+      const auto difference = hn::Abs(there - load(from.row(row) + x + k));
+      const auto weight = one / hn::Max(one, difference);
+      const SumRow sums = sums_of(row);
+      const auto add = [&](float* sum, auto value) {
+        hn::StoreU(hn::LoadU(floats, sum + x + k) + value, floats, sum + x + k);
+      };
+      add(sums.x, weight * flow_x);
+      add(sums.y, weight * flow_y);
+      add(sums.weight, weight);
+    }
+  }
+}
+
+void divide_row(const SumRow& sums, int y, Field& out) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  for (int k = 0; k < out.x.count(0); k += lanes) {
+    const auto load = [&](const float* row, Vector* values) {
+      hn::LoadInterleaved2(floats, row + std::ptrdiff_t{2} * k, values[0], values[1]);
+    };
+    Vector x[2];
+    Vector y_[2];
+    Vector weight[2];
+    load(sums.x, x);
+    load(sums.y, y_);
+    load(sums.weight, weight);
+    for (int parity = 0; parity < 2; ++parity) {
+      hn::StoreU(x[parity] / weight[parity], floats, out.x.row(parity, y) + k);
+      hn::StoreU(y_[parity] / weight[parity], floats, out.y.row(parity, y) + k);
+    }
+  }
+  out.x.replicate_ends(y);
+  out.y.replicate_ends(y);
+}
+
+template <int side>
+void spread(const PatchGrid& grid, const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
+            const Image<Flow>& flows, int first, int last, std::vector<float>& scratch,
+            Field& out) {
+  const int padded_width = from.width() + 3 * row_padding;
+  float* sums = scratch_of(scratch, std::size_t{3} * static_cast<std::size_t>(padded_width) *
+                                        static_cast<std::size_t>(last - first));
+  const auto sums_of = [&](int row) -> SumRow {
+    float* values = sums + std::ptrdiff_t{row - first} * 3 * padded_width;
+    return {values, values + padded_width, values + std::ptrdiff_t{2} * padded_width};
+  };
+  const int width = from.width();
+  for (int row = first; row < last; ++row) {
+    const SumRow sum = sums_of(row);
+    std::fill_n(sum.x, 2 * padded_width + width, 0.0F);
+    std::fill(sum.weight + width, sum.weight + padded_width, 1.0F);
+  }
+  const int first_patches = std::clamp((first - side) / grid.stride, 0, grid.rows - 1);
+  for (int j = first_patches; j < grid.rows && j * grid.stride < last; ++j) {
+    const int top = std::max(first, j * grid.stride);
+    const int bottom = std::min(last, j == grid.rows - 1 ? last : j * grid.stride + side);
+    for (int i = 0; i < grid.columns; ++i) {
+      const int left = i * grid.stride;
+      const int covered = i == grid.columns - 1 ? width - left : side;
+      add_patch<side>(from, to, left, j * grid.stride, covered, top, bottom, flows.at(i, j),
+                      sums_of);
+    }
+  }
+  for (int row = first; row < last; ++row) divide_row(sums_of(row), row, out);
+}
+
+void spread_rows(const PatchGrid& grid, const Image<std::uint8_t>& from,
+                 const Image<std::uint8_t>& to, const Image<Flow>& flows, int first, int last,
+                 std::vector<float>& sums, Field& out) {
+  if (grid.side == 4)
+    spread<4>(grid, from, to, flows, first, last, sums, out);
+  else
+    spread<8>(grid, from, to, flows, first, last, sums, out);
+}
+
 }  // namespace
 }  // namespace eventcamera::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -490,16 +600,18 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 
 HWY_EXPORT(search_one_row);
+HWY_EXPORT(spread_rows);
 
 void search_row(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradients& gradients,
-                const Image<std::uint8_t>& to, int row, int iterations, Flow* flows) {
-  HWY_DYNAMIC_DISPATCH(search_one_row)(grid, from, gradients, to, row, iterations, nullptr, flows);
+                const Image<std::uint8_t>& to, int row, int iterations, const Image<Flow>* found,
+                Flow* flows) {
+  HWY_DYNAMIC_DISPATCH(search_one_row)(grid, from, gradients, to, row, iterations, found, flows);
 }
 
-void propagate_row(const PatchGrid& grid, const Image<std::uint8_t>& from,
-                   const Gradients& gradients, const Image<std::uint8_t>& to, int row,
-                   int iterations, const Image<Flow>& found, Flow* flows) {
-  HWY_DYNAMIC_DISPATCH(search_one_row)(grid, from, gradients, to, row, iterations, &found, flows);
+void spread_patches(const PatchGrid& grid, const Image<std::uint8_t>& from,
+                    const Image<std::uint8_t>& to, const Image<Flow>& flows, int first, int last,
+                    std::vector<float>& sums, VariationalRefinement::Field& out) {
+  HWY_DYNAMIC_DISPATCH(spread_rows)(grid, from, to, flows, first, last, sums, out);
 }
 
 }  // namespace eventcamera
