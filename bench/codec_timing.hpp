@@ -39,9 +39,8 @@ double memcpy_seconds(const std::vector<AnyEvent>& events) {
 
 /// Times `body`, which processes all of these events: million events per second, and the time as a
 /// multiple of a memcpy of them.
-template <class Body>
-void measure(benchmark::State& state, const std::vector<eventcamera::AbsoluteEvent>& events,
-             const Body& body) {
+template <class AnyEvent, class Body>
+void measure(benchmark::State& state, const std::vector<AnyEvent>& events, const Body& body) {
   body();
   double seconds = 0;
   for (auto _ : state) {

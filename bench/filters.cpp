@@ -5,10 +5,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
@@ -28,6 +24,7 @@
 #include "src/filter/undistort_filter.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "tests/formats/recordings.hpp"
+#include "tests/formats/shared_data.hpp"
 
 namespace {
 
@@ -57,19 +54,13 @@ Stream random_stream() {
 
 /// A recording of a camera, over and over. Without it there are no events.
 Stream real_stream() {
-  const char* data = std::getenv("SHARED_DATA");
-  const auto path =
-      std::filesystem::path(data != nullptr ? data : "") / "events/evt3-1280x720-triggers.raw";
-  std::ifstream file(path, std::ios::binary);
-  const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(file), {}};
+  const auto bytes = shared_data::events_file("evt3-1280x720-triggers.raw");
   Stream stream{"real", {}, 1};
   if (bytes.empty()) {
-    std::fprintf(stderr, "%s is missing: no figures for real events\n", path.c_str());
+    std::fputs("no recording in $SHARED_DATA: no figures for real events\n", stderr);
     return stream;
   }
-  Decoded decoded;
-  make_prophesee_raw_decoder()->decode(bytes, decoded);
-  const auto& recorded = decoded.events;
+  const auto recorded = recordings::decode(*make_prophesee_raw_decoder(), bytes).events;
   const Microseconds first = recorded.front().t;
   const Microseconds length = recorded.back().t - first + 1;
   for (Microseconds shift = 0; stream.events.size() < count; shift += length)
@@ -80,14 +71,14 @@ Stream real_stream() {
   return stream;
 }
 
-/// Times a filter on buffers as they come from a camera.
-template <class Core>
-void register_filter(const std::string& name, const Stream& stream,
-                     const typename Core::Settings& settings) {
-  benchmark::RegisterBenchmark((name + "/" + stream.name).c_str(), [&stream, settings](
+/// Times a filter on buffers as they come from a camera. make() returns a function that filters a
+/// buffer and gets its start.
+template <class Make>
+void add(const std::string& name, const Stream& stream, const Make& make) {
+  benchmark::RegisterBenchmark((name + "/" + stream.name).c_str(), [=, &stream](
                                                                        benchmark::State& state) {
     constexpr std::size_t buffer_size = 1 << 15;
-    Core core(sensor);
+    auto filter = make();
     Microseconds start = 0;
     std::vector<Event> scratch;
     double kept = 0;
@@ -98,8 +89,7 @@ void register_filter(const std::string& name, const Stream& stream,
       const double begin = bench::seconds_now();
       for (std::size_t done = 0; done < scratch.size(); done += buffer_size) {
         const auto size = std::min(buffer_size, scratch.size() - done);
-        const auto left =
-            core.filter({std::span(scratch).subspan(done, size), {}}, start, settings);
+        const LabelledEvents left = filter({std::span(scratch).subspan(done, size), {}}, start);
         kept += static_cast<double>(left.events.size());
       }
       seconds = std::min(seconds, bench::seconds_now() - begin);
@@ -112,18 +102,23 @@ void register_filter(const std::string& name, const Stream& stream,
   })->Unit(benchmark::kMillisecond);
 }
 
-/// The check of all events that elements do before they filter.
-struct Validation {
-  struct Settings {};
+/// Filter with settings.
+template <class Filter>
+auto with(const typename Filter::Settings& settings) {
+  return [settings] {
+    return [settings, filter = Filter(sensor)](LabelledEvents events, Microseconds start) mutable {
+      return filter.filter(events, start, settings);
+    };
+  };
+}
 
-  explicit Validation(SensorSize size) : sensor_size(size) {}
-  LabelledEvents filter(LabelledEvents events, Microseconds, const Settings&) const {
-    InvalidEvents invalid;
-    return keep_valid(events, sensor_size, UINT32_MAX, invalid);
-  }
-
-  SensorSize sensor_size;
-};
+/// Filter without settings or state.
+template <class Filter>
+auto fixed(const Filter& filter) {
+  return [&filter] {
+    return [&filter](LabelledEvents events, Microseconds) { return filter.filter(events); };
+  };
+}
 
 /// Size of the output of filters that change it: a quarter of the sensor.
 constexpr SensorSize quarter{sensor.width / 2, sensor.height / 2};
@@ -136,69 +131,46 @@ struct Scale : ScaleFilter {
   explicit Scale(SensorSize size) : ScaleFilter(size, quarter) {}
 };
 
-struct Rotation {
-  struct Settings {};
-
-  explicit Rotation(SensorSize size) : flip(size, {.transpose = true, .mirror_x = true}) {}
-  LabelledEvents filter(LabelledEvents events, Microseconds, const Settings&) const {
-    return flip.filter(events);
-  }
-
-  FlipFilter flip;
-};
-
-/// Drops the pixels of one column in eight.
-struct Mask {
-  struct Settings {};
-
-  explicit Mask(SensorSize size) : mask(size) {
-    for (int y = 0; y < size.height; ++y)
-      for (int x = 0; x < size.width; ++x)
-        if (x % 8 != 0) mask.keep(x, y);
-  }
-  LabelledEvents filter(LabelledEvents events, Microseconds, const Settings&) const {
-    return mask.filter(events);
-  }
-
-  PixelMask mask;
-};
-
-/// Of a wide-angle lens.
-struct Undistort {
-  struct Settings {};
-
-  explicit Undistort(SensorSize size)
-      : undistort(size, {.fx = 900,
-                         .fy = 900,
-                         .cx = size.width / 2.0,
-                         .cy = size.height / 2.0,
-                         .distortion = {-0.3, 0.1, 0, 0, 0}}) {}
-  LabelledEvents filter(LabelledEvents events, Microseconds, const Settings&) const {
-    return undistort.filter(events);
-  }
-
-  UndistortFilter undistort;
-};
+/// Keeps the pixels of seven columns in eight.
+PixelMask columns() {
+  PixelMask mask(sensor);
+  for (int y = 0; y < sensor.height; ++y)
+    for (int x = 0; x < sensor.width; ++x)
+      if (x % 8 != 0) mask.keep(x, y);
+  return mask;
+}
 
 void register_all(const Stream& stream) {
-  register_filter<Validation>("validation", stream, {});
-  register_filter<Crop>("crop", stream, {.left = 320, .right = 320, .top = 180, .bottom = 180});
-  register_filter<Rotation>("rotation", stream, {});
-  register_filter<PolarityFilter>("polarity", stream, {.keep = PolarityFilter::Kept::on});
-  register_filter<Mask>("mask", stream, {});
-  register_filter<Scale>("scale", stream, {});
-  register_filter<Scale>("scale-counted", stream, {.min_events = 4});
-  register_filter<Undistort>("undistortion", stream, {});
-  register_filter<RefractoryFilter>("refractory", stream, {});
-  register_filter<HotPixelFilter>("hot-pixel", stream, {});
-  register_filter<TrailFilter>("trail", stream, {});
-  register_filter<TrailFilter>("stc-cut-trail", stream, {.mode = TrailMode::stc_cut_trail});
-  register_filter<FlickerFilter>("anti-flicker", stream, {});
-  register_filter<RateFilter>("rate-control", stream, {.max_rate = 1'000'000});
-  register_filter<DenoiseFilter>("baf", stream, {.method = DenoiseMethod::baf});
-  register_filter<DenoiseFilter>("stcf", stream, {.method = DenoiseMethod::stcf});
-  register_filter<DenoiseFilter>("time-kernel", stream, {.method = DenoiseMethod::time_kernel});
-  register_filter<DenoiseFilter>("dwf", stream, {.method = DenoiseMethod::dwf});
+  static const FlipFilter rotation(sensor, {.transpose = true, .mirror_x = true});
+  static const PixelMask mask = columns();
+  static const UndistortFilter wide_angle(sensor, {.fx = 900,
+                                                   .fy = 900,
+                                                   .cx = sensor.width / 2.0,
+                                                   .cy = sensor.height / 2.0,
+                                                   .distortion = {-0.3, 0.1, 0, 0, 0}});
+  add("validation", stream, [] {  // of all events, before elements filter
+    return [](LabelledEvents events, Microseconds) {
+      InvalidEvents invalid;
+      return keep_valid(events, sensor, UINT32_MAX, invalid);
+    };
+  });
+  add("crop", stream, with<Crop>({.left = 320, .right = 320, .top = 180, .bottom = 180}));
+  add("rotation", stream, fixed(rotation));
+  add("polarity", stream, with<PolarityFilter>({.keep = PolarityFilter::Kept::on}));
+  add("mask", stream, fixed(mask));
+  add("scale", stream, with<Scale>({}));
+  add("scale-counted", stream, with<Scale>({.min_events = 4}));
+  add("undistortion", stream, fixed(wide_angle));
+  add("refractory", stream, with<RefractoryFilter>({}));
+  add("hot-pixel", stream, with<HotPixelFilter>({}));
+  add("trail", stream, with<TrailFilter>({}));
+  add("stc-cut-trail", stream, with<TrailFilter>({.mode = TrailMode::stc_cut_trail}));
+  add("anti-flicker", stream, with<FlickerFilter>({}));
+  add("rate-control", stream, with<RateFilter>({.max_rate = 1'000'000}));
+  add("baf", stream, with<DenoiseFilter>({.method = DenoiseMethod::baf}));
+  add("stcf", stream, with<DenoiseFilter>({.method = DenoiseMethod::stcf}));
+  add("time-kernel", stream, with<DenoiseFilter>({.method = DenoiseMethod::time_kernel}));
+  add("dwf", stream, with<DenoiseFilter>({.method = DenoiseMethod::dwf}));
 }
 
 }  // namespace

@@ -9,6 +9,8 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
+#include <opencv2/imgproc.hpp>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -20,6 +22,7 @@
 
 #include "bench/methods.hpp"
 #include "bench/scenes.hpp"
+#include "src/flow/opencv.hpp"
 #include "src/gl/simulator.hpp"
 #include "tests/gl/egl_context.hpp"
 #include "tests/simulate/scene.hpp"
@@ -69,20 +72,8 @@ double median(std::vector<double> values) {
 /// The frame at another size, by bilinear interpolation.
 Frame scaled(const Frame& from, int width, int height) {
   Frame to(width, height);
-  for (int y = 0; y < height; ++y) {
-    const double v = (from.height() - 1.0) * y / std::max(height - 1, 1);
-    const int top = std::min(static_cast<int>(v), from.height() - 2);
-    for (int x = 0; x < width; ++x) {
-      const double u = (from.width() - 1.0) * x / std::max(width - 1, 1);
-      const int left = std::min(static_cast<int>(u), from.width() - 2);
-      const double right = u - left;
-      const auto row = [&](int at) {
-        return from.at(left, at) * (1 - right) + from.at(left + 1, at) * right;
-      };
-      to.at(x, y) = static_cast<std::uint8_t>(
-          std::lround(row(top) * (1 - (v - top)) + row(top + 1) * (v - top)));
-    }
-  }
+  cv::Mat out(height, width, CV_8U, to.row(0), static_cast<std::size_t>(to.stride()));
+  cv::resize(opencv_image(from.view()), out, out.size());
   return to;
 }
 
@@ -216,8 +207,7 @@ Costs costs_of(gl::Context& context, const Method& method, const Clip& clip,
     }));
     kernels.push_back(gpu.time_of([&] {
       call.push_back(time_of([&] {
-        simulator->queue(texture.frame({LumaWeights::one, 0, 0, 0}), i * bench::frame_time,
-                         settings);
+        simulator->queue(texture.frame(), i * bench::frame_time, settings);
       }));
     }));
     const EventBuckets* made = nullptr;

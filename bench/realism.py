@@ -25,11 +25,12 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "pipelines"))
-from event_calibrate import Progress, Search, calibrate, find_lag, fit_thresholds  # noqa: E402
+from event_calibrate import Search, calibrate, find_lag, fit_thresholds  # noqa: E402
 from event_streams import (  # noqa: E402
     Gst, Span, Video, compare, delayed, read_mask, read_recording, read_video, samples_of, simulate, until)
 from gst_eventcamera.pipeline import quoted  # noqa: E402
 from page import replace_tables  # noqa: E402
+from program import Progress  # noqa: E402
 
 # The name of each row, and its element, whose thresholds are fitted.
 ROWS = {
@@ -160,7 +161,7 @@ def measure(scene, data, progress):
     if lag != 0:
         rows[LAG_IGNORED] = measured(video, rows[CALIBRATED]["element"], fit_thresholds)
     uncalibrated = {element: measured(on_time, element, None) for element in UNCALIBRATED}
-    progress.end()
+    progress.clear()
     _, test = spans(on_time)
     hidden = 1 - len(test.of(on_time.visible(recorded))) / len(test.of(recorded))
     return {"title": scene.title, "lag": lag, "calibrated": scene.calibrated,
@@ -319,7 +320,7 @@ def draw(path, scene, data, result):
 def main():
     data = os.environ.get("SHARED_DATA", os.path.join("..", "shared", "data"))
     Gst.init(None)
-    progress = Progress()
+    progress = Progress(60)
     results = {}
     for key, scene in SCENES.items():
         if not os.path.exists(os.path.join(data, scene.folder, scene.recording)):

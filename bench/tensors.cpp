@@ -5,15 +5,15 @@
 // caches.
 #include <benchmark/benchmark.h>
 
-#include <chrono>
-#include <cstring>
-#include <random>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "bench/codec_timing.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/tensor/event_tensor.hpp"
 #include "src/tensor/window_queue.hpp"
+#include "tests/formats/recordings.hpp"
 
 namespace {
 
@@ -23,31 +23,30 @@ constexpr Nanoseconds window = 33'000'000;
 constexpr Nanoseconds interval = 10'000'000;  ///< of a buffer
 constexpr int intervals = 40;
 constexpr int events_per_microsecond = 10;
+constexpr std::size_t events_per_interval = interval / 1000 * events_per_microsecond;
 
-using Buffer = std::vector<Event>;
-
-std::vector<Buffer> noise(SensorSize size) {
-  std::mt19937 random(1);
-  std::vector<Buffer> buffers(intervals);
-  for (auto& buffer : buffers)
-    for (std::uint32_t i = 0; i < interval / 1000 * events_per_microsecond; ++i)
-      buffer.push_back(Event::at(static_cast<int>(random() % static_cast<unsigned>(size.width)),
-                                 static_cast<int>(random() % static_cast<unsigned>(size.height)),
-                                 i / events_per_microsecond,
-                                 random() % 2 == 0 ? Polarity::off : Polarity::on));
-  return buffers;
+std::vector<Event> noise(SensorSize size) {
+  recordings::Random random(1);
+  std::vector<Event> events;
+  for (int buffer = 0; buffer < intervals; ++buffer)
+    for (std::size_t i = 0; i < events_per_interval; ++i)
+      events.push_back(Event::at(recordings::below(random, size.width),
+                                 recordings::below(random, size.height),
+                                 static_cast<std::uint32_t>(i / events_per_microsecond),
+                                 recordings::below(random, 2) == 0 ? Polarity::off : Polarity::on));
+  return events;
 }
 
-void make_tensors(const std::vector<Buffer>& buffers, SensorSize size,
-                  const TensorSettings& settings, std::vector<std::byte>& out) {
+void make_tensors(const std::vector<Event>& events, SensorSize size, const TensorSettings& settings,
+                  std::vector<std::byte>& out) {
   EventTensor tensor(size.width, size.height, settings);
   WindowQueue queue(size.width, size.height, {.duration = window});
   out.resize(tensor.bytes());
-  Nanoseconds start = 0;
-  for (const auto& buffer : buffers) {
-    queue.add(buffer, start / 1000, start, start + interval);
+  for (std::size_t i = 0; i < intervals; ++i) {
+    const auto start = static_cast<Nanoseconds>(i) * interval;
+    queue.add(std::span(events).subspan(i * events_per_interval, events_per_interval), start / 1000,
+              start, start + interval);
     while (const auto next = queue.next()) tensor.write(next->events, next->end / 1000, out.data());
-    start += interval;
     benchmark::ClobberMemory();
   }
 }
@@ -55,25 +54,9 @@ void make_tensors(const std::vector<Buffer>& buffers, SensorSize size,
 void register_all(const std::string& name, SensorSize size) {
   const auto add = [&](const std::string& what, const TensorSettings& settings) {
     benchmark::RegisterBenchmark((name + "/" + what).c_str(), [=](benchmark::State& state) {
-      const auto buffers = noise(size);
+      const auto events = noise(size);
       std::vector<std::byte> out;
-      std::vector<Event> copy(buffers[0].size());
-      double copying = 0;
-      double events = 0;
-      for (auto _ : state) {
-        make_tensors(buffers, size, settings, out);
-        const auto start = std::chrono::steady_clock::now();
-        state.PauseTiming();
-        for (const auto& buffer : buffers) {
-          std::memcpy(copy.data(), buffer.data(), buffer.size() * sizeof buffer[0]);
-          benchmark::ClobberMemory();
-          events += static_cast<double>(buffer.size());
-        }
-        copying += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        state.ResumeTiming();
-      }
-      state.counters["Mev/s"] = benchmark::Counter(events / 1e6, benchmark::Counter::kIsRate);
-      state.counters["memcpy-Mev/s"] = events / 1e6 / copying;
+      bench::measure(state, events, [&] { make_tensors(events, size, settings, out); });
     })->Unit(benchmark::kMillisecond);
   };
   add("histogram", {.representation = Representation::histogram});

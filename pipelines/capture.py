@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 from gi.repository import GLib, Gst
 
-from plugins import find_plugins
+from program import option_parser
 
 SCENE = "videotestsrc is-live=true pattern=ball"
 # The default of v4l2src is the largest frame size, which many cameras deliver only a few times a second.
@@ -22,36 +22,29 @@ EVENTS = "application/x-event-camera"
 DECODED = 'uridecodebin uri="{uri}" caps="{caps}" expose-all-streams=false'
 
 
-def option_parser(program, description, address, port):
-    parser = argparse.ArgumentParser(
-        prog=program, description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+def server_options(name, description, address, port):
+    parser = option_parser(description, prog=name)
     source = parser.add_mutually_exclusive_group()
     source.add_argument("--device", help="camera, such as /dev/video0 (default: a test scene)")
     source.add_argument("--source", help="instead of a camera: a video or a recording of events, which is repeated; an"
                         ' address such as rtsp://camera/stream; or a pipeline, such as "v4l2src ! videoflip method=clockwise"')
-    parser.add_argument("--simulator", default="eventsim-dvs", type=for_webcams,
-                        help='simulator and its properties, such as "eventsim-sparse positive-threshold=5"'
-                        " (default: %(default)s)")
+    add_simulator(parser)
     parser.add_argument("--address", type=ipaddress.ip_address, default=address,
                         help="IP address to listen on (default: %(default)s)")
     parser.add_argument("--port", type=port_number, default=port,
                         help="0 = any free port (default: %(default)s)")
-    parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
-                        help="print the version and exit")
     return parser
+
+
+def add_simulator(parser):
+    parser.add_argument("--simulator", default="eventsim-dvs", type=for_webcams,
+                        help='simulator and its properties, such as "eventsim-sparse positive-threshold=5"'
+                        " (default: %(default)s)")
 
 
 def for_webcams(simulator):
     """A simulator that skips frames that a camera repeats, unless its properties say otherwise."""
     return re.sub(r"^((gl)?eventsim-\S+)", r"\1 skip-repeated=true", simulator)
-
-
-def find_elements(names, packages):
-    """Raises RuntimeError if a plugin of this project, or one of these elements from the Debian `packages`, is
-    missing."""
-    find_plugins()
-    if missing := [name for name in names if not Gst.ElementFactory.find(name)]:
-        raise RuntimeError(f"GStreamer has no {', '.join(missing)}; on Debian, install: {packages}")
 
 
 def port_number(text):

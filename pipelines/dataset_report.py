@@ -6,11 +6,11 @@ import os
 import urllib.parse
 
 import numpy as np
-from page_style import PAGE_STYLE
+from program import page
 
 # Fields of a record that go to the manifest: all that do not depend on the machine's file system.
 PUBLISHED = ("name", "split", "input", "making", "parameters", "written", "figures", "warnings", "versions")
-STYLE = PAGE_STYLE + """
+STYLE = """
 .videos { display: grid; grid-template-columns: repeat(auto-fill, minmax(11rem, 1fr)); gap: 1rem } td { white-space: nowrap }
 img { display: block; width: 100% } figcaption { overflow-wrap: anywhere; font-size: 12px }
 """
@@ -89,15 +89,11 @@ def duration_text(seconds):
 def page_of(recipe, made, statistics):
     """An offline page; its pictures lie beside it."""
     title = html.escape(os.path.basename(recipe.path))
-    header = "".join(f"<th>{name}</th>" for name in COLUMNS)
-    rows = "".join(f"<tr><th>{html.escape(part)}</th>"
-                   + "".join(f"<td>{text_of(figures)}</td>" for text_of in COLUMNS.values()) + "</tr>"
-                   for part, figures in statistics.items())
-    return (f'<!DOCTYPE html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-            f"<title>{title}</title><style>{STYLE}</style><h1>{title}</h1>"
-            f"<table><tr><th></th>{header}</tr>{rows}</table>"
-            "<p>For each video, the busiest of a few frame intervals: ON white, OFF blue. Click to enlarge.</p>"
-            f'<div class="videos">{"".join(map(figure_of, made))}</div>\n')
+    rows = [(html.escape(part), [f"<td>{text_of(figures)}</td>" for text_of in COLUMNS.values()])
+            for part, figures in statistics.items()]
+    return page(title, title, STYLE, [f"<th>{name}</th>" for name in COLUMNS], rows,
+                "<p>For each video, the busiest of a few frame intervals: ON white, OFF blue. Click to enlarge.</p>"
+                f'<div class="videos">{"".join(map(figure_of, made))}</div>')
 
 
 def figure_of(record):

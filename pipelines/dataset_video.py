@@ -9,7 +9,7 @@ import tempfile
 import gst_eventcamera as ec
 import numpy as np
 from event_streams import samples_of
-from gst_eventcamera.dataset import duration_of, pictures_of
+from gst_eventcamera.dataset import pictures_of
 from gst_eventcamera.frames import Frames
 from gst_eventcamera.pipeline import EVENT_CAPS, Gst, events_of, utf8_path
 from gst_eventcamera.recipe import OUTPUTS, TENSORS
@@ -209,7 +209,7 @@ def simulate(video, paths):
         for tensor in pipeline.samples(f"file-{TENSORS}") if array else ():
             array.append(tensor_of(tensor))
         pipeline.wait()
-        duration = duration_of(pipeline)
+        duration = pipeline.duration()
     if fault := video.fault(frames, duration):
         raise Refused(fault)
     if figures.chunks == 0:

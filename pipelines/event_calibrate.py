@@ -17,15 +17,14 @@ AEDAT 4, is given once. --from and --to are in seconds after the first frame; th
 import argparse
 import functools
 import os
-import sys
 import time
 from statistics import harmonic_mean
 
 # Imported first: it reports missing packages.
-from event_streams import (GLib, Gst, Span, compare, delayed, expect_writable, png_of, read_mask, read_recording,
+from event_streams import (Gst, Span, compare, delayed, expect_writable, png_of, read_camera,
                            read_video, seconds, simulate, until)
 import numpy as np
-from plugins import find_plugins
+from program import VERSION, Progress, find_plugins, option_parser, run
 from threshold_search import PRECISION, ROUGH_PRECISION, Setting, find_thresholds
 
 # Windows of the calibrated time, with equally many events each, so that fast parts count. Changes are chosen on every
@@ -64,8 +63,6 @@ PROFILED = "eventsim-dvs"
 BLOCK, LOW_THRESHOLD = 8, 0.1
 # Largest share of silent pixels among the pixels with this many active neighbours, which have this many events in all.
 MAX_SILENT, BUSY_NEIGHBOURS, BUSY_EVENTS = 0.05, 5, 24
-# Seconds between two lines of progress where there is no terminal.
-PROGRESS_INTERVAL = 60
 
 
 def ratings_of(figures):
@@ -80,33 +77,6 @@ def ratings_of(figures):
     likeness = np.average([figures["map-correlation"], matches, variances, 10 ** -figures["interval-distance"]],
                           weights=[1, 6, 1, 1])
     return np.array([likeness, figures["map-correlation"], matches])
-
-
-class Progress:
-    """Prints progress: one line, rewritten, on a terminal; elsewhere a line a minute, and every result."""
-
-    def __init__(self):
-        self.on_terminal = sys.stderr.isatty()
-        self.printed = time.monotonic()
-        self.left = ""  # time left, before each text
-
-    def update(self, text):
-        if self.on_terminal:
-            width = (os.get_terminal_size(sys.stderr.fileno()).columns or 80) - 1
-            print(f"\r{(self.left + text)[:width]:<{width}}", end="", file=sys.stderr, flush=True)
-        elif time.monotonic() > self.printed + PROGRESS_INTERVAL:
-            self.print(self.left + text)
-
-    def print(self, text):
-        """Prints a result, which stays."""
-        self.end()
-        print(text, file=sys.stderr, flush=True)
-        self.printed = time.monotonic()
-
-    def end(self):
-        """Removes the line of progress."""
-        if self.on_terminal:
-            print("\r\033[K", end="", file=sys.stderr, flush=True)
 
 
 def explained(video, recorded):
@@ -226,12 +196,12 @@ def calibrate(search, element):
         gain = (other - ratings)[:, 0].mean()
         text = " ".join(f"{name}={value}" for name, value in change.items())
         left = (time.monotonic() - began) / tried * (len(changes) - tried)
-        progress.left = f"{tried} of {len(changes)} changes tried, about {left // 60:.0f}:{left % 60:02.0f} left; "
+        progress.prefix = f"{tried} of {len(changes)} changes tried, about {left // 60:.0f}:{left % 60:02.0f} left; "
         progress.update(f"{text}: likeness {gain:+.4f}")
         if is_better(other - ratings):
             kept, ratings = kept | change, other
             progress.print(f"kept {text}: likeness {gain:+.4f}, now {ratings[:, 0].mean():.4f}")
-    progress.left = ""
+    progress.prefix = ""
     found = search.balanced(changed(element, kept))
     if kept and not is_better(search.ratings(found, held_out) - search.ratings(fitted, held_out)):
         progress.print("dropped all changes: they do not gain on the windows that they were not chosen on")
@@ -374,8 +344,7 @@ def lag_of(text):
 
 
 def options():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("video")
     parser.add_argument("recording", nargs="?", help="default: the events beside the frames of VIDEO, as in AEDAT 4")
     parser.add_argument("--element", type=element_of, default=PROFILED,
@@ -396,8 +365,6 @@ def options():
     parser.add_argument("--profile", metavar="FILE",
                         help="write the settings of eventsim-dvs, for its property profile")
     parser.add_argument("--map", metavar="PNG", help="write a picture of the event counts per pixel")
-    parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
-                        help="print the version and exit")
     args = parser.parse_args()
     args.recording = args.recording or args.video
     return args
@@ -406,7 +373,7 @@ def options():
 def write_profile(path, element, video, recording):
     """Writes the settings of an eventsim-dvs that differ from the defaults."""
     made = Gst.parse_launch(element)
-    lines = [f"# Fitted by event-calibrate @VERSION@ to {os.path.basename(recording)} and {os.path.basename(video)}",
+    lines = [f"# Fitted by event-calibrate {VERSION} to {os.path.basename(recording)} and {os.path.basename(video)}",
              f"[{PROFILED}]"]
     for spec in made.list_properties():
         if spec.owner_type != made.__gtype__ or spec.name in ("preset", "profile", "seed"):
@@ -460,7 +427,7 @@ def main():
         raise RuntimeError(f"only {PROFILED} has profiles, {args.element.split()[0]} has none; leave out --profile")
     for path in filter(None, (args.profile, args.map, args.make_mask)):
         expect_writable(path, filter(None, (args.video, args.recording, args.mask)))
-    progress = Progress()
+    progress = Progress(interval=60)
     start = getattr(args, "from")
     ends = [end for end in (args.to, args.measure_to) if end is not None]
     progress.print(f"reading {args.video}")
@@ -468,12 +435,8 @@ def main():
     if len(video.frames) < 2:
         raise RuntimeError(f"{args.video}: fewer than two frames")
     progress.print(f"reading {args.recording}")
-    if args.mask:
-        video.mask = read_mask(args.mask, video)
-    recorded = video.of_camera(read_recording(args.recording, video))
-    if len(recorded) == 0:
-        raise RuntimeError(f"{args.recording}: no events" + (" where the mask is white" if args.mask else ""))
-    progress.end()
+    recorded = read_camera(args.recording, video, args.mask)
+    progress.clear()
     lag = args.lag
     if lag == "find":
         span = span_of(video, recorded, 0, start, args.to)
@@ -490,7 +453,7 @@ def main():
     silent, silent_share = silent_pixels(video, recorded)
     search = Search(until(video, span.end), recorded, span, progress)
     element = calibrate(search, args.element)
-    progress.end()
+    progress.clear()
     simulated = simulate(video, element)
     figures = compare(video, recorded, simulated, measured)
     if args.lag == "find" and not is_found:
@@ -517,9 +480,4 @@ def main():
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (RuntimeError, OSError, GLib.Error) as failure:
-        sys.exit(f"error: {failure}")
-    except KeyboardInterrupt:
-        sys.exit(130)
+    run(main)

@@ -16,11 +16,11 @@ import sys
 from fractions import Fraction
 
 # Imported first: it requires the versions.
-from event_files import (Failure, Gst, Interrupt, Misuse, Progress, content_of, events_pad, parse, play, post_error,
-                         reader_of, readers, set_option, utf8_path, with_extension_of, writers)
-from plugins import find_plugins
+from event_files import (MAX_SECONDS, Failure, Gst, Interrupt, Misuse, PlayProgress, content_of, events_pad,
+                         listed_pictures, parse, play, post_error, reader_of, readers, run, set_option, utf8_path,
+                         with_extension_of, writers)
+from program import find_elements, find_plugins, option_parser
 
-MAX_SECONDS = 1e9
 WRITER_OPTIONS = {"format": "encoding of a .raw or .mcap file, dialect of text, or layout of HDF5",
                   "compression": "compression of an .aedat4, .h5 or .mcap file"}
 # The files whose readers have the property.
@@ -59,47 +59,16 @@ def pictures_of(path, options):
         if not options.framerate:
             raise Misuse(f"{path}: give the pictures a second with --framerate")
         return [(round(i * Gst.SECOND / options.framerate), name) for i, name in enumerate(names)]
-    line = re.compile(r"\s*([-+.\deE]+)\s+(\S.*\.[A-Za-z]\w*)\s*")
-    entries = []
-    with contextlib.suppress(OSError, UnicodeDecodeError), open(path, encoding="utf-8") as file:
-        for text in file:
-            if not text.strip() or text.startswith("#"):
-                continue
-            found = line.fullmatch(text)
-            if not found and not entries:
-                return None
-            try:
-                entries.append((round(float(found[1]) * 1e9), os.path.join(os.path.dirname(path), found[2])))
-            except (TypeError, ValueError):
-                raise Failure(f"{path}: \"{text.strip()}\" is not a time in seconds and a picture") from None
-    if any(a[0] >= b[0] for a, b in zip(entries, entries[1:])):
-        raise Failure(f"{path}: each picture must have a later time than the one before it")
-    return entries or None
+    return listed_pictures(path) if os.path.isfile(path) else None
 
 
-def feed(pipeline, caps, buffers, seconds):
-    """Makes the appsrc `source` push buffers, `seconds` long in all, when it needs data; an exception ends the pipeline
-    with an error. Returns a list that is updated: the seconds pushed so far, and all seconds."""
-    source = pipeline.get_by_name("source")
-    source.set_property("caps", caps)
-    place, first = [0, seconds], None
-
-    def push(_, __):
-        nonlocal first
-        try:
-            buffer = next(buffers, None)
-        except (OSError, RuntimeError) as failure:
-            post_error(source, str(failure), "")
-            buffer = None
-        if buffer is None:
-            source.emit("end-of-stream")
-        else:
-            first = buffer.pts if first is None else first
-            place[0] = (buffer.pts - first) / Gst.SECOND
-            source.emit("push-buffer", buffer)
-
-    source.connect("need-data", push)
-    return place
+def tracked(buffers, place):
+    """Yields buffers, and keeps the seconds since the first one in place[0]."""
+    first = None
+    for buffer in buffers:
+        first = buffer.pts if first is None else first
+        place[0] = (buffer.pts - first) / Gst.SECOND
+        yield buffer
 
 
 def buffers_of(pictures, speed):
@@ -263,14 +232,12 @@ class Conversion:
         self._writer = writer_of(out) if not self._film else None
         self._readers = []
         self._fed = None
-        self._progress = Progress()
+        self._progress = PlayProgress()
         is_drawing = options.scale != 1 or options.sheet != (1, 1) or options.render or options.over_frames
         if self._writer and is_drawing:
             raise Misuse(f"--scale, --sheet, --render and --over-frames apply only to {' '.join(FILMS)} files")
         names = re.findall(r"! (\w+)(?![/\w])", self._film[1]) if self._film else []
-        if missing := [name for name in names if not Gst.ElementFactory.find(name)]:
-            raise Failure(f"GStreamer has no {', '.join(missing)}; on Debian, install: gstreamer1.0-plugins-base"
-                          " gstreamer1.0-plugins-good gstreamer1.0-plugins-ugly")
+        find_elements(names, "gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-ugly")
         self._is_still = out.lower().endswith(".png")
         self._pipeline = self._make()
         self._set_up()
@@ -286,7 +253,7 @@ class Conversion:
             buffers = recorded(self._inputs, options)
             width, height, length = next(buffers)
             pipeline = parse(f"appsrc name=source format=time ! queue name=events0 ! {self._rest()}")
-            self._fed = feed(pipeline, Gst.Caps.from_string(
+            self._feed(pipeline, Gst.Caps.from_string(
                 f"application/x-event-camera,format=XYTP,width={width},height={height},framerate=0/1"), buffers, length)
             return pipeline
         if options.merge:
@@ -299,8 +266,8 @@ class Conversion:
         if pictures := pictures_of(path, options):
             pipeline = self._simulated("appsrc name=source format=time ! decodebin")
             speed = options.speed if self._writer else 1
-            self._fed = feed(pipeline, content_of(pictures[0][1])[1], buffers_of(pictures, speed),
-                             (pictures[-1][0] - pictures[0][0]) / Gst.SECOND / float(speed))
+            self._feed(pipeline, content_of(pictures[0][1])[1], buffers_of(pictures, speed),
+                       (pictures[-1][0] - pictures[0][0]) / Gst.SECOND / float(speed))
             return pipeline
         reader = reader_of(path, caps)
         if reader:
@@ -311,6 +278,13 @@ class Conversion:
         if not caps or not caps.get_structure(0).get_name().startswith(("video/", "image/", "application/")):
             raise Failure(f"{path}: neither its content nor its extension matches a known format; see --help")
         return self._simulated()
+
+    def _feed(self, pipeline, caps, buffers, seconds):
+        """Feeds the appsrc `source` with buffers, `seconds` long in all."""
+        from gst_eventcamera.pipeline import feed
+
+        self._fed = [0, seconds]
+        feed(pipeline.get_by_name("source"), caps, tracked(buffers, self._fed))
 
     def _simulated(self, source=None):
         """A pipeline that simulates the events of `source`, by default of the video file."""
@@ -671,9 +645,8 @@ def formats():
 
 
 def parse_options():
-    parser = argparse.ArgumentParser(
-        prog="event-convert", description=__doc__, usage="%(prog)s [OPTION]... IN... OUT", allow_abbrev=False,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = option_parser(
+        __doc__, prog="event-convert", usage="%(prog)s [OPTION]... IN... OUT", allow_abbrev=False,
         epilog=formats() if {"-h", "--help"} & set(sys.argv) else None)
     add = parser.add_argument
     add("files", nargs="*", metavar="IN... OUT",
@@ -708,7 +681,6 @@ def parse_options():
     add("--reverse", action="store_true", help="time backwards, polarity inverted")
     add("--output-directory", metavar="DIRECTORY", help="convert each IN to a file of the same name in this folder")
     add("--extension", metavar="NAME", help="extension of the files in the output directory (default: the extension of IN)")
-    add("--version", action="version", version="%(prog)s @VERSION@", help="print the version and exit")
     # parse_intermixed_args() of Python 3.11 refuses names after "--".
     words = sys.argv[1:]
     end = words.index("--") if "--" in words else len(words)
@@ -746,8 +718,4 @@ def main():
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except RuntimeError as failure:
-        print(failure, file=sys.stderr)
-        sys.exit(getattr(failure, "status", 1))
+    run(main)

@@ -29,7 +29,7 @@ try:
     from dataset_report import write_reports
     from dataset_video import hash_of, making_of, record_of, state_of, write_record
     from gst_eventcamera.recipe import uniform_number
-    from plugins import find_plugins
+    from program import find_plugins, option_parser
 except ImportError as missing:
     sys.exit(f"error: {missing}\nInstall python3-gst-eventcamera, a Debian package of gst-eventsim, and python3-yaml,"
              " or in a checkout run ./pipelines/event-dataset")
@@ -39,9 +39,7 @@ MAX_LINES = 20  # printed of a kind
 
 
 def options():
-    parser = argparse.ArgumentParser(
-        prog="event-dataset", usage="%(prog)s [verify] RECIPE [option ...]", description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__, prog="event-dataset", usage="%(prog)s [verify] RECIPE [option ...]")
     parser.add_argument("words", nargs="+", metavar="[verify] RECIPE", help="a file of YAML")
     parser.add_argument("-o", "--output", metavar="FOLDER",
                         help="folder of the data set (default: beside the recipe, with its name)")
@@ -65,8 +63,6 @@ def options():
                         " has only elements that do neither")
     parser.add_argument("--unlock", action="store_true",
                         help="remove the lock that a killed run has left, and exit")
-    parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
-                        help="print the version and exit")
     args = parser.parse_args()
     args.verify = args.words[0] == "verify" and len(args.words) > 1
     if len(args.words) != 1 + args.verify:

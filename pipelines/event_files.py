@@ -3,6 +3,7 @@
 pipeline to its end."""
 import functools
 import os
+import re
 import signal
 import sys
 import time
@@ -14,9 +15,12 @@ gi.require_version("Gst", "1.0")
 gi.require_version("GstBase", "1.0")
 from gi.repository import GLib, Gst, GstBase  # noqa: E402
 
+from program import Progress  # noqa: E402
+
 # Typefinders see into compressed files, too.
 START_SIZE = 1 << 17
-PROGRESS_WIDTH = 40
+# Limit of times in seconds, so that nanoseconds fit a GStreamer clock time.
+MAX_SECONDS = 1e9
 
 
 class Failure(RuntimeError):
@@ -84,6 +88,32 @@ def reader_of(path, caps):
     """The reader of a file, by its content, or by its extension if the content is ambiguous; None if there is none."""
     by_content = next((reader for reader in readers() if caps and reader.factory.can_sink_any_caps(caps)), None)
     return by_content or with_extension_of(readers(), path)
+
+
+def listed_pictures(path):
+    """The times in nanoseconds and the paths of a text file of lines "seconds picture"; None if it is something else."""
+    line = re.compile(r"\s*(\S+)\s+(\S.*\.[A-Za-z]\w*)\s*")
+    entries = []
+    try:
+        with open(path, encoding="utf-8") as file:
+            for text in file:
+                if not text.strip() or text.startswith("#"):
+                    continue
+                try:
+                    time, name = line.fullmatch(text).groups()
+                    seconds = float(time)
+                except (AttributeError, ValueError):
+                    if not entries:
+                        return None
+                    raise Failure(f"{path}: \"{text.strip()}\" is not a time in seconds and a picture") from None
+                if not abs(seconds) < MAX_SECONDS:
+                    raise Failure(f"{path}: {time} is not the time of a picture; give seconds below 1e9")
+                if entries and round(seconds * 1e9) <= entries[-1][0]:
+                    raise Failure(f"{path}: the time {time} is not later than the one before it")
+                entries.append((round(seconds * 1e9), os.path.join(os.path.dirname(path), name)))
+    except UnicodeDecodeError:
+        return None
+    return entries
 
 
 def set_option(element, name, text):
@@ -171,29 +201,20 @@ class Interrupt:
         return bool(self._numbers)
 
 
-class Progress:
-    """A bar that is overwritten on a terminal, or a line every ten seconds elsewhere."""
+class PlayProgress(Progress):
+    """The share that is done, and the time left."""
 
     def __init__(self):
-        self._start = self._last = time.monotonic()
-        self._is_terminal = sys.stderr.isatty()
+        super().__init__(interval=10, pause=1)
+        self._start = time.monotonic()
 
     def show(self, share, count):
-        """Prints the share that is done, in a second at the earliest, and the time left."""
-        now = time.monotonic()
-        if share is None or now - self._last < (1 if self._is_terminal else 10):
+        if share is None:
             return
-        self._last = now
         share = min(max(share, 0), 1)
-        left = f", {(now - self._start) * (1 / share - 1):.0f} s left" if share > 0.01 else ""
-        text = f"{100 * share:3.0f} %, {count}{left}"
-        if self._is_terminal:
-            text = f"\r\033[K[{'#' * round(PROGRESS_WIDTH * share):{PROGRESS_WIDTH}}] {text}"
-        print(text, end="" if self._is_terminal else "\n", file=sys.stderr, flush=True)
-
-    def clear(self):
-        if self._is_terminal:
-            print("\r\033[K", end="", file=sys.stderr, flush=True)
+        left = f", {(time.monotonic() - self._start) * (1 / share - 1):.0f} s left" if share > 0.01 else ""
+        bar = f"[{'#' * round(40 * share):40}] " if self.on_terminal else ""
+        self.update(f"{bar}{100 * share:3.0f} %, {count}{left}")
 
 
 def play(pipeline, show, report, interrupt=False, prepare=None):
@@ -225,3 +246,12 @@ def play(pipeline, show, report, interrupt=False, prepare=None):
             prepare()
             prepare = None
             pipeline.set_state(Gst.State.PLAYING)
+
+
+def run(main):
+    """Runs a program, and exits."""
+    try:
+        sys.exit(main())
+    except RuntimeError as failure:
+        print(failure, file=sys.stderr)
+        sys.exit(getattr(failure, "status", 1))

@@ -5,13 +5,13 @@
     event-info recording.raw
     event-info recording.raw --plot rate.png
     event-info --json *.raw"""
-import argparse
 import json
 import sys
 
 # Imported first: it requires the versions.
-from event_files import Failure, Gst, Interrupt, Progress, content_of, events_pad, parse, play, reader_of, utf8_path
-from plugins import find_plugins
+from event_files import (Failure, Gst, Interrupt, PlayProgress, content_of, events_pad, parse, play, reader_of, run,
+                         utf8_path)
+from program import find_plugins, option_parser, pyplot_for
 import numpy as np
 
 BIN = 10_000  # of the event rate, in microseconds
@@ -147,16 +147,10 @@ def described(info):
 
 def plot(counts, info, path):
     """Draws the event rate over time."""
-    try:
-        import matplotlib
-        matplotlib.use("Agg")
-        from matplotlib import pyplot
-    except ImportError:
-        raise Failure("--plot needs Matplotlib; on Debian, install: python3-matplotlib") from None
     used = counts.bins[:((counts.last or 0) - (counts.first or 0)) // BIN + 1]
     step = -(-max(len(used), 1) // 1000)  # bins of a point
     rates = np.add.reduceat(used, range(0, len(used), step)) / (step * BIN) if len(used) else used
-    figure, axes = pyplot.subplots(figsize=(8, 3), layout="constrained")
+    figure, axes = pyplot_for("--plot").subplots(figsize=(8, 3), layout="constrained")
     axes.fill_between(np.arange(len(rates)) * step * BIN / 1e6, rates, step="post", color="#4080d0")
     axes.set(xlabel="time (s)", ylabel="event rate (Mev/s)", title=info["path"], ylim=(0, None))
     axes.margins(x=0)
@@ -165,12 +159,10 @@ def plot(counts, info, path):
 
 def main():
     Gst.init(None)
-    parser = argparse.ArgumentParser(prog="event-info", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__, prog="event-info")
     parser.add_argument("files", nargs="+", metavar="FILE")
     parser.add_argument("--json", action="store_true", help="print JSON: a list with an object for each file")
     parser.add_argument("--plot", metavar="PICTURE", help="draw the event rate over time, for one FILE")
-    parser.add_argument("--version", action="version", version="%(prog)s @VERSION@", help="print the version and exit")
     options = parser.parse_args()
     if options.plot and len(options.files) != 1:
         parser.error("--plot needs one FILE")
@@ -178,7 +170,7 @@ def main():
     interrupt, described_files, status = Interrupt(), [], 0
     for path in options.files:
         try:
-            counts, info = read(path, Progress(), interrupt)
+            counts, info = read(path, PlayProgress(), interrupt)
         except Failure as failure:
             print(failure if path in str(failure) else f"{path}: {failure}", file=sys.stderr)
             status = 1
@@ -197,8 +189,4 @@ def main():
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except RuntimeError as failure:
-        print(failure, file=sys.stderr)
-        sys.exit(1)
+    run(main)

@@ -8,26 +8,25 @@ ceiling: how similar a second recording by the same camera would be.
 All files are event files that this project reads, of the same pixels and with the same clock. --from and
 --to are in seconds after the first real event; the default is the time that all cover. Differences
 beyond the noise ceiling are marked with *."""
-import argparse
 import base64
 import functools
 import html
+import io
+import itertools
 import os
-import sys
 from dataclasses import dataclass
 
 # Imported first: it reports missing packages.
-from event_streams import (GLib, Gst, Sensor, Span, compare, expect_writable, png_of, read_mask, read_recording,
+from event_streams import (Gst, Sensor, Span, compare, expect_writable, png_of, read_camera,
                            read_video, reconstruct, seconds)
 import numpy as np
-from page_style import PAGE_STYLE
-from plugins import find_plugins
+from program import find_plugins, option_parser, page, pyplot_for, run
 
 LIMITS = (1, 5, 10)  # of matches, ms
 # Tolerance for figures beyond the ceiling, which is an estimate.
 TOLERANCE = 0.05
 SPLITS = 20
-COLOURS = ["currentColor", "#4080d0", "#d07020", "#309060", "#a050c0", "#c04060", "#60a0a0"]
+COLOURS = ["#000000", "#4080d0", "#d07020", "#309060", "#a050c0", "#c04060", "#60a0a0"]
 
 
 @dataclass
@@ -147,61 +146,26 @@ def map_of(counts, max_count):
     return "data:image/png;base64," + base64.b64encode(encoded).decode()
 
 
-def ticks_of(low, high, is_log):
-    """Round values from `low` to `high`, about five: 1, 2 and 5 times powers of ten. A logarithmic axis has
-    only the powers if these suffice."""
-    if is_log:
-        powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.log10(high) + 1)
-        shown = powers[::-(-len(powers) // 8)] if len(powers) > 4 else np.outer(powers, (1, 2, 5)).ravel()
-    else:
-        coarse = 10.0 ** np.floor(np.log10((high - low) / 5)) * np.array([1, 2, 5, 10])
-        step = coarse[coarse >= (high - low) / 6][0]
-        shown = np.arange(np.ceil(low / step), high / step + 1) * step
-    return shown[(shown >= low * 0.999) & (shown <= high * 1.001)]
-
-
-def legend_of(names):
-    return " ".join(f'<span style="color: {COLOURS[i % len(COLOURS)]}">■ {name}</span>' for i, name in enumerate(names))
-
-
 def chart(title, x_title, y_title, names, curves, logarithmic=(False, False)):
-    """An SVG of curves, given as x and y of each stream, the real one first, which is drawn over the others. A
-    logarithmic axis starts at the lowest value, a linear one at 0."""
-    points = []
-    for curve in curves:
-        curve = np.array(curve, float).reshape(2, -1)
-        points.append(curve[:, (curve > 0).all(axis=0) | (not any(logarithmic))])
-    drawn = np.concatenate(points, axis=1)
-    if drawn.shape[1] == 0:
-        return ""
-    low = np.where(logarithmic, drawn.min(axis=1), 0)
-    high = np.maximum(drawn.max(axis=1), np.where(logarithmic, low * 1.001, low + 1e-9))
-    width, height, left, bottom = 540, 260, 90, 44
-
-    def share(axis, values):
-        scale = np.log10 if logarithmic[axis] else np.asarray
-        return (scale(values) - scale(low[axis])) / (scale(high[axis]) - scale(low[axis]))
-
-    def place(curve):
-        return " ".join(f"{left + a * width:.1f},{10 + (1 - b) * height:.1f}"
-                        for a, b in zip(share(0, curve[0]), share(1, curve[1])))
-
-    lines = [f'<polyline points="{place(curve)}" stroke="{COLOURS[i % len(COLOURS)]}"/>'
-             for i, curve in reversed(list(enumerate(points)))]
-    marks = ""
-    for value in ticks_of(low[0], high[0], logarithmic[0]):
-        x = left + share(0, value) * width
-        marks += (f'<path d="M{x:.1f} 10v{height}"/><text x="{x:.1f}" y="{height + 28}" text-anchor="middle">'
-                  f"{value:g}</text>")
-    for value in ticks_of(low[1], high[1], logarithmic[1]):
-        y = 10 + (1 - share(1, value)) * height
-        marks += f'<path d="M{left} {y:.1f}h{width}"/><text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
-    return (f"<figure><figcaption><b>{title}</b> {legend_of(names)}</figcaption>"
-            f'<svg viewBox="0 0 {left + width + 30} {height + 10 + bottom}">'
-            f'<rect x="{left}" y="10" width="{width}" height="{height}"/>{marks}{"".join(lines)}'
-            f'<text x="{left + width / 2}" y="{height + 46}" text-anchor="middle">{x_title}</text>'
-            f'<text x="14" y="{10 + height / 2}" text-anchor="middle" transform="rotate(-90 14 {10 + height / 2})">'
-            f"{y_title}</text></svg></figure>")
+    """An SVG of curves, given as x and y of each stream, the real one first, which is drawn over the others."""
+    figure, axes = pyplot_for("--html").subplots(figsize=(7, 3.6), layout="constrained")
+    for i, (name, curve) in reversed(list(enumerate(zip(names, curves)))):
+        axes.plot(*np.array(curve, float).reshape(2, -1), color=COLOURS[i % len(COLOURS)], label=name.replace("$", r"\$"))
+    axes.set(title=title, xlabel=x_title, ylabel=y_title)
+    if logarithmic[0]:
+        axes.set_xscale("log")
+    else:
+        axes.set_xlim(0)
+    if logarithmic[1]:
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(0)
+    axes.grid(alpha=0.3)
+    axes.legend(*(each[::-1] for each in axes.get_legend_handles_labels()), framealpha=0)
+    file = io.StringIO()
+    figure.savefig(file, format="svg", transparent=True)
+    svg = file.getvalue().replace("#000000", "currentColor")  # light on a dark page
+    return f"<figure>{svg[svg.index('<svg'):]}</figure>"
 
 
 def intervals_of(sensor, events):
@@ -246,7 +210,7 @@ def response_curve(sensor, events, travels):
 def charts_of(sensor, real, simulated, travels):
     """The curves of the page, with the response to light if the changes of the light are known."""
     streams = [real] + simulated
-    names = [html.escape(stream.name) for stream in streams]
+    names = [stream.name for stream in streams]
     rates = []
     for i, stream in enumerate(streams):
         curve = (stream.figures or simulated[0].figures)["rate-curve"]
@@ -272,13 +236,11 @@ def charts_of(sensor, real, simulated, travels):
     return charts
 
 
-STYLE = PAGE_STYLE + """
+STYLE = """
 .beyond { color: light-dark(#b02020, #ff8080) } .maps, .charts { display: grid; gap: 1rem }
 .maps { grid-template-columns: repeat(auto-fill, minmax(18rem, 1fr)) }
 .charts { grid-template-columns: repeat(auto-fill, minmax(min(32rem, 100%), 1fr)) }
-img { width: 100%; image-rendering: pixelated } svg { width: 100% } svg text { font-size: 12px; fill: currentColor }
-svg rect, path { fill: none; stroke: #8888 } path { stroke: #8884 } polyline { fill: none; stroke-width: 2 }
-figcaption span { margin-left: .7em; white-space: nowrap }
+img { width: 100%; image-rendering: pixelated } svg { width: 100%; height: auto } svg text { fill: currentColor }
 .bar { display: flex; justify-content: space-between; max-width: 18rem; padding: .1rem .4rem; background: linear-gradient(90deg, #000, #fff) }
 .bar span:nth-child(-n+2) { color: #fff } .bar span { color: #000 }
 """
@@ -289,29 +251,25 @@ def page_of(sensor, real, simulated, rows, charts):
     maps = [counts_per_pixel(sensor, stream.events) for stream in streams]
     max_count = max(np.quantile(maps[0][maps[0] > 0], 0.995), 1)
     names = [html.escape(stream.name) for stream in streams]
-    header = "".join(f'<th style="border-bottom: 3px solid {COLOURS[i % len(COLOURS)]}">{name}</th>'
-                     for i, name in enumerate([f"{names[0]}, ceiling"] + names[1:]))
-    body = "".join(
-        f"<tr><th>{row.title}</th><td>{row.ceiling}</td>"
-        + "".join(f'<td class="beyond">{cell} *</td>' if beyond else f"<td>{cell}</td>"
-                  for cell, beyond in zip(row.cells, row.beyond)) + "</tr>" for row in rows)
+    header = [f'<th style="border-bottom: 3px solid {colour}">{name}</th>'
+              for name, colour in zip([f"{names[0]}, ceiling"] + names[1:], itertools.cycle(["currentColor"] + COLOURS[1:]))]
+    body = [(row.title, [f"<td>{row.ceiling}</td>"] + [
+        f'<td class="beyond">{cell} *</td>' if beyond else f"<td>{cell}</td>"
+        for cell, beyond in zip(row.cells, row.beyond)]) for row in rows]
     figures = "".join(f'<figure><figcaption>{name}</figcaption><img alt="events per pixel" src="{map_of(each, max_count)}">'
                       "</figure>" for name, each in zip(names, maps))
-    return ('<!DOCTYPE html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-            f"<title>Realism of {', '.join(names[1:])}</title><style>{STYLE}</style><h1>Beside {names[0]}</h1>"
-            f"<table><tr><th></th>{header}</tr>{body}</table>"
+    return page(f"Realism of {', '.join(names[1:])}", f"Beside {names[0]}", STYLE, header, body,
             "<p>* beyond the noise ceiling: two recordings of the scene by the same camera would differ less.</p>"
             f'<h2>Events per pixel</h2><p class="bar"><span>0</span><span>{max_count / 4:.3g}</span><span>{max_count:.3g}'
             "</span></p><p>White: the count that 99.5 % of the pixels with real events do not exceed. The brightness is"
-            f' the square root of the count.</p><div class="maps">{figures}</div><div class="charts">{"".join(charts)}</div>\n')
+            f' the square root of the count.</p><div class="maps">{figures}</div><div class="charts">{"".join(charts)}</div>')
 
 
 # the program
 
 
 def options():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = option_parser(__doc__)
     parser.add_argument("real")
     parser.add_argument("simulated", nargs="+")
     parser.add_argument("--from", type=seconds, metavar="SECONDS", help="start of the comparison")
@@ -323,8 +281,6 @@ def options():
                         help="the frames, for the page's response curve: a video, or a text file of lines"
                         " \"seconds picture\"")
     parser.add_argument("--html", metavar="PAGE", help="write a page with maps and curves")
-    parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
-                        help="print the version and exit")
     return parser.parse_args()
 
 
@@ -351,16 +307,12 @@ def main():
     if args.video and not args.html:
         raise RuntimeError("--video needs a page; name one with --html")
     if args.html:
+        pyplot_for("--html")
         expect_writable(args.html, filter(None, [args.real, *args.simulated, args.mask, args.video]))
     sensor = Sensor()
     streams = []
     for path in [args.real] + args.simulated:
-        streams.append(Stream(os.path.basename(path), read_recording(path, sensor)))
-        if len(streams) == 1 and args.mask:
-            sensor.mask = read_mask(args.mask, sensor)
-        streams[-1].events = sensor.of_camera(streams[-1].events)
-        if len(streams[-1].events) == 0:
-            raise RuntimeError(f"{path}: no events" + (" where the mask is white" if args.mask else ""))
+        streams.append(Stream(os.path.basename(path), read_camera(path, sensor, args.mask)))
     span = span_of(streams, getattr(args, "from"), args.to)
     for stream in streams:
         stream.events = span.of(stream.events)
@@ -373,15 +325,9 @@ def main():
     rows = table_of(sensor, real, simulated, span)
     print_table(real, simulated, rows)
     if args.html:
-        page = page_of(sensor, real, simulated, rows, charts_of(sensor, real, simulated, travels))
         with open(args.html, "w", encoding="utf-8") as file:
-            file.write(page)
+            file.write(page_of(sensor, real, simulated, rows, charts_of(sensor, real, simulated, travels)))
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (RuntimeError, OSError, GLib.Error) as failure:
-        sys.exit(f"error: {failure}")
-    except KeyboardInterrupt:
-        sys.exit(130)
+    run(main)

@@ -14,7 +14,7 @@ try:
     import numpy as np
 
     gi.require_version("GstVideo", "1.0")
-    from gi.repository import GLib, GstVideo  # noqa: F401
+    from gi.repository import GstVideo
     from gst_eventcamera.pipeline import Gst, Pipeline, events_of, quoted
     from gst_eventcamera.recordings import buffer_of
     from gst_eventcamera.sources import SINK
@@ -22,6 +22,8 @@ try:
 except (ImportError, ValueError) as missing:
     sys.exit(f"error: {missing}\nInstall python3-gst-eventcamera, a Debian package of gst-eventsim, or in a checkout"
              " run the programs of pipelines/")
+
+from event_files import MAX_SECONDS, listed_pictures  # noqa: E402
 
 # Duration of a buffer of compared events, whose times have 32 bits, in microseconds.
 MAX_BUFFER = 1 << 31
@@ -34,9 +36,6 @@ WHITE_MARGIN = 5
 
 # Of red, green and blue in luma, by BT.709.
 RGB_WEIGHTS = 0.2126, 0.7152, 0.0722
-
-# Limit of times in seconds, so that nanoseconds fit a GStreamer clock time.
-MAX_SECONDS = 1e9
 
 
 @dataclass
@@ -157,13 +156,8 @@ def samples_of(description, feeds=()):
     """Plays a pipeline, and yields the samples of its appsink `out`. Each feed is the name of an appsrc, its caps
     and its buffers."""
     with Pipeline(description) as pipeline:
-        for name, caps, _ in feeds:
-            pipeline.element(name).set_property("caps", Gst.Caps.from_string(caps))
-        pipeline.set_state(Gst.State.PLAYING)
-        for name, _, buffers in feeds:
-            for buffer in buffers:
-                pipeline.element(name).emit("push-buffer", buffer)
-            pipeline.element(name).emit("end-of-stream")
+        for feed in feeds:
+            pipeline.feed(*feed)
         yield from pipeline.samples()
 
 
@@ -184,19 +178,8 @@ def png_of(pixels):
 
 def read_pictures(path, start, end):
     """A text file of lines "seconds picture"; None if it is something else."""
-    entries = []
-    try:
-        with open(path, encoding="utf-8") as file:
-            for line in file:
-                if line.strip() and not line.startswith("#"):
-                    time, name = line.split(maxsplit=1)
-                    if not abs(float(time)) < MAX_SECONDS:
-                        raise RuntimeError(f"{path}: {time} is not the time of a picture; give seconds below 1e9")
-                    entries.append((round(float(time) * 1e9),
-                                    os.path.join(os.path.dirname(path), name.strip())))
-                    if len(entries) > 1 and entries[-1][0] <= entries[-2][0]:
-                        raise RuntimeError(f"{path}: the time {time} is not later than the one before it")
-    except (UnicodeDecodeError, ValueError):
+    entries = listed_pictures(path)
+    if entries is None:
         return None
     if not entries:
         raise RuntimeError(f"{path}: no pictures; give a line \"seconds picture\" for each")
@@ -280,6 +263,17 @@ def read_recording(path, sensor):
         # If a file does not state its size, readers assume the smallest known sensor that holds the events.
         print(f"warning: {path} has {events.width} x {events.height} pixels, what it is compared with has {sensor.width}"
               f" x {sensor.height}; this is right only if the file does not state its size", file=sys.stderr)
+    return events
+
+
+def read_camera(path, sensor, mask):
+    """The events of a file, of the pixels that are white in a picture, if one is given. Sets the mask of the sensor."""
+    events = read_recording(path, sensor)
+    if mask and sensor.mask is None:
+        sensor.mask = read_mask(mask, sensor)
+    events = sensor.of_camera(events)
+    if len(events) == 0:
+        raise RuntimeError(f"{path}: no events" + (" where the mask is white" if mask else ""))
     return events
 
 

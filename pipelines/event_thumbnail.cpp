@@ -11,7 +11,6 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -34,26 +33,13 @@ constexpr gint64 time_limit = gint64{10} * G_USEC_PER_SEC;
 /// Maximum length of a window in the middle of a recording.
 constexpr GstClockTime max_window = GST_SECOND;
 
-struct Free {
-  void operator()(GstObject* object) const { gst_object_unref(object); }
-  void operator()(GstSample* sample) const { gst_sample_unref(sample); }
-  void operator()(GstMessage* message) const { gst_message_unref(message); }
-  void operator()(GError* error) const { g_error_free(error); }
-  void operator()(gchar* text) const { g_free(text); }
-  void operator()(GOptionContext* context) const { g_option_context_free(context); }
-};
-template <class Type>
-using Owned = std::unique_ptr<Type, Free>;
-
 /// The message of an error, and its cause, which is the debug text after the code location.
 std::string text_of(GstMessage* message) {
-  GError* error = nullptr;
-  gchar* debug = nullptr;
+  g_autoptr(GError) error = nullptr;
+  g_autofree gchar* debug = nullptr;
   gst_message_parse_error(message, &error, &debug);
-  const Owned<GError> owned_error(error);
-  const Owned<gchar> owned_debug(debug);
   const char* cause = debug != nullptr ? std::strchr(debug, '\n') : nullptr;
-  return std::string(error->message) + (cause != nullptr ? std::string("\n  ") + (cause + 1) : "");
+  return error->message + (cause != nullptr ? std::string("\n  ") + (cause + 1) : "");
 }
 
 /// Reads the events of a recording, from any time.
@@ -61,79 +47,78 @@ class Recording {
  public:
   /// Opens a file. Throws std::runtime_error, as does next().
   explicit Recording(const char* path) {
-    GError* error = nullptr;
-    pipeline_.reset(GST_OBJECT(gst_parse_launch_full(
+    g_autoptr(GError) error = nullptr;
+    pipeline_ = gst_parse_launch_full(
         "filesrc name=file ! decodebin " ASK_FOR_EVENTS
         " expose-all-streams=false ! appsink name=events sync=false max-buffers=2",
-        nullptr, GST_PARSE_FLAG_FATAL_ERRORS, &error)));
-    const Owned<GError> owned(error);
-    if (!pipeline_) throw std::runtime_error(error->message);
-    const Owned<GstObject> file(GST_OBJECT(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "file")));
-    g_object_set(file.get(), "location", path, nullptr);
-    sink_.reset(GST_OBJECT(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "events")));
-    gst_element_set_state(pipeline(), GST_STATE_PLAYING);
-    gst_element_get_state(pipeline(), nullptr, nullptr, time_limit * GST_USECOND);
+        nullptr, GST_PARSE_FLAG_FATAL_ERRORS, &error);
+    if (pipeline_ == nullptr) throw std::runtime_error(error->message);
+    g_autoptr(GstElement) file = gst_bin_get_by_name(GST_BIN(pipeline_), "file");
+    g_object_set(file, "location", path, nullptr);
+    sink_ = gst_bin_get_by_name(GST_BIN(pipeline_), "events");
+    gst_element_set_state(pipeline_, GST_STATE_PLAYING);
+    gst_element_get_state(pipeline_, nullptr, nullptr, time_limit * GST_USECOND);
   }
   ~Recording() {
-    if (pipeline_) gst_element_set_state(pipeline(), GST_STATE_NULL);
+    gst_element_set_state(pipeline_, GST_STATE_NULL);
+    gst_object_unref(sink_);
+    gst_object_unref(pipeline_);
   }
   Recording(const Recording&) = delete;
   Recording& operator=(const Recording&) = delete;
 
   std::optional<GstClockTime> duration() const {
     gint64 duration = 0;
-    if (!gst_element_query_duration(pipeline(), GST_FORMAT_TIME, &duration) || duration <= 0)
+    if (!gst_element_query_duration(pipeline_, GST_FORMAT_TIME, &duration) || duration <= 0)
       return std::nullopt;
     return static_cast<GstClockTime>(duration);
   }
 
   /// Seeks to `start`, and plays until `stop` if it is valid. Returns false if that fails.
   bool seek(GstClockTime start, GstClockTime stop) {
-    return gst_element_seek(pipeline(), 1, GST_FORMAT_TIME, flags, GST_SEEK_TYPE_SET,
+    return gst_element_seek(pipeline_, 1, GST_FORMAT_TIME, flags, GST_SEEK_TYPE_SET,
                             static_cast<gint64>(start), GST_SEEK_TYPE_SET,
                             static_cast<gint64>(stop)) != FALSE;
   }
 
   /// Returns the next events, or null at the end and after the time limit.
-  Owned<GstSample> next() {
-    auto* sink = GST_APP_SINK(sink_.get());
+  GstSample* next() {
+    auto* sink = GST_APP_SINK(sink_);
     while (g_get_monotonic_time() < deadline_) {
-      Owned<GstSample> sample(gst_app_sink_try_pull_sample(sink, GST_SECOND / 10));
+      g_autoptr(GstSample) sample = gst_app_sink_try_pull_sample(sink, GST_SECOND / 10);
       throw_error();
-      if (sample || gst_app_sink_is_eos(sink)) return sample;
+      if (sample != nullptr || gst_app_sink_is_eos(sink)) return g_steal_pointer(&sample);
     }
     return nullptr;
   }
 
  private:
-  GstElement* pipeline() const { return GST_ELEMENT(pipeline_.get()); }
-
   void throw_error() {
-    const Owned<GstObject> bus(GST_OBJECT(gst_element_get_bus(pipeline())));
-    const Owned<GstMessage> message(gst_bus_pop_filtered(GST_BUS(bus.get()), GST_MESSAGE_ERROR));
-    if (message) throw std::runtime_error(text_of(message.get()));
+    g_autoptr(GstBus) bus = gst_element_get_bus(pipeline_);
+    g_autoptr(GstMessage) message = gst_bus_pop_filtered(bus, GST_MESSAGE_ERROR);
+    if (message != nullptr) throw std::runtime_error(text_of(message));
   }
 
   static constexpr auto flags =
       static_cast<GstSeekFlags>(GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE);
 
   gint64 deadline_ = g_get_monotonic_time() + time_limit;
-  Owned<GstObject> pipeline_;
-  Owned<GstObject> sink_;
+  GstElement* pipeline_;
+  GstElement* sink_;
 };
 
 /// Draws the next window. Throws std::runtime_error.
 std::optional<Thumbnail> draw_window(Recording& recording, int max_side) {
   std::optional<Thumbnail> picture;
   while (!picture || !picture->is_full()) {
-    const auto sample = recording.next();
+    g_autoptr(GstSample) sample = recording.next();
     GstEventCameraInfo info{};
-    if (!sample || !gst_event_camera_info_from_caps(&info, gst_sample_get_caps(sample.get())))
+    if (sample == nullptr || !gst_event_camera_info_from_caps(&info, gst_sample_get_caps(sample)))
       break;
     // If the file does not state the size of the sensor, it may grow.
     const SensorSize sensor{info.width, info.height};
     if (!picture || picture->sensor() != sensor) picture.emplace(sensor, max_side);
-    if (const MappedEvents events(gst_sample_get_buffer(sample.get())); events)
+    if (const MappedEvents events(gst_sample_get_buffer(sample)); events)
       picture->add(events.events(), events.start());
   }
   return picture;
@@ -177,13 +162,11 @@ std::optional<std::string> parse(Options& options, int& argc, char**& argv) {
       {"version", 0, 0, G_OPTION_ARG_NONE, &options.print_version, "Print the version", nullptr},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &options.files, nullptr, nullptr},
       {}};
-  const Owned<GOptionContext> context(
-      g_option_context_new("IN OUT - draws a thumbnail of an event file, a PNG file"));
-  GError* error = nullptr;
-  g_option_context_add_main_entries(context.get(), entries, nullptr);
-  g_option_context_parse(context.get(), &argc, &argv, &error);
-  const Owned<GError> owned(error);
-  if (error != nullptr) return error->message;
+  g_autoptr(GOptionContext) context =
+      g_option_context_new("IN OUT - draws a thumbnail of an event file, a PNG file");
+  g_autoptr(GError) error = nullptr;
+  g_option_context_add_main_entries(context, entries, nullptr);
+  if (!g_option_context_parse(context, &argc, &argv, &error)) return error->message;
   if (options.print_version) return std::nullopt;
   if (options.files == nullptr || g_strv_length(options.files) != 2) return "needs IN and OUT";
   if (options.size < 1 || options.size > 4096) return "--size must be from 1 to 4096";
@@ -192,9 +175,8 @@ std::optional<std::string> parse(Options& options, int& argc, char**& argv) {
 
 /// Returns false, and prints what to do, if GStreamer lacks the plugin eventcam.
 bool has_plugin() {
-  const Owned<GstObject> plugin(
-      GST_OBJECT(gst_registry_find_plugin(gst_registry_get(), "eventcam")));
-  if (!plugin)
+  g_autoptr(GstPlugin) plugin = gst_registry_find_plugin(gst_registry_get(), "eventcam");
+  if (plugin == nullptr)
     std::fputs(
         "GStreamer does not find the plugin eventcam. In a checkout, enter the development shell: "
         "meson devenv -C build -w .\nOtherwise install it: the Debian package "

@@ -28,7 +28,8 @@ except (ImportError, ValueError) as missing:
     sys.exit(f"error: {missing}\nOn Debian, install: python3-gi gir1.2-gst-plugins-base-1.0"
              " gir1.2-gst-rtsp-server-1.0")
 
-from capture import Capture, Source, described, find_elements, host_of, option_parser  # noqa: E402
+from capture import Capture, Source, described, host_of, server_options  # noqa: E402
+from program import find_elements, find_plugins, run  # noqa: E402
 
 ELEMENTS = ["vp8enc", "rtpvp8pay",
             "x264enc", "rtph264pay"]
@@ -127,7 +128,7 @@ class Server:
 
 
 def main():
-    parser = option_parser("rtsp-events", __doc__, "0.0.0.0", 8554)
+    parser = server_options("rtsp-events", __doc__, "0.0.0.0", 8554)
     parser.add_argument("--user", help="user name that clients must log in with")
     parser.add_argument("--password", help="password of that user")
     parser.add_argument("--certificate", metavar="PEM",
@@ -138,6 +139,7 @@ def main():
     if args.user == "":
         parser.error("--user is empty")
     Gst.init(None)
+    find_plugins()
     find_elements(ELEMENTS, "gstreamer1.0-plugins-good gstreamer1.0-plugins-ugly")
     server = Server(args.device, args.source, args.simulator)
     if args.user is not None or args.certificate:
@@ -146,7 +148,4 @@ def main():
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (RuntimeError, GLib.Error) as failure:
-        sys.exit(f"error: {failure}")
+    run(main)

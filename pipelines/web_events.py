@@ -27,7 +27,8 @@ except (ImportError, ValueError) as missing:
     sys.exit(f"error: {missing}\nOn Debian, install: python3-gi gir1.2-gst-plugins-base-1.0"
              " gir1.2-gst-plugins-bad-1.0 gir1.2-soup-3.0")
 
-from capture import Capture, Source, find_elements, host_of, option_parser  # noqa: E402
+from capture import Capture, Source, host_of, server_options  # noqa: E402
+from program import find_elements, find_plugins, run  # noqa: E402
 
 PAGE = os.path.join(os.path.dirname(os.path.realpath(__file__)), "web_events.html")
 ELEMENTS = ["vp8enc", "rtpvp8pay", "webrtcbin", "nicesink", "dtlssrtpenc"]
@@ -292,18 +293,16 @@ class Server:
 
 
 def main():
-    parser = option_parser("web-events", __doc__, "127.0.0.1", 8080)
+    parser = server_options("web-events", __doc__, "127.0.0.1", 8080)
     parser.add_argument("--host", action="append", default=[],
                         help="further name of this machine that browsers may use, besides localhost, its host"
                         " name and IP addresses; may be repeated")
     args = parser.parse_args()
     Gst.init(None)
+    find_plugins()
     find_elements(ELEMENTS, "gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-nice")
     Server(args.device, args.source, args.simulator, args.host).run(args.address, args.port)
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (RuntimeError, GLib.Error) as failure:
-        sys.exit(f"error: {failure}")
+    run(main)

@@ -20,4 +20,4 @@ tests/mmdebstrap.sh "$1" --variant=apt --format=null \
     # GCC warns of what the standard library does if that is precompiled.
     meson setup build -Dtests=true -Dwerror=true -Db_pch=false
     meson test -C build --print-errorlogs \
-      element_{aedat_reading,file_reading,gl,hdf5,properties,render,rtp,states,stream,tensor}"'
+      element_{aedat,contracts,drawing,files,gl,hdf5,rtp,simulator,tensor}"'

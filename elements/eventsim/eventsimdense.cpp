@@ -29,7 +29,7 @@
 #include "features.hpp"
 #include "gst/simulator/dense_properties.hpp"
 #include "gst/simulator/luma_video_simulator.hpp"
-#include "src/simulate/dense_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 
 using eventcamera::DenseSimulator;
 using eventcamera::FlowMethod;

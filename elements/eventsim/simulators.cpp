@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// Simulators without properties of their own: a table of methods.
+#include "src/simulate/simulators.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 #include "gst/simulator/luma_video_simulator.hpp"
-#include "src/simulate/diff_simulator.hpp"
-#include "src/simulate/frame_simulator.hpp"
-#include "src/simulate/sparse_simulator.hpp"
 
 /**
  * SECTION:element-eventsim-frame

@@ -5,7 +5,6 @@
 
 #include "gst/base/video_frame.hpp"
 #include "src/core/luma.hpp"
-#include "src/core/rgb_luma.hpp"
 #include "src/core/thread_pool.hpp"
 
 /// Luma weights of the colours of RGB video. Its colorimetry has no YUV matrix, so the matrix is

@@ -11,7 +11,6 @@
 #include <gst/eventcamera/eventcamera.h>
 #include <signal.h>
 #include <string.h>
-#include <unistd.h>
 
 typedef struct {
   guint64 events;
@@ -67,8 +66,17 @@ static gboolean check_caps(const GstCaps* caps) {
   return TRUE;
 }
 
-/* Counts events until the end of the stream, and prints a line per second of stream time. */
-static gboolean count_stream(GstAppSink* sink, GstBus* bus) {
+static volatile sig_atomic_t is_interrupted = FALSE;
+
+/* A second Ctrl-C ends the program. */
+static void interrupt(int number) {
+  is_interrupted = TRUE;
+  signal(number, SIG_DFL);
+}
+
+/* Counts events until the end of the stream, and prints a line per second of stream time. Ctrl-C
+ * sends EOS, so that sinks complete their files. */
+static gboolean count_stream(GstElement* pipeline, GstAppSink* sink, GstBus* bus) {
   Count all = {0, 0};
   Count second = {0, 0};
   GstClockTime start = GST_CLOCK_TIME_NONE;
@@ -78,6 +86,10 @@ static gboolean count_stream(GstAppSink* sink, GstBus* bus) {
   while (!gst_app_sink_is_eos(sink)) {
     GstSample* sample = gst_app_sink_try_pull_sample(sink, GST_SECOND / 10);
     GstBuffer* buffer;
+    if (is_interrupted) {
+      is_interrupted = FALSE;
+      gst_element_send_event(pipeline, gst_event_new_eos());
+    }
     if (sample == NULL) {
       if (failed(bus)) return FALSE;
       continue;
@@ -107,28 +119,13 @@ static gboolean count_stream(GstAppSink* sink, GstBus* bus) {
   return !failed(bus);
 }
 
-static GstElement* pipeline;
-
-/* Sends EOS on Ctrl-C, so that sinks complete their files. */
-static gpointer wait_for_interrupt(gpointer signals) {
-  int caught;
-  if (sigwait(signals, &caught) != 0) return NULL;
-  gst_element_send_event(pipeline, gst_event_new_eos());
-  pthread_sigmask(SIG_UNBLOCK, signals, NULL); /* a second Ctrl-C ends the program */
-  pause();
-  return NULL;
-}
-
 int main(int argc, char** argv) {
-  static sigset_t signals;
   GError* error = NULL;
+  GstElement* pipeline;
   GstElement* sink;
   GstBus* bus;
   gboolean ok;
 
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &signals, NULL);
   gst_init(&argc, &argv);
   if (argc != 2) {
     g_printerr("usage: %s PIPELINE, with an appsink name=events in it\n", argv[0]);
@@ -147,11 +144,10 @@ int main(int argc, char** argv) {
     gst_object_unref(pipeline);
     return 2;
   }
-  gst_object_ref(pipeline); /* for the thread, until the program ends */
-  g_thread_unref(g_thread_new("interrupt", wait_for_interrupt, &signals));
+  signal(SIGINT, interrupt);
   gst_element_set_state(pipeline, GST_STATE_PLAYING);
   bus = gst_element_get_bus(pipeline);
-  ok = count_stream(GST_APP_SINK(sink), bus);
+  ok = count_stream(pipeline, GST_APP_SINK(sink), bus);
   gst_element_set_state(pipeline, GST_STATE_NULL);
   gst_object_unref(bus);
   gst_object_unref(sink);

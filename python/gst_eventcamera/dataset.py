@@ -6,15 +6,15 @@ import contextlib
 import dataclasses
 import functools
 import os
+import pathlib
 import re
-import tempfile
-from typing import Iterator, Mapping, Optional, Sequence, overload
+from typing import Iterable, Iterator, Mapping, Optional, Sequence, overload
 
 import numpy as np
 
 from .events import Events
 from .frames import Frames
-from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, duration_of, events_of, property_limits, quoted
+from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, events_of, property_limits
 from .recipe import PICTURES, TENSORS, Recipe, Value, Window, is_picture
 from .sources import SINK
 from .tensors import TENSOR_CAPS, tensor_of
@@ -65,7 +65,7 @@ class DatasetVideo:
         frames = Frames()
         frames.watch(pipeline.element("decoded").get_static_pad("sink"))
         yield from pipeline.samples()
-        if fault := self.fault(frames, duration_of(pipeline)):
+        if fault := self.fault(frames, pipeline.duration()):
             raise PipelineError(f"{self.name}: {fault}")
 
     def fault(self, frames: Frames, duration: float) -> str:
@@ -84,19 +84,15 @@ class DatasetVideo:
         if threads > 0 and "n-threads" in property_limits(recipe.simulator):
             parameters["n-threads"] = threads
         line = recipe.line(parameters)
-        with contextlib.ExitStack() as stack:
-            # Caps at the start or end of the line need an element before and after them.
-            rest = f"identity ! {line} ! identity ! {EVENT_CAPS} ! {rest}"
-            if recipe.window:
-                made: Pipeline = VideoPipeline("appsrc name=window format=time", rest)
-            elif os.path.isdir(self.path):
-                folder = stack.enter_context(tempfile.TemporaryDirectory())
-                made = VideoPipeline(_numbered_pictures(self.path, folder, recipe), rest)
-            else:
-                made = VideoFile(self.path, rest)
-            pipeline = stack.enter_context(made)
-            if recipe.window:
-                _feed(pipeline, _moving_window(_scaled_picture(self.path, recipe.window), recipe.window), recipe)
+        # Caps at the start or end of the line need an element before and after them.
+        rest = f"identity ! {line} ! identity ! {EVENT_CAPS} ! {rest}"
+        if not recipe.window and not os.path.isdir(self.path):
+            with VideoFile(self.path, rest) as pipeline:
+                yield pipeline
+            return
+        element, caps, buffers = (_moving_window if recipe.window else _pictures)(self.path, recipe)
+        with VideoPipeline(f"appsrc name=source format=time ! {element}", rest) as pipeline:
+            pipeline.feed("source", caps, buffers)
             yield pipeline
 
 
@@ -138,24 +134,35 @@ def pictures_of(folder: str) -> list[str]:
     return [os.path.join(folder, name) for name in in_order]
 
 
+Fed = tuple[str, str, Iterator[Gst.Buffer]]  # an element after an appsrc, and the caps and buffers of the appsrc
+
+
 def _framerate(recipe: Recipe) -> str:
     """The framerate as a field of caps."""
     assert recipe.framerate
     return f"framerate={recipe.framerate.numerator}/{recipe.framerate.denominator}"
 
 
-def _numbered_pictures(path: str, folder: str, recipe: Recipe) -> str:
-    """A source of the pictures of a folder: multifilesrc, which reads links with numbers as names."""
+def _timed(frames: Iterable[bytes], recipe: Recipe) -> Iterator[Gst.Buffer]:
+    """Buffers of frames."""
+    assert recipe.framerate
+    duration = Gst.SECOND / recipe.framerate
+    for number, frame in enumerate(frames):
+        buffer = Gst.Buffer.new_wrapped(frame)
+        buffer.pts, buffer.duration = round(number * duration), round(duration)
+        yield buffer
+
+
+def _pictures(path: str, recipe: Recipe) -> Fed:
+    """The pictures of a folder."""
     if not recipe.framerate:
         raise PipelineError(f"{path} is a folder of pictures, and the recipe has no framerate")
     pictures = pictures_of(path)
     kinds = {PICTURES[os.path.splitext(picture)[1].lower()] for picture in pictures}
     if len(kinds) != 1:
         raise PipelineError(f"{path} has pictures of different formats")
-    for number, picture in enumerate(pictures):
-        os.symlink(os.path.abspath(picture), os.path.join(folder, f"{number:08}"))
-    numbered = quoted(folder.replace("%", "%%") + "/%08d")
-    return f"multifilesrc location={numbered} caps=\"{kinds.pop()},{_framerate(recipe)}\" ! decodebin"
+    frames = (pathlib.Path(picture).read_bytes() for picture in pictures)
+    return "decodebin", f"{kinds.pop()},{_framerate(recipe)}", _timed(frames, recipe)
 
 
 def _scaled_picture(path: str, window: Window) -> np.ndarray:
@@ -171,29 +178,12 @@ def _scaled_picture(path: str, window: Window) -> np.ndarray:
     return np.frombuffer(buffer.extract_dup(0, buffer.get_size()), np.uint8).reshape(height, -1)
 
 
-def _moving_window(picture: np.ndarray, window: Window) -> Iterator[np.ndarray]:
-    """Yields the window at each of its positions on a scaled picture."""
-    for left, top in window.corners():
-        yield picture[top:top + window.height, left:left + window.width]
-
-
-def _feed(pipeline: Pipeline, frames: Iterator[np.ndarray], recipe: Recipe) -> None:
-    """Pushes a frame whenever the pipeline needs one."""
-    assert recipe.window and recipe.framerate
-    width, height, duration = recipe.window.width, recipe.window.height, Gst.SECOND / recipe.framerate
-    numbered = enumerate(frames)
-
-    def push(source: Gst.Element, _: int) -> None:
-        number, frame = next(numbered, (0, None))
-        if frame is None:
-            source.emit("end-of-stream")
-            return
-        rows = np.pad(frame, ((0, 0), (0, -width % 4)))  # as GStreamer pads them
-        buffer = Gst.Buffer.new_wrapped(rows.tobytes())
-        buffer.pts, buffer.duration = round(number * duration), round(duration)
-        source.emit("push-buffer", buffer)
-
-    source = pipeline.element("window")
-    source.set_property("caps", Gst.Caps.from_string(
-        f"video/x-raw,format=GRAY8,width={width},height={height},{_framerate(recipe)}"))
-    source.connect("need-data", push)
+def _moving_window(path: str, recipe: Recipe) -> Fed:
+    """The window of a recipe at each of its positions on a picture."""
+    assert recipe.window
+    width, height = recipe.window.width, recipe.window.height
+    picture = _scaled_picture(path, recipe.window)
+    frames = (np.pad(picture[top:top + height, left:left + width], ((0, 0), (0, -width % 4))).tobytes()
+              for left, top in recipe.window.corners())  # padded as GStreamer does
+    caps = f"video/x-raw,format=GRAY8,width={width},height={height},{_framerate(recipe)}"
+    return "identity", caps, _timed(frames, recipe)

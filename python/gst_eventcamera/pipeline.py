@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import atexit
-import contextlib
 import math
 import os
 import sys
 import warnings
-from typing import Callable, Iterator, Optional
+from typing import Callable, Iterable, Iterator, Optional
 
 import gi
 import numpy as np
@@ -132,6 +131,9 @@ class Pipeline:
 
         pad.add_probe(Gst.PadProbeType.EVENT_DOWNSTREAM, replace)
 
+    def feed(self, name: str, caps: str, buffers: Iterable[Gst.Buffer]) -> None:
+        feed(self.element(name), Gst.Caps.from_string(caps), buffers)
+
     def raise_error(self, wait: int = 0) -> None:
         """Raises the first error that an element has posted, or posts within `wait` nanoseconds."""
         self._handle_messages(wait)
@@ -178,11 +180,9 @@ class Pipeline:
         self.set_state(Gst.State.PAUSED)
 
     def duration(self) -> float:
-        """Duration in seconds; the pipeline must be paused."""
+        """Duration in seconds, 0 if unknown; the pipeline must be paused."""
         known, duration = self._pipeline.query_duration(Gst.Format.TIME)
-        if not known:
-            raise PipelineError("the duration of the source is unknown")
-        return duration / 1e9
+        return duration / 1e9 if known else 0.0
 
     def caps(self) -> Gst.Caps:
         """Caps of the output; the pipeline must be paused."""
@@ -212,18 +212,31 @@ class Pipeline:
             self.raise_error(MAX_WAIT)
 
 
+def feed(source: Gst.Element, caps: Gst.Caps, buffers: Iterable[Gst.Buffer]) -> None:
+    """Makes an appsrc push buffers as it needs them, and then EOS; an exception ends the pipeline with an error."""
+    rest = iter(buffers)
+
+    def push(_: Gst.Element, __: int) -> None:
+        buffer = None
+        try:
+            buffer = next(rest, None)
+        except (OSError, RuntimeError) as failure:
+            error = GLib.Error.new_literal(Gst.StreamError.quark(), str(failure), Gst.StreamError.FAILED)
+            source.post_message(Gst.Message.new_error(source, error, ""))
+        if buffer is None:
+            source.emit("end-of-stream")
+        else:
+            source.emit("push-buffer", buffer)
+
+    source.set_property("caps", caps)
+    source.connect("need-data", push)
+
+
 @atexit.register
 def _stop_all() -> None:
     """Stops pipelines before Python ends threads, which may hold the lock of a pad in a probe."""
     for pipeline in list(_open):
         pipeline.__exit__()
-
-
-def duration_of(pipeline: Pipeline) -> float:
-    """Duration in seconds; 0 if unknown."""
-    with contextlib.suppress(PipelineError):
-        return pipeline.duration()
-    return 0.0
 
 
 def property_limits(element: str) -> dict[str, tuple[float, float]]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from .events import Events, join
 from .pipeline import (
-    EVENT_CAPS, LABEL, GLib, Gst, GstEventCamera, Pipeline, PipelineError, duration_of, events_of, given_size,
+    EVENT_CAPS, LABEL, GLib, Gst, GstEventCamera, Pipeline, PipelineError, events_of, given_size,
     quoted, sensor_size, utf8_path, warn)
 from .sources import SINK
 
@@ -30,9 +30,6 @@ MAX_EMPTY = 10_000
 MAX_LEN = 1 << 27
 # Microseconds of the buffers that are written.
 BUFFER = 10_000
-# Bytes that may wait to be written, and nanoseconds between two looks at them.
-MAX_QUEUED = 1 << 24
-LOOK = Gst.MSECOND
 XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
 
 
@@ -222,9 +219,8 @@ class Stream:
     def _whole(self) -> float:
         """The duration of the recording, which readers may estimate or not know until they have read its end."""
         with self._open() as pipeline:
-            pipeline.gaps_as_buffers()
             pipeline.set_state(Gst.State.PAUSED)
-            for start in max(duration_of(pipeline) - 1e-6, 0), 0:  # all of it, if nothing is at its end
+            for start in max(pipeline.duration() - 1e-6, 0), 0:  # all of it, if nothing is at its end
                 pipeline.seek(start, None)
                 if sum(1 for _ in pipeline.samples()) > 0:
                     break
@@ -254,7 +250,7 @@ def read(path: str | os.PathLike[str], start: float = 0, end: Optional[float] = 
         events = join(part._play(pipeline))
         if events.width == 0:
             events.width, events.height = sensor_size(pipeline.caps())
-        events.end = max(events.end, events.start + part._length(duration_of(pipeline)))
+        events.end = max(events.end, events.start + part._length(pipeline.duration()))
     return events
 
 
@@ -280,17 +276,8 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
         writer = writer.replace("eventcsvenc", "eventcsvenc format=labels")
     with _replacing(path) as part, Pipeline(f"appsrc name=in format=time ! {writer}") as pipeline:
         pipeline.element("file").set_property("location", part)
-        source = pipeline.element("in")
-        source.set_property("caps", Gst.Caps.from_string(
-            f"{EVENT_CAPS},width={width},height={height},framerate=0/1"))
+        pipeline.feed("in", f"{EVENT_CAPS},width={width},height={height},framerate=0/1", _buffers(events))
         pipeline.set_state(Gst.State.PLAYING)
-        for buffer in _buffers(events):
-            while source.get_property("current-level-bytes") > MAX_QUEUED:
-                pipeline.raise_error(wait=LOOK)
-            if source.emit("push-buffer", buffer) != Gst.FlowReturn.OK:
-                pipeline.raise_error()
-                raise PipelineError(f"{path} cannot be written")
-        source.emit("end-of-stream")
         pipeline.wait()
 
 

@@ -44,7 +44,7 @@ inline std::span<const Event> events_until(std::span<const Event> events, Micros
                                            Microseconds end) {
   const auto first_after =
       std::ranges::find_if(events, [&](const Event& event) { return start + event.t > end; });
-  return events.first(static_cast<std::size_t>(first_after - events.begin()));
+  return events.first(first_after - events.begin());
 }
 
 /// Bits of a coordinate. Simulators carry the cause of an event in the other bits (label.hpp).

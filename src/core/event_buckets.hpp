@@ -21,7 +21,6 @@ class EventBuckets {
 
   int bands() const { return static_cast<int>(bands_); }
 
-  /// Number of events.
   virtual std::size_t size() const = 0;
 
   /// Writes size() events, sorted by time, then in raster order.
@@ -37,7 +36,7 @@ class EventBuckets {
   EventBuckets& operator=(const EventBuckets&) = default;
 
   /// Writes the sorted events [first, last) to out + first. A FiredPixels or a time slice is
-  /// written whole, by the call whose range holds its first event.
+  /// written whole, by the call whose range contains its first event.
   virtual void write_part(std::size_t first, std::size_t last, Event* out) const = 0;
 
   std::size_t bands_ = 1;

@@ -10,7 +10,7 @@
 
 namespace eventcamera {
 
-/// Numbers of events of a buffer that cannot be used.
+/// Numbers of invalid events.
 struct InvalidEvents {
   std::size_t outside = 0;   ///< x or y past the sensor
   std::size_t unsorted = 0;  ///< earlier than the previous event, or past the end of the buffer
@@ -23,10 +23,9 @@ class EventValidator {
  public:
   EventValidator(int width, int height) : width_(width), height_(height) {}
 
-  /// Calls `use` for each valid event; times are relative to `start`. A late event, before the
-  /// previous one or before passed(), gets that time; events outside the sensor or after `max_t`
-  /// are dropped. `labels` is empty or has one label per event. Returns the numbers of dropped
-  /// events.
+  /// Calls `use` for each valid event; times are relative to `start`. Late events, before the
+  /// previous one or before passed(), get that time; events outside the sensor or after `max_t` are
+  /// dropped. `labels` is empty or has one label per event. Returns the numbers of dropped events.
   template <class Use>
   InvalidEvents for_each_valid(std::span<const Event> events, Microseconds start,
                                Microseconds max_t, const Use& use,
@@ -47,7 +46,6 @@ class EventValidator {
     return dropped;
   }
 
-  /// Forgets all times.
   void restart() { *this = {width_, height_}; }
 
   /// Treats events before `time` as late from now on.

@@ -3,7 +3,6 @@
 
 #include "src/core/set_bits.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/core/fired_pixels.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -26,8 +25,8 @@ void write_byte(std::uint32_t first_place, unsigned fired, unsigned on, hn::Vec<
   for (int i = 0; i < 8; i += lanes) {
     const auto bit = hn::PromoteTo(places, hn::LoadU(bytes, set_bits.of[fired] + i));
     const auto polarity =
-        hn::And(hn::Shl(ons, hn::Sub(hn::Set(places, 31), bit)), hn::Set(places, 0x80000000U));
-    hn::StoreInterleaved2(t, hn::Or(hn::Add(first, bit), polarity), places,
+        hn::And(hn::Shl(ons, hn::Set(places, 31) - bit), hn::Set(places, 0x80000000U));
+    hn::StoreInterleaved2(t, hn::Or(first + bit, polarity), places,
                           reinterpret_cast<std::uint32_t*>(out + i));
   }
 }

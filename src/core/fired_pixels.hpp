@@ -47,10 +47,8 @@ class FiredPixels {
     group_count_ = static_cast<std::uint32_t>(count);
   }
 
-  /// Time of the pixels.
   std::uint32_t time() const { return t_; }
 
-  /// Number of pixels.
   std::size_t size() const { return size_; }
 
   /// Number of pixels whose event is ON.
@@ -61,7 +59,6 @@ class FiredPixels {
     return sum;
   }
 
-  /// Writes size() events.
   void write_to(Event* out) const;
 
   /// Passes the pixels of each row to visit(int y, std::span<const Group>, number of pixels).

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/core/interval_times.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/core/interval_times.cpp"
 #include <hwy/foreach_target.h>
 // Must come after HWY_TARGET_INCLUDE.
@@ -40,15 +39,14 @@ bool convert(Microseconds start, Microseconds latest, std::span<const AbsoluteEv
     hn::Vec<decltype(words)> before, times, pixels;
     hn::LoadInterleaved2(words, in + 2 * i - 2, before, pixels);
     hn::LoadInterleaved2(words, in + 2 * i, times, pixels);
-    falls = hn::Or(falls, hn::VecFromMask(words, hn::Lt(times, before)));
-    const auto relative =
-        hn::And(hn::Sub(times, hn::Set(words, start)), hn::Set(words, 0xffffffff));
+    falls = hn::Or(falls, hn::VecFromMask(words, times < before));
+    const auto relative = hn::And(times - hn::Set(words, start), hn::Set(words, 0xffffffff));
     const auto event = hn::Or(relative, hn::ShiftLeft<32>(pixels));
     hn::StoreU(event, words, reinterpret_cast<std::int64_t*>(out + i));
   }
   if (i > 0 && i < events.size()) latest = events[i - 1].t;
   for (; i < events.size(); ++i) convert_one(i);
-  return !falls_here && hn::AllTrue(words, hn::Eq(falls, hn::Zero(words)));
+  return !falls_here && hn::AllTrue(words, falls == hn::Zero(words));
 }
 
 }  // namespace

@@ -21,12 +21,10 @@ constexpr Event with_cause(Event event, Cause cause) {
   return event;
 }
 
-/// Cause stored by with_cause().
 constexpr Cause cause_of(const Event& event) {
   return static_cast<Cause>((event.x >> 14 & 3) | (event.y_p >> 12 & 4));
 }
 
-/// Event without the cause stored by with_cause().
 constexpr Event without_cause(Event event) {
   event.x &= coordinate_bits;
   event.y_p &= coordinate_bits | 0x8000;
@@ -43,7 +41,6 @@ struct Label {
 };
 static_assert(sizeof(Label) == 4);
 
-/// Label of an event of a labelled stream.
 constexpr Label label_of(const AbsoluteEvent& event) {
   return {.object_class = event.object_class, .cause = event.cause};
 }
@@ -59,7 +56,7 @@ struct LabelledEvents {
   std::span<Label> labels;  ///< one per event, or empty
 
   /// Moves the events for which keep(Event&) is true to the front, in order and with their labels,
-  /// and returns them. `keep` is called once for each event, in order, and may change it.
+  /// and returns them. Calls `keep`, which may change the event, once for each, in order.
   template <class Keep>
   LabelledEvents keep_if(Keep keep) const {
     // Locals, which stores cannot alias.

@@ -14,7 +14,6 @@ constexpr bool is_side(std::int64_t pixels) {
   return pixels > 0 && pixels <= max_side;
 }
 
-/// Sensor size in pixels.
 struct SensorSize {
   int width = 0;
   int height = 0;

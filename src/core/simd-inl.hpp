@@ -47,7 +47,12 @@ HWY_INLINE hn::Vec<Tag> iota(Tag tag, hn::TFromD<Tag> first) {
     std::iota(lanes.begin(), lanes.end(), T{0});
     return lanes;
   }();
-  return hn::Add(hn::Load(tag, numbers.data()), hn::Set(tag, first));
+  return hn::Load(tag, numbers.data()) + hn::Set(tag, first);
+}
+
+template <class Vector>
+HWY_INLINE Vector lerp(Vector a, Vector b, Vector weight) {
+  return a + weight * (b - a);
 }
 
 /// Moves the lanes of a mask to the front; the remaining lanes are undefined. Lanes have 4 or 8
@@ -101,7 +106,7 @@ class Lookup {
   hn::Vec<Words> lanes_;
 #else
   explicit Lookup(hn::Vec<Words> lanes)
-      : is_low_(hn::RebindMask(Floats(), hn::Lt(lanes, hn::Set(Words(), count)))),
+      : is_low_(hn::RebindMask(Floats(), lanes < hn::Set(Words(), count))),
         lanes_(hn::IndicesFromVec(Floats(), hn::And(lanes, hn::Set(Words(), count - 1)))) {}
   HWY_INLINE Vector operator()(Vector low, Vector high) const {
     return hn::IfThenElse(is_low_, hn::TableLookupLanes(low, lanes_),

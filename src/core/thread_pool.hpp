@@ -13,11 +13,11 @@ namespace eventcamera {
 
 /// Pool of threads for parallel loops. Must be called from one thread at a time.
 ///
-/// The loops of a frame follow each other closely and can be shorter than a thread's wake-up time.
-/// So threads yield for a while before they sleep, and a loop does not wait for late threads.
+/// The loops of a frame follow each other closely and can be shorter than the wake-up time of a
+/// thread. So threads yield for a while before they sleep, and a loop does not wait for late ones.
 ///
-/// Any thread may run any round of a loop. Each round must write only its own data; the result is
-/// then the same for any number of threads.
+/// Any thread may run any round of a loop. Each round must write only its own data, so that the
+/// result does not depend on the number of threads.
 class ThreadPool {
  public:
   ThreadPool() = default;
@@ -40,7 +40,7 @@ class ThreadPool {
 
  private:
   /// Rounds that a thread runs before it helps other threads: the same in each loop over an image,
-  /// so that their data are often in its cache.
+  /// so that its cache often has their data.
   struct alignas(64) Share {
     std::atomic<int> next = 0;
     int end = 0;

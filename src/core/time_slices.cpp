@@ -9,9 +9,9 @@ namespace eventcamera {
 namespace {
 
 /// Counting sort of a time slice of 2^slice_bits microseconds. visit_lists(visit) passes its events
-/// to visit(std::span<const Event>, const Event& last) in lists, with the last event of the array
-/// that holds the list. Bins are a microsecond or longer: at most a few times as many bins as
-/// events.
+/// to visit(std::span<const Event>, const Event& last) in lists; `last` is the last event of the
+/// array that holds the list. Bins last a microsecond or more, and there are at most a few times as
+/// many as events.
 template <class VisitLists>
 void write_slice(const VisitLists& visit_lists, int slice_bits, std::span<Event> out) {
   constexpr int max_bins_bits = 12;
@@ -51,7 +51,7 @@ void TimeSlices::reset(std::uint32_t duration, int bands) {
 
 void TimeSlices::add(int band, std::span<const Event> events) {
   const auto slice_of = [this](const Event& event) { return event.t >> slice_bits_; };
-  auto& [sliced, starts] = slices_[static_cast<std::size_t>(band)];
+  auto& [sliced, starts] = slices_[band];
   for (const auto& event : events) ++starts[slice_of(event) + 1];
   std::partial_sum(starts.begin(), starts.end(), starts.begin());
   auto ends = starts;
@@ -66,7 +66,7 @@ std::size_t TimeSlices::size() const {
 }
 
 void TimeSlices::visit_band(int band, const Visit& visit) const {
-  visit(slices_[static_cast<std::size_t>(band)].events);
+  visit(slices_[band].events);
 }
 
 void TimeSlices::write_part(std::size_t first, std::size_t last, Event* out) const {

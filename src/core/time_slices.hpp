@@ -11,8 +11,8 @@
 
 namespace eventcamera {
 
-/// Events of an interval that each band adds in any order. They are sorted when they are written,
-/// slice by slice.
+/// Events of an interval, which each band adds in any order. They are sorted slice by slice when
+/// written.
 class TimeSlices final : public EventBuckets {
  public:
   /// Empties the slices but keeps their memory. The interval lasts `duration` microseconds.

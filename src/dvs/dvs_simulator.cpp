@@ -21,7 +21,6 @@
 namespace eventcamera {
 namespace {
 
-/// Memory of a thread.
 struct alignas(64) Scratch {
   RowToSolve row;
   std::vector<std::uint16_t> luma;    ///< a row, padded for vectors
@@ -115,7 +114,7 @@ class PixelSimulator final : public DvsSimulator {
   void begin(const StepTimes& interval, bool is_exposed, const Settings& settings) {
     timeline_.begin(settings_, response_.gain(), *last_time_, interval.duration(), is_exposed);
     fired_.begin(timeline_.duration(), settings_.max_rate, settings.rolling_shutter);
-    scratch_.resize(static_cast<std::size_t>(threads().threads()));
+    scratch_.resize(threads().threads());
   }
 
   void end(StepBuckets& read) {
@@ -177,7 +176,6 @@ class PixelSimulator final : public DvsSimulator {
     }
   }
 
-  /// Advances a run of pixels through a sub-interval.
   void advance(const Run& run, const SubInterval& sub_interval, const RunLuma& luma,
                RowToSolve& row) const {
     row.candidates.count = 0;
@@ -204,7 +202,7 @@ class PixelSimulator final : public DvsSimulator {
   template <class AdvanceRow>
   void for_each_row(const AdvanceRow& advance_row) {
     threads().for_each(band_count(format().height), [&](int band, int thread) {
-      auto& scratch = scratch_[static_cast<std::size_t>(thread)];
+      auto& scratch = scratch_[thread];
       auto& row = scratch.row;
       row.model = &pixels_.model();
       row.events.begin(fired_, band);

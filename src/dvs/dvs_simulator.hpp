@@ -34,7 +34,6 @@ namespace eventcamera {
 /// used.
 class DvsSimulator : public Simulator {
  public:
-  /// Applies to the next frames.
   void set(const DvsSettings& settings) { settings_ = settings; }
 
  protected:

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later Elementary functions with the same results on every
-// machine, branch-free and inline. elementary-inl.hpp has the vector versions.
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Elementary functions with the same results on every machine, branch-free and inline. Vector
+// versions are in solver-inl.hpp.
 #pragma once
 
 #include <algorithm>

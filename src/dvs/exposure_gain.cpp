@@ -14,14 +14,14 @@ constexpr int block_side = 8;
 constexpr int region_rows = 4;  ///< and columns
 constexpr std::size_t min_regions = 8;
 
-/// Luma up to which black level and quantisation matter; white is 255.
+/// Luma up to which black level and quantisation distort the gain; white is 255.
 constexpr int dark_luma = 16;
 
 int block_count(int side) {
   return (side + block_side - 1) / block_side;
 }
 
-/// Median, the upper one of an even number of `values`, which must not be empty.
+/// Median of `values`, which must not be empty; the upper one of an even number.
 double median(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -51,36 +51,18 @@ double block_gain(const ImageView<Pixel>& last, const ImageView<Pixel>& now, con
   return std::log(static_cast<double>(now_sum) / last_sum);
 }
 
-template <class Pixel>
-void expose_frame(Image<Pixel>& frame, int bits, bool linear_light, double gain,
-                  ThreadPool& threads) {
-  const int white = (1 << bits) - 1;
-  std::vector<Pixel> exposed(std::size_t{1} << bits);
-  for (int luma = 0; luma <= white; ++luma) {
-    const double light = light_of(luma / static_cast<double>(white), linear_light);
-    const double brighter = std::min(1.0, luma_of(gain * light, linear_light));
-    exposed[static_cast<std::size_t>(luma)] =
-        static_cast<Pixel>(luma < saturated_luma(white) ? std::lround(white * brighter) : luma);
-  }
-  for_each_row(threads, frame.height(), [&](int y) {
-    Pixel* row = frame.row(y);
-    for (int x = 0; x < frame.width(); ++x)
-      row[x] = exposed[std::min<std::size_t>(row[x], static_cast<std::size_t>(white))];
-  });
-}
-
 }  // namespace
 
 ExposureGain::ExposureGain(int bits, bool linear_light) : light_(std::size_t{1} << bits) {
   const int white = static_cast<int>(light_.size()) - 1;
   for (int luma = dark_luma * white / 255 + 1; luma < saturated_luma(white); ++luma)
-    light_[static_cast<std::size_t>(luma)] = static_cast<std::uint16_t>(
+    light_[luma] = static_cast<std::uint16_t>(
         std::lround(65535 * light_of(luma / static_cast<double>(white), linear_light)));
 }
 
 template <class Pixel>
-double ExposureGain::find(const ImageView<Pixel>& last, const ImageView<Pixel>& now,
-                          ThreadPool& threads) {
+double ExposureGain::between(const ImageView<Pixel>& last, const ImageView<Pixel>& now,
+                             ThreadPool& threads) {
   const int columns = block_count(now.width);
   const int rows = block_count(now.height);
   gains_.resize(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
@@ -118,24 +100,29 @@ double ExposureGain::find(const ImageView<Pixel>& last, const ImageView<Pixel>& 
   return 4 * static_cast<std::size_t>(agreeing) >= 3 * regions.size() ? std::exp(gain) : 1;
 }
 
-double ExposureGain::between(const ImageView<std::uint8_t>& last,
-                             const ImageView<std::uint8_t>& now, ThreadPool& threads) {
-  return find(last, now, threads);
+template double ExposureGain::between(const ImageView<std::uint8_t>&,
+                                      const ImageView<std::uint8_t>&, ThreadPool&);
+template double ExposureGain::between(const ImageView<std::uint16_t>&,
+                                      const ImageView<std::uint16_t>&, ThreadPool&);
+
+template <class Pixel>
+void expose(Image<Pixel>& frame, int bits, bool linear_light, double gain, ThreadPool& threads) {
+  const int white = (1 << bits) - 1;
+  std::vector<Pixel> exposed(std::size_t{1} << bits);
+  for (int luma = 0; luma <= white; ++luma) {
+    const double light = light_of(luma / static_cast<double>(white), linear_light);
+    const double brighter = std::min(1.0, luma_of(gain * light, linear_light));
+    exposed[luma] =
+        static_cast<Pixel>(luma < saturated_luma(white) ? std::lround(white * brighter) : luma);
+  }
+  for_each_row(threads, frame.height(), [&](int y) {
+    Pixel* row = frame.row(y);
+    for (int x = 0; x < frame.width(); ++x)
+      row[x] = exposed[std::min<std::size_t>(row[x], static_cast<std::size_t>(white))];
+  });
 }
 
-double ExposureGain::between(const ImageView<std::uint16_t>& last,
-                             const ImageView<std::uint16_t>& now, ThreadPool& threads) {
-  return find(last, now, threads);
-}
-
-void expose(Image<std::uint8_t>& frame, int bits, bool linear_light, double gain,
-            ThreadPool& threads) {
-  expose_frame(frame, bits, linear_light, gain, threads);
-}
-
-void expose(Image<std::uint16_t>& frame, int bits, bool linear_light, double gain,
-            ThreadPool& threads) {
-  expose_frame(frame, bits, linear_light, gain, threads);
-}
+template void expose(Image<std::uint8_t>&, int, bool, double, ThreadPool&);
+template void expose(Image<std::uint16_t>&, int, bool, double, ThreadPool&);
 
 }  // namespace eventcamera

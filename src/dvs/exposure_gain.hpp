@@ -10,13 +10,12 @@
 
 namespace eventcamera {
 
-/// Luma from which on a pixel counts as saturated: the white of narrow-range video.
+/// Minimum luma of a saturated pixel: the white of narrow-range video.
 inline int saturated_luma(int white) {
   return static_cast<int>(std::ceil(white * 235 / 255.0));
 }
 
-/// Estimates the gain by which a frame camera changed its exposure, which an event camera would not
-/// see.
+/// Estimates the gain by which a frame camera changed its exposure: event cameras do not see it.
 ///
 /// An exposure changes all light by the same factor; motion, a shadow or a lamp changes some places
 /// more than others. So the gain is the median of the gains of 4x4 regions, each of which is the
@@ -28,28 +27,21 @@ class ExposureGain {
   static constexpr double min_gain = 1.01;
   static constexpr double max_gain = 1.25;
 
-  /// For luma of 8 to 16 bits, whose light is light_of().
+  /// For luma of 8 to 16 bits.
   ExposureGain(int bits, bool linear_light);
 
   /// Returns the gain from one frame to the next; 1 if it is not valid. The same for any number of
   /// threads.
-  double between(const ImageView<std::uint8_t>& last, const ImageView<std::uint8_t>& now,
-                 ThreadPool& threads);
-  double between(const ImageView<std::uint16_t>& last, const ImageView<std::uint16_t>& now,
-                 ThreadPool& threads);
+  template <class Pixel>
+  double between(const ImageView<Pixel>& last, const ImageView<Pixel>& now, ThreadPool& threads);
 
  private:
-  template <class Pixel>
-  double find(const ImageView<Pixel>& last, const ImageView<Pixel>& now, ThreadPool& threads);
-
   std::vector<std::uint16_t> light_;  ///< by luma; 0 if too dark, or saturated
   std::vector<double> gains_;         ///< logarithms, by block; NaN if unknown
 };
 
 /// Scales a frame to `gain` times its exposure. Saturated pixels stay saturated.
-void expose(Image<std::uint8_t>& frame, int bits, bool linear_light, double gain,
-            ThreadPool& threads);
-void expose(Image<std::uint16_t>& frame, int bits, bool linear_light, double gain,
-            ThreadPool& threads);
+template <class Pixel>
+void expose(Image<Pixel>& frame, int bits, bool linear_light, double gain, ThreadPool& threads);
 
 }  // namespace eventcamera

@@ -26,7 +26,6 @@ class FramePair {
   explicit FramePair(const LumaFormat& format)
       : last(format.width, format.height), now(format.width, format.height), bits_(format.bits) {}
 
-  /// Starts over with a first frame, `last`.
   void start(const ImageView<Pixel>& frame) {
     last.assign(frame);
     blurred_last_.reset();
@@ -34,7 +33,7 @@ class FramePair {
     is_first_ = true;
   }
 
-  /// Finds the gain of the exposure and, for Upsampling::motion, `flow`, unless it is known; then
+  /// Finds the gain of the exposure and, for Upsampling::motion, `flow` if it is not known; then
   /// removes motion blur. Calls settle() if that changes the first frame.
   template <class Settle>
   void prepare(const DvsSettings& settings, LightResponse& response, Nanoseconds duration,
@@ -49,7 +48,7 @@ class FramePair {
     if (moves)
       find(flow, threads);
     else
-      frame_flow_.forget();  // does not see this frame
+      frame_flow_.forget();  // it would miss this frame
     if (moves && settings.exposure_time > 0)
       sharpen(*flow, static_cast<double>(settings.exposure_time) / static_cast<double>(duration),
               threads, settle);

@@ -18,8 +18,8 @@
 
 namespace eventcamera {
 
-/// Events of an interval, which bands of rows add in any order. Events past its end are deferred to
-/// the next interval. With a rolling shutter of the frames, all events of a row are delayed; with a
+/// Collects the events of an interval from bands of rows, in any order. Events past its end are
+/// deferred to the next interval. A rolling shutter of the frames delays all events of a row; at a
 /// limited rate, a Readout delays them further.
 class IntervalEvents {
   struct DeferredEvent {
@@ -30,7 +30,7 @@ class IntervalEvents {
 
  public:
   IntervalEvents(int width, int height)
-      : width_(width), height_(height), deferred_(static_cast<std::size_t>(band_count(height))) {}
+      : width_(width), height_(height), deferred_(band_count(height)) {}
 
   /// Begins an interval of `duration` microseconds. `max_rate` is in events per second; 0 = no
   /// limit. `rolling_shutter` is as for row_delays().
@@ -43,14 +43,14 @@ class IntervalEvents {
     fired_.reset(static_cast<std::uint32_t>(duration), band_count(height_));
   }
 
-  /// True if the interval has exactly the events within it, at their own times.
+  /// True if no event is delayed, and none was deferred to this interval.
   bool is_plain() const {
     return rolling_shutter_ == 0 && !readout_ &&
            std::ranges::all_of(deferred_, [](const Deferred& band) { return band.empty(); });
   }
 
-  /// Ends the interval, after the last event. Returns its events, with_cause(): its own slices, or
-  /// in `read` those that were read out.
+  /// Ends the interval, after the last event. Returns its events, with_cause(), in `read` if there
+  /// is a readout.
   const EventBuckets& end(StepBuckets& read, ThreadPool& threads) {
     if (!readout_) return fired_;
     sorted_.resize(fired_.size());
@@ -60,8 +60,8 @@ class IntervalEvents {
     return read;
   }
 
-  /// Time from the end of the interval to the last deferred event of a rolling shutter, rounded up;
-  /// none if there is none.
+  /// Time from the end of the interval to the last event deferred by a rolling shutter, rounded up,
+  /// if any.
   std::optional<Nanoseconds> latest() const {
     std::optional<double> latest;
     if (rolling_shutter_ == 0) return std::nullopt;
@@ -84,8 +84,7 @@ class IntervalEvents {
     if (readout_) readout_->reset();
   }
 
-  /// Adds the events of one band of rows at a time. Several may add to the same interval, from
-  /// different threads.
+  /// Adds the events of one band of rows at a time. Threads may use several for the same interval.
   class Band {
    public:
     /// Begins with the deferred events of the last interval.
@@ -94,7 +93,7 @@ class IntervalEvents {
       delays_ = events.rolling_shutter_ != 0 ? events.delays_.data() : nullptr;
       fired_ = &events.fired_;
       band_ = band;
-      deferred_ = &events.deferred_[static_cast<std::size_t>(band)];
+      deferred_ = &events.deferred_[band];
       added_.clear();
       kept_ = 0;
       for (const auto& [t, event] : *deferred_) {
@@ -107,10 +106,8 @@ class IntervalEvents {
       due_ = added_.size();
     }
 
-    /// Duration of the interval, microseconds.
     double duration() const { return duration_; }
 
-    /// Adds events within the interval.
     void add(std::span<const Event> events) {
       added_.insert(added_.end(), events.begin(), events.end());
     }
@@ -131,7 +128,6 @@ class IntervalEvents {
     }
 
    private:
-    /// Delays the events of this interval.
     void delay_rows() {
       const auto delay_of = [this](const Event& event) {
         return delays_[event.y_p & coordinate_bits];
@@ -169,7 +165,7 @@ class IntervalEvents {
   };
 
  private:
-  /// Event rate limit that no array reaches, events per second.
+  /// Rate limit that no array reaches, events per second.
   static constexpr double unlimited = 1e18;
 
   int width_;

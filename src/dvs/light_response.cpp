@@ -6,7 +6,7 @@
 namespace eventcamera {
 namespace {
 
-/// Limit of the gain since the first frame, in case many estimates err in the same direction.
+/// Limit of the gain since the first frame, in case errors of many estimates add up.
 constexpr double max_total_gain = 64;
 
 /// Light factor of bright luma: `overexposed_light` at white, falling to 1 over the 20 (of 255)

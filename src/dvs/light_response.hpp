@@ -39,7 +39,7 @@ class LightResponse {
 
   void set_range(bool is_narrow);
 
-  /// The next frame has the exposure 1.
+  /// Sets the exposure of the next frame to 1.
   void restart();
 
   /// Updates the exposure if `exposure_compensation` is set. Returns its gain since the last frame.
@@ -61,7 +61,7 @@ class LightResponse {
   /// Response to the luma of a frame.
   float operator()(int luma) const {
     const int seen = is_widened() ? 257 * luma : luma;
-    return table_[static_cast<std::size_t>(std::min(seen, white()))];
+    return table_[std::min(seen, white())];
   }
 
  private:

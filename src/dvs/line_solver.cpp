@@ -8,27 +8,14 @@
 #include "src/dvs/shot_noise.hpp"
 #include "src/dvs/trajectory.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/line_solver.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
-#include "src/core/simd-inl.hpp"
-#include "src/dvs/random-inl.hpp"
+#include "src/dvs/solver-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
-
-using Doubles = hn::CappedTag<double, max_lanes / 2>;
-using Floats = hn::Rebind<float, Doubles>;
-using Words = hn::Rebind<std::int32_t, Doubles>;
-using Bits = hn::RebindToUnsigned<Doubles>;
-using Values = hn::Vec<Doubles>;
-using Mask = hn::Mask<Doubles>;
-
-Values all(double value) {
-  return hn::Set(Doubles(), value);
-}
 
 /// A vector of candidates.
 class Pixels {
@@ -39,7 +26,6 @@ class Pixels {
     count_ = std::min(row.candidates.count - first, hn::Lanes(Doubles()));
   }
 
-  /// Index of the first one.
   std::size_t first() const { return first_; }
   Mask exist() const { return hn::FirstN(Doubles(), count_); }
 
@@ -59,8 +45,8 @@ class Pixels {
 
   /// Fall of the references within the sub-interval.
   Values fall(const RowToSolve& row) const {
-    return hn::Add(hn::Mul(load(row, Candidates::leak), all(row.sub_interval->duration)),
-                   all(row.sub_interval->rise));
+    return load(row, Candidates::leak) * all(row.sub_interval->duration) +
+           all(row.sub_interval->rise);
   }
 
   void store(const RowToSolve& row, Values stored, float* values) const {
@@ -81,10 +67,10 @@ class Pixels {
 
   /// Stores RowToSolve::refractory_left(), if any is or was.
   void store_refractory_left(const RowToSolve& row, Values ready) const {
-    auto left = hn::Max(all(0), hn::Sub(ready, all(row.sub_interval->duration)));
-    const auto is_short = hn::And(hn::Gt(left, all(0)), hn::Lt(left, all(min_gap)));
-    left = hn::Add(left, hn::IfThenElseZero(is_short, all(row.sub_interval->next_rounding)));
-    const auto is_or_was = hn::Gt(hn::Max(left, load(row, Candidates::refractory_left)), all(0));
+    auto left = hn::Max(all(0), ready - all(row.sub_interval->duration));
+    const auto is_short = hn::And(left > all(0), left < all(min_gap));
+    left = left + hn::IfThenElseZero(is_short, all(row.sub_interval->next_rounding));
+    const auto is_or_was = hn::Max(left, load(row, Candidates::refractory_left)) > all(0);
     if (hn::AllFalse(Doubles(), hn::And(is_or_was, exist()))) return;
     store(row, left, row.pixels.refractory_left);
   }
@@ -103,8 +89,8 @@ class Pixels {
   std::size_t count_;
 };
 
-/// Vectors of candidates that are solved in turns: the processor overlaps their operations, while
-/// successive crossings of one pixel depend on each other.
+/// Vectors of candidates that are solved in turns, because the processor can overlap their
+/// operations: successive crossings of one pixel depend on each other.
 constexpr std::size_t max_vectors = 16;
 
 /// Adds events of vectors of pixels.
@@ -122,9 +108,9 @@ class Events {
     const Doubles doubles;
     const Bits bits;
     // 2^52 + n has n in its lowest bits.
-    const auto time = hn::Floor(hn::Min(hn::Add(all(begin_), t), all(end_)));
+    const auto time = hn::Floor(hn::Min(all(begin_) + t, all(end_)));
     const auto microseconds =
-        hn::And(hn::BitCast(bits, hn::Add(time, all(0x1p52))), hn::Set(bits, 0xffffffff));
+        hn::And(hn::BitCast(bits, time + all(0x1p52)), hn::Set(bits, 0xffffffff));
     const auto x = hn::ShiftLeft<32>(hn::BitCast(bits, pixels.x(row_)));
     const auto place = hn::Or(x, hn::Set(bits, place_of_row_));
     const auto polarity =
@@ -137,7 +123,7 @@ class Events {
     count_ += hn::CountTrue(doubles, fire);
   }
 
-  /// Must be called after each turn.
+  /// Call after each turn.
   void flush() {
     row_.events.add({events_, count_});
     count_ = 0;
@@ -174,8 +160,8 @@ class Events {
   Event events_[(max_vectors + 1) * max_lanes / 2];
 };
 
-/// Growth of the thresholds of a vector of pixels, as a fraction of them. It falls to 0, or until
-/// the sub-interval ends.
+/// Growth of the thresholds of a vector of pixels, as a fraction of the thresholds. It falls to 0,
+/// or until the sub-interval ends.
 struct Growth {
   Values first;
   Values last;  ///< after the fall
@@ -187,35 +173,34 @@ struct Growth {
 /// Time until signals that start at `value` with this slope reach the thresholds; infinite if later
 /// than `left`, the rest of the sub-interval in microseconds.
 HWY_INLINE Values wait(Values value, Values slope, Values threshold, Values left) {
-  const auto is_beyond = hn::Ge(value, threshold);
-  const auto meets =
-      hn::Ge(hn::Add(value, hn::Mul(slope, left)), hn::Sub(threshold, all(rounding)));
-  const auto time = hn::Div(hn::Sub(threshold, value), slope);
+  const auto is_beyond = value >= threshold;
+  const auto meets = value + slope * left >= threshold - all(rounding);
+  const auto time = (threshold - value) / slope;
   const auto found = hn::IfThenElseZero(hn::Not(is_beyond), hn::Min(hn::Max(time, all(0)), left));
   return hn::IfThenElse(hn::Or(is_beyond, meets), found, hn::Inf(Doubles()));
 }
 
-/// Time until signals reach grown thresholds, which fall.
+/// Time until signals reach thresholds whose growth falls.
 HWY_INLINE Values wait(Values value, Values slope, Values threshold, const Growth& growth) {
   const auto one = all(1);
   const auto margin = all(rounding);
-  const auto level = hn::Mul(threshold, hn::Add(one, growth.first));
-  const auto last_level = hn::Mul(threshold, hn::Add(one, growth.last));
-  const auto value_after = [&](Values t) HWY_ATTR { return hn::Add(value, hn::Mul(slope, t)); };
-  const auto is_beyond = hn::Ge(value, level);
-  const auto meets = hn::Ge(value_after(growth.fall), hn::Sub(last_level, margin));
-  const auto reaches = hn::And(hn::Lt(growth.fall, growth.left),
-                               hn::Ge(value_after(growth.left), hn::Sub(threshold, margin)));
-  const auto way = hn::Sub(hn::IfThenElse(meets, level, threshold), value);
-  const auto approach = hn::Add(slope, hn::Mul(threshold, growth.rate));
-  const auto time = hn::Div(way, hn::IfThenElse(meets, approach, slope));
+  const auto level = threshold * (one + growth.first);
+  const auto last_level = threshold * (one + growth.last);
+  const auto value_after = [&](Values t) HWY_ATTR { return value + slope * t; };
+  const auto is_beyond = value >= level;
+  const auto meets = value_after(growth.fall) >= last_level - margin;
+  const auto reaches =
+      hn::And(growth.fall < growth.left, value_after(growth.left) >= threshold - margin);
+  const auto way = hn::IfThenElse(meets, level, threshold) - value;
+  const auto approach = slope + threshold * growth.rate;
+  const auto time = way / hn::IfThenElse(meets, approach, slope);
   const auto limit = hn::IfThenElse(meets, growth.fall, growth.left);
   const auto found = hn::IfThenElseZero(hn::Not(is_beyond), hn::Min(hn::Max(time, all(0)), limit));
   return hn::IfThenElse(hn::Or(is_beyond, hn::Or(meets, reaches)), found, hn::Inf(Doubles()));
 }
 
-/// Straight-line signals of a vector of pixels. Thresholds may vary by adaptation, or by jitter if
-/// there is no mismatch.
+/// Straight-line signals of a vector of pixels. Thresholds may vary by adaptation, or by jitter
+/// without mismatch.
 template <bool thresholds_vary>
 class Lines {
  public:
@@ -226,8 +211,8 @@ class Lines {
     pixels_.begin(row, candidate);
     fall_ = pixels_.fall(row);
     first_ = pixels_.load(row, Candidates::last_target);
-    last_ = hn::Add(pixels_.load(row, Candidates::target), fall_);
-    slope_ = hn::Div(hn::Sub(last_, first_), all(row.sub_interval->duration));
+    last_ = pixels_.load(row, Candidates::target) + fall_;
+    slope_ = (last_ - first_) / all(row.sub_interval->duration);
     positive_ = pixels_.load(row, Candidates::positive);
     negative_ = pixels_.load(row, Candidates::negative);
     reference_ = pixels_.load(row, Candidates::reference);
@@ -235,7 +220,7 @@ class Lines {
     t_ = all(0);
     crosses_ = pixels_.exist();
     if constexpr (thresholds_vary) {
-      growth_end_ = hn::Sub(pixels_.load(row, row.pixels.growth_end), all(row.sub_interval->start));
+      growth_end_ = pixels_.load(row, row.pixels.growth_end) - all(row.sub_interval->start);
       if (row.model->has_threshold_jitter()) begin_draws(row);
     }
   }
@@ -245,37 +230,35 @@ class Lines {
     const Doubles doubles;
     const auto& adaptation = row.model->adaptation;
     const auto rate = all(adaptation.rate());
-    const auto value = hn::Sub(hn::Add(first_, hn::Mul(slope_, t_)), reference_);
-    const auto left = hn::Sub(all(row.sub_interval->duration), t_);
+    const auto value = first_ + slope_ * t_ - reference_;
+    const auto left = all(row.sub_interval->duration) - t_;
     Values on_wait;
     Values off_wait;
     if constexpr (thresholds_vary) {
-      const auto growth_left = hn::Max(hn::Sub(growth_end_, t_), all(0));
+      const auto growth_left = hn::Max(growth_end_ - t_, all(0));
       const auto fall = hn::Min(growth_left, left);
-      const Growth growth{hn::Mul(rate, growth_left), hn::Mul(rate, hn::Sub(growth_left, fall)),
-                          rate, fall, left};
+      const Growth growth{rate * growth_left, rate * (growth_left - fall), rate, fall, left};
       on_wait = wait(value, slope_, positive_, growth);
       off_wait = wait(hn::Neg(value), hn::Neg(slope_), negative_, growth);
     } else {
       on_wait = wait(value, slope_, positive_, left);
       off_wait = wait(hn::Neg(value), hn::Neg(slope_), negative_, left);
     }
-    const auto is_on = hn::Le(on_wait, off_wait);
+    const auto is_on = on_wait <= off_wait;
     const auto wait_time = hn::IfThenElse(is_on, on_wait, off_wait);
-    crosses_ = hn::And(crosses_, hn::Lt(wait_time, hn::Inf(doubles)));
+    crosses_ = hn::And(crosses_, wait_time < hn::Inf(doubles));
     if (hn::AllFalse(doubles, crosses_)) return false;
-    t_ = hn::IfThenElse(crosses_, hn::Add(t_, wait_time), t_);
+    t_ = hn::IfThenElse(crosses_, t_ + wait_time, t_);
     const auto threshold = hn::IfThenElse(is_on, positive_, hn::Neg(negative_));
     auto growth = all(0);
-    if constexpr (thresholds_vary)
-      growth = hn::Mul(rate, hn::Max(hn::Sub(growth_end_, t_), all(0)));
-    const auto level = hn::Add(reference_, hn::Mul(threshold, hn::Add(all(1), growth)));
+    if constexpr (thresholds_vary) growth = rate * hn::Max(growth_end_ - t_, all(0));
+    const auto level = reference_ + threshold * (all(1) + growth);
     reference_ = hn::IfThenElse(crosses_, level, reference_);
-    const auto fires = hn::And(crosses_, hn::Ge(t_, ready_));
-    events.add(pixels_, fires, is_on, hn::Gt(growth, all(0)), t_);
-    ready_ = hn::IfThenElse(fires, hn::Add(t_, all(row.model->gap)), ready_);
+    const auto fires = hn::And(crosses_, t_ >= ready_);
+    events.add(pixels_, fires, is_on, growth > all(0), t_);
+    ready_ = hn::IfThenElse(fires, t_ + all(row.model->gap), ready_);
     if constexpr (thresholds_vary) {
-      const auto prolonged = hn::Add(hn::Max(t_, growth_end_), all(adaptation.duration()));
+      const auto prolonged = hn::Max(t_, growth_end_) + all(adaptation.duration());
       growth_end_ = hn::IfThenElse(fires, prolonged, growth_end_);
       if (row.model->has_threshold_jitter()) draw_thresholds(row, fires);
     }
@@ -284,12 +267,11 @@ class Lines {
 
   void end(const RowToSolve& row) const {
     const auto reference = hn::IfThenElse(crosses_, last_, reference_);
-    pixels_.store(row, hn::Sub(reference, fall_), row.pixels.reference);
+    pixels_.store(row, reference - fall_, row.pixels.reference);
     pixels_.store_refractory_left(row, ready_);
     if constexpr (thresholds_vary) {
       if (row.model->adaptation.is_on())
-        pixels_.store(row, hn::Add(all(row.sub_interval->start), growth_end_),
-                      row.pixels.growth_end);
+        pixels_.store(row, all(row.sub_interval->start) + growth_end_, row.pixels.growth_end);
       if (row.model->has_threshold_jitter()) {
         pixels_.store(row, drawn_, positive_, row.pixels.positive);
         pixels_.store(row, drawn_, negative_, row.pixels.negative);
@@ -300,9 +282,8 @@ class Lines {
  private:
   void begin_draws(const RowToSolve& row) {
     const Bits bits;
-    const auto numbers =
-        hn::Add(hn::BitCast(bits, pixels_.x(row)), hn::Set(bits, row.pixels.first_number));
-    random_ = RandomSeries<Doubles>(row.model->random, numbers, Random::Purpose::event);
+    const auto numbers = hn::BitCast(bits, pixels_.x(row)) + hn::Set(bits, row.pixels.first_number);
+    random_ = RandomSeries(row.model->random, numbers, Random::Purpose::event);
     draw_ = hn::Set(bits, row.sub_interval->number * draws_per_sub_interval);
     drawn_ = hn::FirstN(Doubles(), 0);
   }
@@ -311,15 +292,14 @@ class Lines {
   void draw_thresholds(const RowToSolve& row, Mask fire) {
     const auto [first, second] = random_.normals(draw_);
     const auto drawn = [&](Values normal, double mean) HWY_ATTR {
-      const auto threshold =
-          hn::Add(all(mean), hn::Mul(all(row.model->settings.threshold_jitter), normal));
+      const auto threshold = all(mean) + all(row.model->settings.threshold_jitter) * normal;
       return hn::Max(threshold, all(min_threshold_of(mean)));
     };
     positive_ = hn::IfThenElse(fire, drawn(first, row.model->mean_thresholds.positive), positive_);
     negative_ = hn::IfThenElse(fire, drawn(second, row.model->mean_thresholds.negative), negative_);
     drawn_ = hn::Or(drawn_, fire);
     const Bits bits;
-    draw_ = hn::IfThenElse(hn::RebindMask(bits, fire), hn::Add(draw_, hn::Set(bits, 1)), draw_);
+    draw_ = hn::IfThenElse(hn::RebindMask(bits, fire), draw_ + hn::Set(bits, 1), draw_);
   }
 
   Pixels pixels_;
@@ -334,12 +314,12 @@ class Lines {
   Values ready_;  ///< earliest time of the next event
   Values growth_end_;
   Values t_;  ///< of the last crossing
-  RandomSeries<Doubles> random_;
+  RandomSeries random_;
   hn::Vec<Bits> draw_;  ///< counter of the next random number
   Mask drawn_;          ///< pixels whose thresholds were drawn
 };
 
-/// Finds a crossing of each vector in turn, and then the next ones.
+/// Finds the first crossing in each vector, then the second ones, and so on.
 template <class Signals>
 void solve_in_turns(RowToSolve& row) {
   Events events(row);

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/motion_deblur.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -31,21 +30,21 @@ HWY_INLINE hn::Vec<Floats> mean_along(const Image<float>& image, const Path& pat
   const std::ptrdiff_t along = is_wide ? (path.dx > 0 ? 1 : -1) : (path.dy > 0 ? row : -row);
   const std::ptrdiff_t across = is_wide ? row : 1;
   const float slope = is_wide ? path.dy : path.dx;
-  // Both samples at a distance of j lie between `near` and its neighbour across.
+  // Both samples at distance j lie between `near` and its neighbour across.
   for (int j = 1; static_cast<float>(j) < half + 0.5F; ++j) {
     const float moved = static_cast<float>(j) * slope;
     const float whole = std::floor(moved);
     const auto near = j * along + static_cast<std::ptrdiff_t>(whole) * across;
     const auto pair = [&](std::ptrdiff_t at) HWY_ATTR {
-      return hn::Add(hn::LoadU(floats, centre + at), hn::LoadU(floats, centre - at));
+      return hn::LoadU(floats, centre + at) + hn::LoadU(floats, centre - at);
     };
     const auto first = pair(near);
-    const auto rise = hn::Sub(pair(near + across), first);
-    const auto samples = hn::Add(first, hn::Mul(hn::Set(floats, moved - whole), rise));
+    const auto rise = pair(near + across) - first;
+    const auto samples = first + hn::Set(floats, moved - whole) * rise;
     const float weight = std::min(1.0F, half + 0.5F - static_cast<float>(j));
-    sum = hn::Add(sum, hn::Mul(hn::Set(floats, weight), samples));
+    sum = sum + hn::Set(floats, weight) * samples;
   }
-  return hn::Mul(sum, hn::Set(floats, 1 / path.length));
+  return sum * hn::Set(floats, 1 / path.length);
 }
 
 /// Writes `to` = frame / mean(light) for a row.
@@ -57,7 +56,7 @@ void divide_row(const float* frame, const Image<float>& light, const Path* paths
   const int lanes = static_cast<int>(hn::Lanes(floats));
   for (int x = 0; x < light.width(); x += lanes) {
     const auto mean = mean_along(light, paths[x / MotionDeblur::block], x, y);
-    hn::StoreU(hn::Min(hn::Div(hn::LoadU(floats, frame + x), mean), limit), floats, to + x);
+    hn::StoreU(hn::Min(hn::LoadU(floats, frame + x) / mean, limit), floats, to + x);
   }
 }
 
@@ -67,7 +66,7 @@ void multiply_row(const Image<float>& ratio, const Path* paths, int y, float* li
   const int lanes = static_cast<int>(hn::Lanes(floats));
   for (int x = 0; x < ratio.width(); x += lanes) {
     const auto mean = mean_along(ratio, paths[x / MotionDeblur::block], x, y);
-    hn::StoreU(hn::Mul(hn::LoadU(floats, light + x), hn::Mul(mean, mean)), floats, light + x);
+    hn::StoreU(hn::LoadU(floats, light + x) * (mean * mean), floats, light + x);
   }
 }
 
@@ -83,10 +82,10 @@ HWY_EXPORT(multiply_row);
 
 namespace {
 
-/// Samples are up to max_length / 2 pixels from a block, which may itself end past the row.
+/// Samples are up to max_length / 2 pixels from a block, and a block may end past the row.
 constexpr int margin = MotionDeblur::max_length / 2 + 2 + MotionDeblur::block;
 
-/// Half of a grey level, which rounding may have removed, so that no light is 0.
+/// Added to grey levels so that no light is 0: rounding may have removed up to half a level.
 constexpr float offset = 0.5F;
 
 void replicate_sides(Image<float>& image, int y) {
@@ -95,7 +94,7 @@ void replicate_sides(Image<float>& image, int y) {
   std::fill_n(row + image.width(), margin, row[image.width() - 1]);
 }
 
-/// After replicate_sides() of all rows.
+/// Call after replicate_sides() of all rows.
 void replicate_ends(Image<float>& image) {
   const auto copy = [&](int from, int to) {
     std::copy_n(image.row(from) - margin, image.width() + 2 * margin, image.row(to) - margin);
@@ -131,7 +130,7 @@ Flow flow_to(const ImageView<Flow>& flow, int x, int y) {
 
 MotionDeblur::MotionDeblur(int width, int height)
     : paths_((width + block - 1) / block, height),
-      moves_(static_cast<std::size_t>(height)),
+      moves_(height),
       frame_(width, height),
       light_(width, height, margin),
       ratio_(width, height, margin) {}
@@ -146,7 +145,7 @@ void MotionDeblur::set_motion(const ImageView<Flow>& flow, double share, bool at
       path = path_of(at_end ? flow_to(flow, x, y) : flow.row(y)[x], share);
       moves |= path.length > 1;
     }
-    moves_[static_cast<std::size_t>(y)] = moves;
+    moves_[y] = moves;
   });
 }
 
@@ -155,7 +154,7 @@ void MotionDeblur::sharpen(Image<Pixel>& frame, int bits, ThreadPool& threads) {
   const int width = frame.width();
   const int height = frame.height();
   const float scale = 255.0F / static_cast<float>((1 << bits) - 1);
-  const auto moves = [&](int y) { return moves_[static_cast<std::size_t>(y)] != 0; };
+  const auto moves = [&](int y) { return moves_[y] != 0; };
   for_each_row(threads, height, [&](int y) {
     for (int x = 0; x < width; ++x)
       frame_.row(y)[x] = static_cast<float>(frame.row(y)[x]) * scale + offset;

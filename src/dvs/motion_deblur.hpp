@@ -9,10 +9,10 @@
 
 namespace eventcamera {
 
-/// Estimates the sharp light L in the middle of a long exposure from the frame I, its mean over the
-/// exposure, and the motion during it: Richardson-Lucy iterations of twice the usual step,
+/// Estimates the sharp light L in the middle of a long exposure from the motion and the frame I,
+/// the mean over the exposure: Richardson-Lucy iterations of twice the usual step,
 ///   L = L * mean(I / mean(L))^2, at first L = I,
-/// where mean() is taken along the motion of each pixel. A fixed point has mean(L) = I.
+/// where mean() is taken along the motion of each pixel. At the fixed point, mean(L) = I.
 ///
 /// Blocks of 8x1 pixels share their motion. It is sampled once per pixel along its longer axis,
 /// with linear interpolation across; motion below a pixel counts as none. The border is replicated.
@@ -20,8 +20,7 @@ class MotionDeblur {
  public:
   static constexpr int block = 8;
   static constexpr int iterations = 10;
-  /// Longer motion counts as this, in pixels.
-  static constexpr int max_length = 64;
+  static constexpr int max_length = 64;  ///< limit of the motion, pixels
 
   /// Motion of a block during the exposure: samples are at the multiples of (dx, dy) between
   /// -length / 2 and length / 2.
@@ -33,12 +32,12 @@ class MotionDeblur {
 
   MotionDeblur(int width, int height);
 
-  /// Sets the motion during the exposure of `from` or, if `at_end`, of `to`: the flow between both,
-  /// times the share of the exposure in the interval. The flow, which is on the grid of `from`, is
-  /// assumed to continue.
+  /// Sets the motion during the exposure of the first frame or, if `at_end`, of the second: the
+  /// flow from the first to the second, times the share of the exposure in the interval. The flow,
+  /// on the grid of the first frame, is assumed to continue.
   void set_motion(const ImageView<Flow>& flow, double share, bool at_end, ThreadPool& threads);
 
-  /// The path of the block that holds pixel (x, y).
+  /// Path of the block that contains pixel (x, y).
   const Path& path(int x, int y) const { return paths_.row(y)[x / block]; }
 
   /// Replaces a frame of this size by the estimate.

@@ -9,7 +9,6 @@
 #include "src/core/sensor_size.hpp"
 #include "src/flow/flow_range.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/moving_light.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -19,10 +18,10 @@ HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-/// Pixels whose samples are near each other.
+/// Number of pixels that are sampled together if their samples are close to each other.
 constexpr int block = 8;
 
-/// Blocks that a vector holds, and are sampled together.
+/// Number of blocks in a vector.
 #if HWY_TARGET == HWY_SCALAR || HWY_HAVE_SCALABLE
 constexpr int max_blocks = 1;
 #else
@@ -34,7 +33,7 @@ using Words4 = hn::CappedTag<std::int32_t, 4>;
 
 /// Positions of pixels along one axis and their displacements per step, in 1/65536 of a pixel.
 struct AxisMotion {
-  HWY_ALIGN std::int32_t start[max_pixels];  ///< and half of 1/64 pixel, for rounding
+  HWY_ALIGN std::int32_t start[max_pixels];  ///< plus half of 1/64 pixel, for rounding
   HWY_ALIGN Motion of[max_pixels];
   HWY_ALIGN std::int32_t block_start[4] = {};
   HWY_ALIGN Motion min[4] = {};  ///< by block
@@ -56,7 +55,7 @@ struct AxisMotion {
     }
   }
 
-  /// Whether the pixels of each block stay less than a block apart for `steps` steps.
+  /// True if the pixels of each block stay less than a block apart for `steps` steps.
   bool stay_close(int blocks, int steps) const {
     std::int64_t max_difference = 0;
     for (int i = 0; i < blocks; ++i)
@@ -64,7 +63,7 @@ struct AxisMotion {
     return max_difference * steps <= (block - 1) << 16;
   }
 
-  /// Whether the pixels of the first block are less than a block apart after k steps.
+  /// True if the pixels of the first block are less than a block apart after k steps.
   bool are_close(int k) const {
     const auto pixel = [&](Motion motion) { return (k * motion + 512) >> 16; };
     return std::abs(pixel(max[0]) - pixel(min[0])) < block;
@@ -87,7 +86,7 @@ struct BlockMotions {
     const auto scale = hn::Set(floats, 65536.0F / static_cast<float>(steps));
     const auto per_step = [&](hn::Vec<decltype(floats)> motion) {  // motion_per_step()
       const auto clamped = hn::Max(hn::Min(motion, limit), hn::Neg(limit));
-      return hn::NearestInt(hn::IfThenElseZero(hn::Eq(motion, motion), hn::Mul(clamped, scale)));
+      return hn::NearestInt(hn::IfThenElseZero(hn::Eq(motion, motion), clamped * scale));
     };
     const auto first_x = hn::Set(words, (left << 16) + 512);
     const auto first_y = hn::Set(words, (row << 16) + 512);
@@ -97,7 +96,7 @@ struct BlockMotions {
       hn::LoadInterleaved2(floats, &flows[i].x, dx, dy);
       hn::Store(per_step(dx), words, x.of + i);
       hn::Store(per_step(dy), words, y.of + i);
-      hn::Store(hn::Add(first_x, hn::ShiftLeft<16>(iota(words, i))), words, x.start + i);
+      hn::Store(first_x + hn::ShiftLeft<16>(iota(words, i)), words, x.start + i);
       hn::Store(first_y, words, y.start + i);
     }
     x.find_ranges(blocks);
@@ -118,9 +117,8 @@ std::uint16_t blended_luma(std::int32_t earlier, std::int32_t later, int weight)
   return static_cast<std::uint16_t>((grey * 257 + (1 << 11)) >> 12);
 }
 
-/// Blends a block of pixels one by one.
-void blend_apart(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
-                 std::uint16_t* out) {
+void blend_singly(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
+                  std::uint16_t* out) {
   const auto sample_of = [&](const ImageView<std::uint8_t>& frame, int i, int k) {
     return sample(frame, motions.x.start[i] - 512 + k * motions.x.of[i],
                   motions.y.start[i] - 512 + k * motions.y.of[i]);
@@ -135,13 +133,13 @@ void blend_apart(const Warp<std::uint8_t>& warp, const BlockMotions& motions, in
 template <int blocks>
 void blend_blocks(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
                   std::uint16_t* out) {
-  blend_apart(warp, motions, j, out);
+  blend_singly(warp, motions, j, out);
 }
 
 #else
 
-/// Bilinear samples, equal to sample() in warp.hpp, of blocks whose pixels are close together: all
-/// samples of a block are in the same 16 bytes of a few rows.
+/// Vector version of sample() in warp.hpp, for blocks whose pixels are close together: all samples
+/// of a block are in the same 16 bytes of a few rows.
 template <int blocks>
 class Sampler {
  public:
@@ -171,8 +169,8 @@ class Sampler {
 
     // Bytes of the left and right neighbours.
     const auto column = hn::ShiftRight<6>(x);
-    const auto places = hn::BitCast(
-        Bytes(), hn::Add(hn::Or(column, hn::ShiftLeft<8>(column)), hn::Set(shorts, 256)));
+    const auto places =
+        hn::BitCast(Bytes(), hn::Or(column, hn::ShiftLeft<8>(column)) + hn::Set(shorts, 256));
     const auto right = hn::And(x, fraction);
     // In 1/64 of a grey level.
     const auto row_at = [&](int row) HWY_ATTR {
@@ -180,14 +178,14 @@ class Sampler {
           hn::BitCast(Shades(), hn::TableLookupBytes(pixels_at(left, top, row), places));
       const auto a = hn::BitCast(shorts, hn::And(pairs, hn::Set(Shades(), 255)));
       const auto b = hn::BitCast(shorts, hn::ShiftRight<8>(pairs));
-      return hn::Add(hn::ShiftLeft<6>(a), hn::Mul(hn::Sub(b, a), right));
+      return hn::ShiftLeft<6>(a) + (b - a) * right;
     };
     const auto row = hn::ShiftRight<6>(y);
     auto upper = row_at(0);
     auto lower = row_at(1);
     auto next = lower;
     for (int i = 0;; ++i) {
-      const auto is_below = hn::Gt(row, hn::Set(shorts, static_cast<std::int16_t>(i)));
+      const auto is_below = row > hn::Set(shorts, static_cast<std::int16_t>(i));
       if (hn::AllFalse(shorts, is_below)) break;
       const auto below = row_at(i + 2);
       upper = hn::IfThenElse(is_below, next, upper);
@@ -195,12 +193,12 @@ class Sampler {
       next = below;
     }
     const auto down = hn::And(y, fraction);
-    const auto rise = hn::Sub(lower, upper);
-    const auto low_bits = hn::Mul(rise, down);
+    const auto rise = lower - upper;
+    const auto low_bits = rise * down;
     const auto high_bits = hn::MulHigh(rise, down);
     // `wide` is upper in the upper halves of words.
     const auto sum = [](hn::Vec<Shorts> wide, hn::Vec<Shorts> product) HWY_ATTR {
-      return hn::Add(hn::ShiftRight<10>(hn::BitCast(Words(), wide)), hn::BitCast(Words(), product));
+      return hn::ShiftRight<10>(hn::BitCast(Words(), wide)) + hn::BitCast(Words(), product);
     };
     const auto zero = hn::Zero(shorts);
     return {sum(hn::InterleaveLower(shorts, zero, upper),
@@ -215,8 +213,7 @@ class Sampler {
                                                  std::int32_t* first) {
     const Words4 words;
     const auto slowest = hn::Load(words, k < 0 ? motion.max : motion.min);
-    const auto moved =
-        hn::Add(hn::Load(words, motion.block_start), hn::Mul(slowest, hn::Set(words, k)));
+    const auto moved = hn::Load(words, motion.block_start) + slowest * hn::Set(words, k);
     const auto pixels =
         hn::Min(hn::Max(hn::ShiftRight<16>(moved), hn::Zero(words)), hn::Set(words, size - 1));
     hn::Store(pixels, words, first);
@@ -231,12 +228,12 @@ class Sampler {
     const auto end = hn::Set(words, (size - 1) * 64);
     const auto firsts = hn::LoadDup128(words, first);
     const auto part = [&](std::size_t i) HWY_ATTR {
-      const auto moved = hn::Add(hn::Load(words, motion.start + i),
-                                 hn::Mul(hn::Load(words, motion.of + i), hn::Set(words, k)));
+      const auto moved =
+          hn::Load(words, motion.start + i) + hn::Load(words, motion.of + i) * hn::Set(words, k);
       const auto position = hn::Min(hn::Max(hn::ShiftRight<10>(moved), hn::Zero(words)), end);
       const auto own = hn::TableLookupBytes(
           firsts, hn::BitCast(words, hn::Load(Bytes(), word_of_block.of + 4 * i)));
-      return hn::DemoteTo(half, hn::Sub(position, hn::ShiftLeft<6>(own)));
+      return hn::DemoteTo(half, position - hn::ShiftLeft<6>(own));
     };
     return hn::Combine(Shorts(), part(hn::MaxLanes(words)), part(0));
   }
@@ -247,8 +244,7 @@ class Sampler {
     const auto last = hn::Set(words, frame_.height - 1);
     const auto stride = hn::Set(words, static_cast<std::int32_t>(frame_.stride));
     HWY_ALIGN std::int32_t places[4];
-    hn::Store(hn::Add(hn::Mul(hn::Min(hn::Add(top, hn::Set(words, row)), last), stride), left),
-              words, places);
+    hn::Store(hn::Min(top + hn::Set(words, row), last) * stride + left, words, places);
     return gather(Bytes(), places);
   }
 
@@ -264,7 +260,7 @@ class Sampler {
     }
   }
 
-  /// Bytes of the word of each pixel's block.
+  /// Indices of the bytes of the word of each pixel's block.
   static constexpr auto word_of_block = [] {
     struct alignas(64) Table {
       std::uint8_t of[max_pixels * 4];
@@ -282,10 +278,9 @@ class Sampler {
 template <class Words>
 HWY_INLINE hn::Vec<Words> blended(Words words, hn::Vec<Words> earlier, hn::Vec<Words> later,
                                   hn::Vec<Words> weight) {
-  const auto sum = hn::Add(hn::ShiftLeft<8>(earlier), hn::Mul(hn::Sub(later, earlier), weight));
-  const auto grey = hn::ShiftRight<8>(hn::Add(sum, hn::Set(words, 1 << 7)));
-  return hn::ShiftRight<12>(
-      hn::Add(hn::Add(hn::ShiftLeft<8>(grey), grey), hn::Set(words, 1 << 11)));
+  const auto sum = hn::ShiftLeft<8>(earlier) + (later - earlier) * weight;
+  const auto grey = hn::ShiftRight<8>(sum + hn::Set(words, 1 << 7));
+  return hn::ShiftRight<12>(hn::ShiftLeft<8>(grey) + grey + hn::Set(words, 1 << 11));
 }
 
 /// Blends blocks whose pixels are close together.
@@ -311,7 +306,7 @@ void blend_blocks(const Warp<std::uint8_t>& warp, const BlockMotions& motions, i
 
 #endif
 
-/// Moves the pixels of some blocks, of which `count` are in the run.
+/// Moves the pixels of some blocks; `count` of them are in the run.
 template <int blocks>
 void move_blocks(const Warp<std::uint8_t>& warp, const Flow* flow, int left, int y, int count,
                  std::uint16_t* out, std::ptrdiff_t stride) {
@@ -328,7 +323,7 @@ void move_blocks(const Warp<std::uint8_t>& warp, const Flow* flow, int left, int
       if (motions.are_close(-j) && motions.are_close(warp.steps - j))
         blend_blocks<1>(warp, motions, j, out);
       else
-        blend_apart(warp, motions, j, out);
+        blend_singly(warp, motions, j, out);
     }
   }
 }
@@ -360,8 +355,8 @@ HWY_EXPORT(move_light_8);
 namespace {
 
 /// Number of steps of a tile whose pixels move by up to `max_motion` pixels. Luma is linear between
-/// steps; where it bends, the error of event times is proportional to the motion and to the inverse
-/// square of the steps. So from `fine` pixels on, steps grow with the square root of the motion,
+/// steps. Where it bends, the error of event times is proportional to the motion and inversely to
+/// the square of the steps: from `fine` pixels on, steps grow with the square root of the motion,
 /// which keeps the error constant.
 int steps_for(float max_motion, int max_steps) {
   constexpr float fine = 4;

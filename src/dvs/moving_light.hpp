@@ -21,7 +21,7 @@ class MotionTiles {
   static constexpr int height = 8;
   static_assert(rows_per_band % height == 0);
 
-  /// Finds the number of steps of each tile, at most `max_steps`.
+  /// Computes the number of steps of each tile, at most `max_steps`.
   void measure(const ImageView<Flow>& flow, int max_steps, ThreadPool& threads);
 
   int columns() const { return steps_.width(); }
@@ -33,9 +33,9 @@ class MotionTiles {
 };
 
 /// Writes the luma of a run of pixels that move along the flow: a row for each blended frame j = 1
-/// ... steps - 1, at out + (j - 1) * stride. 8-bit frames (which must be views of Images) are
-/// widened to 16 bits, which keeps more shades in dark areas; deeper frames keep their depth. Rows
-/// of `out` must have 8 elements past their end.
+/// ... steps - 1, at out + (j - 1) * stride. 8-bit frames (views of Images) are widened to 16 bits,
+/// to keep more shades in dark areas; deeper frames keep their depth. Rows of `out` must have 8
+/// elements past their end.
 void move_light(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, const Run& run,
                 std::uint16_t* out, std::ptrdiff_t stride);
 void move_light(const Warp<std::uint16_t>& warp, const ImageView<Flow>& flow, const Run& run,

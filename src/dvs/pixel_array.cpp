@@ -10,7 +10,7 @@
 namespace eventcamera {
 namespace {
 
-/// True if both settings give each pixel the same traits.
+/// True if pixels have the same traits with both settings.
 bool have_same_traits(const DvsSettings& a, const DvsSettings& b) {
   return a.positive_threshold == b.positive_threshold &&
          a.negative_threshold == b.negative_threshold && a.threshold_sigma == b.threshold_sigma &&

@@ -66,7 +66,7 @@ class PixelArray {
   void change(const DvsSettings& settings, ThreadPool& threads);
 
   /// Resets the pixels as if this frame had been shown for a long time, and draws their initial
-  /// noise budgets. Refractory periods go on.
+  /// noise budgets. Refractory periods continue.
   template <class Pixel>
   void settle(const Image<Pixel>& frame, const LightResponse& response, ThreadPool& threads) {
     for_each_row(threads, height(), [&](int y) {

@@ -25,7 +25,6 @@ struct ContrastThresholds {
   double negative;
 };
 
-/// The properties of one pixel.
 struct PixelTraits {
   ContrastThresholds thresholds;
   double leak;  ///< fall of the reference per microsecond

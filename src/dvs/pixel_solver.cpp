@@ -77,7 +77,7 @@ class Pixel {
  private:
   TrajectoryPoint at(double t) const { return {t, above_leak_.at(t)}; }
 
-  /// `now` is at `t` or later.
+  /// Handles a noise event due at `t`; `now` may be later.
   void make_noise(TrajectoryPoint now, double t) {
     noise_.draw(model_.random, number_, draw_++);
     if (t < ready_) return;
@@ -87,7 +87,7 @@ class Pixel {
          row_.has_labels() ? Cause::shot_noise : Cause::unknown);
   }
 
-  /// First crossing of levels that approach the reference while the growth of the thresholds falls.
+  /// First crossing of the levels, which approach the reference while the thresholds' growth falls.
   std::optional<Crossing> first_crossing(const Crossings& crossings, TrajectoryPoint from) const {
     if (growth_end_ > start_ + from.t) {
       const double growth = adaptation_.growth(start_ + from.t, growth_end_);
@@ -101,14 +101,14 @@ class Pixel {
     return crossings.first(reference_ - negative_, reference_ + positive_, from);
   }
 
-  /// First crossing of the level at `threshold` from the reference, negative for OFF, which grew by
-  /// `growth` at `from` and falls until `to`.
+  /// First crossing of the level at `threshold` (negative for OFF) from the reference. Its growth
+  /// is `growth` at `from` and falls until `to`.
   std::optional<Crossing> crossing(double threshold, double growth, TrajectoryPoint from,
                                    TrajectoryPoint to) const {
     if (std::isinf(threshold)) return std::nullopt;
     const double level = reference_ + threshold * (1 + growth);
     const double rise = threshold * adaptation_.rate();
-    if (above_leak_.lag == 0) {  // most straight lines stay below the falling one
+    if (above_leak_.lag == 0) {  // most straight lines stay below the falling level
       const double sign = threshold > 0 ? 1 : -1;
       const double last_level = level - rise * (to.t - from.t);
       if (sign * (from.value - level) < 0 && sign * (to.value - last_level) < -rounding)
@@ -188,7 +188,6 @@ class Pixel {
   ShotNoise noise_;
 };
 
-/// Solves candidate i.
 void solve_pixel(RowToSolve& row, std::size_t i) {
   const int x = row.candidates.x[i];
   const auto shade = static_cast<std::size_t>(row.candidates.shade[i]);

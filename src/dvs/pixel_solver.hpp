@@ -15,8 +15,8 @@
 
 namespace eventcamera {
 
-/// Maximum number of events of a pixel in one sub-interval, including those lost in its refractory
-/// period; then its reference is set to its signal. A change from black to white is 35 events at
+/// Maximum number of events of a pixel in one sub-interval, including events lost in its refractory
+/// period; then its reference is set to its signal. A change from black to white takes 35 events at
 /// common thresholds.
 inline constexpr int max_events = 512;
 
@@ -24,8 +24,8 @@ inline constexpr int max_events = 512;
 class UnsolvedPixels {
  public:
   /// Times are microseconds after the start of the sub-interval. Values are multiplied by `sign`,
-  /// so that the slope of the trajectory never decreases: it can only turn upwards, and the level
-  /// above the reference is the far one.
+  /// so that the slope of the trajectory never decreases: it can only turn upwards. The level above
+  /// the reference is the far one, the level below the near one.
   enum Column : std::size_t {
     index,  ///< in Candidates
     sign,
@@ -60,8 +60,8 @@ class UnsolvedPixels {
   std::vector<double> memory_;
 };
 
-/// Candidates of a row, and the parameters to advance them through a sub-interval. One per thread,
-/// to keep its memory; model and events are set for each band.
+/// Candidates of a row, and the parameters to advance them through a sub-interval. Each thread
+/// keeps one to reuse its memory; model and events are set for each band.
 struct RowToSolve {
   const PixelModel* model = nullptr;
   IntervalEvents::Band events;
@@ -72,8 +72,8 @@ struct RowToSolve {
 
   bool has_labels() const { return pixels.last_cause != nullptr; }
 
-  /// Rest of the refractory period at the end of the sub-interval. A rest of less than min_gap
-  /// comes after an event in the last microsecond, in which the pixel must not fire again.
+  /// Rest of the refractory period at the end of the sub-interval. A rest below min_gap follows an
+  /// event in the last microsecond, in which the pixel must not fire again.
   double refractory_left(double ready) const {
     const double left = std::max(0.0, ready - sub_interval->duration);
     return left > 0 && left < min_gap ? left + sub_interval->next_rounding : left;
@@ -105,8 +105,8 @@ struct RowToSolve {
 /// period and latency.
 void solve_pixels(RowToSolve& row);
 
-/// Solves the candidates in which shot noise fires, one at a time, and removes them. The noise of
-/// the others is done afterwards.
+/// Solves the candidates in which shot noise fires, one at a time, and removes them. Advances the
+/// noise budgets of the others.
 void solve_noisy_pixels(RowToSolve& row);
 
 /// Like solve_pixels(), for Solver::lines: straight-line signals without latency, whose reference

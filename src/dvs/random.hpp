@@ -57,7 +57,7 @@ class Random {
                                     std::uint64_t counter = 0) const {
     const std::uint64_t first = bits(pixel, purpose, counter);
     const double radius = std::sqrt(-2 * std::min(0.0, logarithm(to_uniform(first))));
-    // The angle is one within an eighth of a turn, mirrored at random.
+    // An angle within an eighth of a turn, mirrored at random.
     const std::uint64_t second = mixed(first + 1);
     const double angle = std::numbers::pi / 4 * to_uniform(second << 3);
     const auto [cosine, sine] = cosine_and_sine(angle);
@@ -71,7 +71,7 @@ class Random {
     return std::bit_cast<double>(bits >> 12 | std::uint64_t{1023} << 52) - (1 - 0x1p-53);
   }
 
-  /// The value, negative if the highest bit is set.
+  /// Flips the sign of the value if the highest bit is set.
   static double mirrored(double value, std::uint64_t bits) {
     return std::bit_cast<double>(std::bit_cast<std::uint64_t>(value) ^ (bits >> 63 << 63));
   }

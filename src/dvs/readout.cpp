@@ -9,8 +9,8 @@ namespace eventcamera {
 Readout::Readout(int width, int height)
     : width_(width),
       waiting_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
-      rows_(static_cast<std::size_t>(height)),
-      row_queue_(static_cast<std::size_t>(height)) {}
+      rows_(height),
+      row_queue_(height) {}
 
 void Readout::reset() {
   std::fill(waiting_.begin(), waiting_.end(), Waiting{0});
@@ -21,18 +21,17 @@ void Readout::reset() {
 
 void Readout::read(std::span<const Event> in, double duration, double events_per_second,
                    StepBuckets& out) {
-  constexpr double min_rate = 1e-9;  // an event in 30 years; a lower one makes no difference
+  constexpr double min_rate = 1e-9;  // an event in 30 years: a lower rate makes no difference
   const double time_per_event = 1e6 / std::max(events_per_second, min_rate);
   double idle_from = unfinished_ * time_per_event;  // microseconds after the start of the interval
   out.reset(1, 1);
   auto& left = out.bucket(1, 0);
-  // Reads rows until `time`.
   const auto serve_until = [&](double time) {
     while (queue_count_ > 0 && idle_from < time) {
       const int row = row_queue_[queue_first_];
       queue_first_ = (queue_first_ + 1) % row_queue_.size();
       --queue_count_;
-      const int count = rows_[static_cast<std::size_t>(row)].count;
+      const int count = rows_[row].count;
       serve(row, static_cast<std::uint32_t>(idle_from), left);
       idle_from += count * time_per_event;
     }
@@ -56,7 +55,7 @@ void Readout::admit(const Event& event) {
   const auto cause = static_cast<unsigned>(cause_of(event)) << cause_shift;
   const auto on = event.polarity() == Polarity::on ? on_bit : Waiting{0};
   waiting = static_cast<Waiting>(waits_bit | on | cause);
-  auto& row = rows_[static_cast<std::size_t>(pixel.y())];
+  auto& row = rows_[pixel.y()];
   if (row.count++ == 0) {
     row_queue_[(queue_first_ + queue_count_++) % row_queue_.size()] = pixel.y();
     row.first = x;
@@ -68,7 +67,7 @@ void Readout::admit(const Event& event) {
 }
 
 void Readout::append(int y, std::uint32_t t, std::vector<Event>& out) const {
-  const auto& row = rows_[static_cast<std::size_t>(y)];
+  const auto& row = rows_[y];
   const Waiting* waiting = waiting_.data() + place_of(0, y);
   constexpr int block = sizeof(std::uint64_t);  // of pixels, most of which have no event
   for (int x = row.first, left = row.count; left > 0;) {
@@ -90,7 +89,7 @@ void Readout::append(int y, std::uint32_t t, std::vector<Event>& out) const {
 
 void Readout::serve(int y, std::uint32_t t, std::vector<Event>& out) {
   append(y, t, out);
-  auto& row = rows_[static_cast<std::size_t>(y)];
+  auto& row = rows_[y];
   auto* waiting = waiting_.data() + place_of(0, y);
   std::fill(waiting + row.first, waiting + row.last, Waiting{0});
   row = {};

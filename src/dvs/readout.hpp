@@ -10,19 +10,17 @@
 
 namespace eventcamera {
 
-/// Arbiter of the readout: reads one row at a time, first come, first served, at a limited
-/// event rate. The events of a row take the time of its readout. A waiting pixel drops further
-/// events, so events beyond the readout rate are lost, and at most one event per pixel waits.
+/// Arbiter of the readout: reads one row at a time, first come, first served, at a limited event
+/// rate. Events get the time of the readout of their row. A waiting pixel drops further events, so
+/// at most one event per pixel waits, and events beyond the readout rate are lost.
 class Readout {
  public:
   Readout(int width, int height);
 
-  /// Drops the causes of the waiting events.
   void drop_causes() {
     for (auto& waiting : waiting_) waiting &= ~cause_bits;
   }
 
-  /// Drops the waiting events.
   void reset();
 
   /// Admits the sorted events of an interval of `duration` microseconds, with_cause(), and fills
@@ -30,7 +28,7 @@ class Readout {
   void read(std::span<const Event> in, double duration, double events_per_second, StepBuckets& out);
 
  private:
-  /// Waiting event of a pixel, without its time, which will be the time of its readout; 0 if none.
+  /// Waiting event of a pixel, without a time; 0 if none.
   using Waiting = std::uint8_t;
   static constexpr Waiting waits_bit = 1;
   static constexpr Waiting on_bit = 2;
@@ -44,7 +42,6 @@ class Readout {
     int count = 0;
   };
 
-  /// Its pixel must lie on the sensor.
   void admit(const Event& event);
   /// Appends the waiting events of a row, with the time `t`.
   void append(int y, std::uint32_t t, std::vector<Event>& out) const;

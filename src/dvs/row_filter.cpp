@@ -6,7 +6,6 @@
 #include "src/dvs/exposure_gain.hpp"
 #include "src/dvs/trajectory.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/row_filter.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -66,51 +65,50 @@ void filter(const PixelModel& model, const LightResponse& response, const SubInt
     auto target = hn::GatherIndex(floats, responses, value);
     const auto last_target = hn::LoadU(floats, targets + x);
     if (keeps_saturated) {
-      const auto is_saturated = hn::RebindMask(floats, hn::Gt(value, below_saturated));
+      const auto is_saturated = hn::RebindMask(floats, value > below_saturated);
       target = hn::IfThenElse(is_saturated, hn::Max(target, last_target), target);
     }
-    if (is_partial) target = hn::Add(last_target, hn::Mul(hn::Sub(target, last_target), share));
+    if (is_partial) target = last_target + (target - last_target) * share;
     // A rise of all signals is equivalent to a fall of all references.
     const auto leak = hn::LoadU(floats, leaks + x);
-    const auto leaked = hn::Add(hn::Mul(leak, duration), rise);
+    const auto leaked = leak * duration + rise;
 
     auto last_signal = last_target;
     auto signal = target;
-    auto margin = hn::Set(floats, rounding);  // excess beyond the values at both ends
+    auto margin = hn::Set(floats, rounding);  // by which the signal may exceed its end values
     if constexpr (has_bandwidth) {
       last_signal = hn::LoadU(floats, pixels.signal + x);
       const auto decay_factor = hn::GatherIndex(floats, tables.decay_factor.data(), shade);
       const auto mean_decay_factor =
           hn::GatherIndex(floats, tables.mean_decay_factor.data(), shade);
       const auto exponent = hn::GatherIndex(floats, tables.exponent.data(), shade);
-      const auto lag = hn::Sub(last_signal, last_target);
-      signal = hn::Add(hn::Sub(target, hn::Mul(hn::Sub(target, last_target), mean_decay_factor)),
-                       hn::Mul(lag, decay_factor));
-      // The signal may reverse in between, but not cross the tangents at both ends.
-      const auto first_slope = hn::Sub(leaked, hn::Mul(lag, exponent));
-      const auto last_slope = hn::Add(leaked, hn::Mul(hn::Sub(target, signal), exponent));
-      const auto turns = hn::Lt(hn::Mul(first_slope, last_slope), zero);
+      const auto lag = last_signal - last_target;
+      signal = target - (target - last_target) * mean_decay_factor + lag * decay_factor;
+      // The signal may reverse in between, but does not cross the tangents at its ends.
+      const auto first_slope = leaked - lag * exponent;
+      const auto last_slope = leaked + (target - signal) * exponent;
+      const auto turns = first_slope * last_slope < zero;
       const auto to_turn = hn::Min(hn::Abs(first_slope), hn::Abs(last_slope));
-      margin = hn::Add(margin, hn::IfThenElseZero(turns, to_turn));
+      margin = margin + hn::IfThenElseZero(turns, to_turn);
     }
 
     const auto reference = hn::LoadU(floats, references + x);
-    const auto next_reference = hn::Sub(reference, leaked);
-    const auto first = hn::Sub(last_signal, reference);
-    const auto last = hn::Sub(signal, next_reference);
-    const auto max = hn::Add(hn::Max(first, last), margin);
-    const auto min = hn::Sub(hn::Min(first, last), margin);
+    const auto next_reference = reference - leaked;
+    const auto first = last_signal - reference;
+    const auto last = signal - next_reference;
+    const auto max = hn::Max(first, last) + margin;
+    const auto min = hn::Min(first, last) - margin;
     const auto positive = hn::LoadU(floats, positives + x);
     const auto negative = hn::LoadU(floats, negatives + x);
     const auto refractory_left = hn::LoadU(floats, refractory_lefts + x);
-    auto happens = hn::Or(hn::Ge(max, positive), hn::Le(min, hn::Neg(negative)));
-    happens = hn::Or(happens, hn::Gt(refractory_left, zero));
+    auto happens = hn::Or(max >= positive, min <= hn::Neg(negative));
+    happens = hn::Or(happens, refractory_left > zero);
     auto noise_budget = hn::Zero(counts);
     if (has_noise) {
       const auto noise = hn::GatherIndex(counts, tables.noise.data(), shade);
       const auto before = hn::LoadU(counts, noise_budgets + x);
-      happens = hn::Or(happens, hn::RebindMask(floats, hn::Not(hn::Gt(before, noise))));
-      noise_budget = hn::Sub(before, noise);
+      happens = hn::Or(happens, hn::RebindMask(floats, hn::Not(before > noise)));
+      noise_budget = before - noise;
     }
     happens = hn::And(happens, hn::FirstN(floats, static_cast<std::size_t>(count)));
 

@@ -62,8 +62,8 @@ class Candidates {
 
 /// Luma of a run of pixels: std::uint8_t if it has 8 bits, std::uint16_t otherwise.
 struct RunLuma {
-  const void* target;  ///< towards which the light moves
-  const void* shade;   ///< that bandwidth and noise depend on
+  const void* target;  ///< luma at the end of the step
+  const void* shade;   ///< luma that determines bandwidth and noise
 };
 
 /// Advances a run of pixels through a sub-interval: targets, and with bandwidth signals, of all

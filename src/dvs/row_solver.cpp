@@ -7,28 +7,14 @@
 
 #include "src/dvs/trajectory.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/row_solver.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
-#include "src/core/simd-inl.hpp"
-#include "src/dvs/elementary-inl.hpp"
-#include "src/dvs/random-inl.hpp"
+#include "src/dvs/solver-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
-
-using Doubles = hn::CappedTag<double, max_lanes / 2>;
-using Bits = hn::RebindToUnsigned<Doubles>;
-using Floats = hn::Rebind<float, Doubles>;
-using Words = hn::Rebind<std::int32_t, Doubles>;
-using Values = hn::Vec<Doubles>;
-using Mask = hn::Mask<Doubles>;
-
-Values all(double value) {
-  return hn::Set(Doubles(), value);
-}
 
 struct Points {
   Values t;
@@ -42,26 +28,25 @@ struct Trajectories {
   Values bandwidth;
 
   HWY_INLINE Values lag_at(const Points& points) const {
-    return hn::Sub(hn::Sub(points.value, offset), hn::Mul(slope, points.t));
+    return points.value - offset - slope * points.t;
   }
   HWY_INLINE Values slope_at(const Points& points) const {
-    return hn::Sub(slope, hn::Mul(bandwidth, lag_at(points)));
+    return slope - bandwidth * lag_at(points);
   }
 
   /// Value at a time after `points`.
   HWY_INLINE Values at(Values t, const Points& points) const {
-    return hn::Add(hn::Add(offset, hn::Mul(slope, t)),
-                   hn::Mul(lag_at(points), decays(hn::Mul(bandwidth, hn::Sub(t, points.t)))));
+    return offset + slope * t + lag_at(points) * decays(bandwidth * (t - points.t));
   }
 
   /// Like Crossings::turn_after().
   HWY_INLINE Points turn_after(const Points& from, const Points& end) const {
-    const auto final_lag = hn::Div(slope, bandwidth);
-    const auto ratio = hn::Div(lag_at(from), final_lag);
-    const auto t = hn::Add(from.t, hn::Div(logarithms(ratio), bandwidth));
-    const auto value = hn::Add(hn::Add(offset, hn::Mul(slope, t)), final_lag);
-    const auto is_before_end = hn::Lt(t, end.t);
-    const auto turns = hn::Gt(ratio, all(1));
+    const auto final_lag = slope / bandwidth;
+    const auto ratio = lag_at(from) / final_lag;
+    const auto t = from.t + logarithms(ratio) / bandwidth;
+    const auto value = offset + slope * t + final_lag;
+    const auto is_before_end = t < end.t;
+    const auto turns = ratio > all(1);
     return {hn::IfThenElse(turns, hn::IfThenElse(is_before_end, t, end.t), from.t),
             hn::IfThenElse(turns, hn::IfThenElse(is_before_end, value, end.value), from.value)};
   }
@@ -71,53 +56,45 @@ struct Trajectories {
     const auto zero = all(0);
     const auto two = all(2);
     const auto precision = all(crossing_precision);
-    const auto rise = hn::Sub(levels, a.value);
-    const auto duration = hn::Sub(b.t, a.t);
-    const auto secant =
-        hn::Mul(hn::Min(hn::Max(hn::Div(rise, hn::Sub(b.value, a.value)), zero), all(1)), duration);
+    const auto rise = levels - a.value;
+    const auto duration = b.t - a.t;
+    const auto secant = hn::Min(hn::Max(rise / (b.value - a.value), zero), all(1)) * duration;
     const auto lag = lag_at(a);
-    const auto rises = hn::Gt(b.value, a.value);
-    const auto half = hn::Sub(slope, hn::Mul(bandwidth, hn::Add(lag, hn::Mul(rise, all(0.5)))));
-    const auto square =
-        hn::Add(hn::Mul(half, half), hn::Mul(hn::Mul(hn::Mul(two, slope), bandwidth), rise));
+    const auto rises = b.value > a.value;
+    const auto half = slope - bandwidth * (lag + rise * all(0.5));
+    const auto square = half * half + two * slope * bandwidth * rise;
     const auto root = hn::Sqrt(hn::Max(zero, square));
-    auto t = hn::Div(hn::Mul(two, rise), hn::Add(half, hn::IfThenElse(rises, root, hn::Neg(root))));
-    t = hn::IfThenElse(hn::And(hn::Ge(t, zero), hn::Le(t, duration)), t, secant);
+    auto t = two * rise / (half + hn::IfThenElse(rises, root, hn::Neg(root)));
+    t = hn::IfThenElse(hn::And(t >= zero, t <= duration), t, secant);
     auto early = zero;
     auto late = duration;
     auto left = wanted;
     for (int i = 0; i < max_iterations && !hn::AllFalse(Doubles(), left); ++i) {
-      const auto lag_left = hn::Mul(lag, decays(hn::Mul(bandwidth, t)));
-      const auto beyond = hn::Sub(hn::Sub(hn::Mul(slope, t), hn::Sub(lag, lag_left)), rise);
-      const auto is_late = hn::Not(hn::Xor(hn::Gt(beyond, zero), rises));
+      const auto lag_left = lag * decays(bandwidth * t);
+      const auto beyond = slope * t - (lag - lag_left) - rise;
+      const auto is_late = hn::Not(hn::Xor(beyond > zero, rises));
       late = hn::IfThenElse(is_late, t, late);
       early = hn::IfThenElse(is_late, early, t);
-      const auto slope_here = hn::Sub(slope, hn::Mul(bandwidth, lag_left));
-      const auto curvature = hn::Mul(hn::Mul(bandwidth, bandwidth), lag_left);
-      const auto step = hn::Div(
-          hn::Mul(hn::Mul(two, beyond), slope_here),
-          hn::Sub(hn::Mul(hn::Mul(two, slope_here), slope_here), hn::Mul(beyond, curvature)));
-      const auto next = hn::Sub(t, step);
-      const auto is_within = hn::And(hn::Ge(next, early), hn::Le(next, late));
-      t = hn::IfThenElse(
-          left, hn::IfThenElse(is_within, next, hn::Mul(hn::Add(early, late), all(0.5))), t);
+      const auto slope_here = slope - bandwidth * lag_left;
+      const auto curvature = bandwidth * bandwidth * lag_left;
+      const auto step =
+          two * beyond * slope_here / (two * slope_here * slope_here - beyond * curvature);
+      const auto next = t - step;
+      const auto is_within = hn::And(next >= early, next <= late);
+      t = hn::IfThenElse(left, hn::IfThenElse(is_within, next, (early + late) * all(0.5)), t);
       const auto length = hn::Abs(step);
-      const auto slope_there = hn::Sub(slope_here, hn::Mul(curvature, step));
-      const auto min_slope_squared =
-          hn::Min(hn::Mul(slope_here, slope_here), hn::Mul(slope_there, slope_there));
-      const auto error = hn::Mul(
-          hn::Mul(hn::Mul(length, length), length),
-          hn::Add(
-              hn::Mul(hn::Mul(curvature, curvature), all(0.25)),
-              hn::Mul(hn::Abs(hn::Mul(hn::Mul(curvature, bandwidth), slope_here)), all(1.0 / 6))));
-      const auto is_short = hn::Lt(hn::Mul(bandwidth, length), all(0.5));
-      const auto is_precise =
-          hn::Or(hn::Lt(length, precision), hn::Lt(error, hn::Mul(precision, min_slope_squared)));
-      const auto is_done = hn::Or(hn::Lt(hn::Sub(late, early), precision),
-                                  hn::And(hn::And(is_within, is_short), is_precise));
+      const auto slope_there = slope_here - curvature * step;
+      const auto min_slope_squared = hn::Min(slope_here * slope_here, slope_there * slope_there);
+      const auto error = length * length * length *
+                         (curvature * curvature * all(0.25) +
+                          hn::Abs(curvature * bandwidth * slope_here) * all(1.0 / 6));
+      const auto is_short = bandwidth * length < all(0.5);
+      const auto is_precise = hn::Or(length < precision, error < precision * min_slope_squared);
+      const auto is_done =
+          hn::Or(late - early < precision, hn::And(hn::And(is_within, is_short), is_precise));
       left = hn::And(left, hn::Not(is_done));
     }
-    return hn::Add(a.t, t);
+    return a.t + t;
   }
 };
 
@@ -171,9 +148,9 @@ class RowSolver {
     };
     const auto duration = all(duration_);
     const auto from = load(Candidates::last_target);
-    const auto fall = hn::Add(load(Candidates::leak), all(row_.sub_interval->rise / duration_));
+    const auto fall = load(Candidates::leak) + all(row_.sub_interval->rise / duration_);
     auto last_value = load(Candidates::target);
-    const auto light_slope = hn::Div(hn::Sub(last_value, from), duration);
+    const auto light_slope = (last_value - from) / duration;
     auto value = from;
     auto offset = from;
     auto bandwidth = all(0);
@@ -183,22 +160,22 @@ class RowSolver {
                                   hn::PromoteTo(hn::RebindToSigned<Doubles>(), shade));
       value = load(Candidates::last_signal);
       last_value = load(Candidates::signal);
-      offset = hn::Sub(from, hn::Div(light_slope, bandwidth));
-      sign = hn::CopySign(sign, hn::Sub(value, offset));
+      offset = from - light_slope / bandwidth;
+      sign = hn::CopySign(sign, value - offset);
     }
-    const auto end = hn::Add(last_value, hn::Mul(fall, duration));
+    const auto end = last_value + fall * duration;
     const auto positive = load(Candidates::positive);
     const auto negative = load(Candidates::negative);
-    const auto is_upright = hn::Gt(sign, all(0));
+    const auto is_upright = sign > all(0);
     store(Column::index, iota(doubles, static_cast<double>(i)));
     store(Column::sign, sign);
     store(Column::t, all(0));
-    store(Column::value, hn::Mul(sign, value));
-    store(Column::end, hn::Mul(sign, end));
-    store(Column::offset, hn::Mul(sign, offset));
-    store(Column::slope, hn::Mul(sign, hn::Add(light_slope, fall)));
+    store(Column::value, sign * value);
+    store(Column::end, sign * end);
+    store(Column::offset, sign * offset);
+    store(Column::slope, sign * (light_slope + fall));
     store(Column::bandwidth, bandwidth);
-    store(Column::reference, hn::Mul(sign, load(Candidates::reference)));
+    store(Column::reference, sign * load(Candidates::reference));
     store(Column::to_far, hn::IfThenElse(is_upright, positive, negative));
     store(Column::to_near, hn::IfThenElse(is_upright, negative, positive));
     store(Column::ready, load(Candidates::refractory_left));
@@ -227,48 +204,47 @@ class RowSolver {
     const auto ready = load(Column::ready);
     const auto noise = load(Column::next_noise);
     const auto sign = load(Column::sign);
-    // A reset holds the reference at the signal until the pixel is ready, maybe after the end.
+    // A reset holds the reference at the signal until the pixel is ready, possibly past the end.
     const auto held_until = holds_ ? ready : all(0);
-    const auto stays_held = hn::Gt(held_until, end.t);
-    const auto is_released = hn::And(hn::Gt(held_until, now.t), hn::Not(stays_held));
+    const auto stays_held = held_until > end.t;
+    const auto is_released = hn::And(held_until > now.t, hn::Not(stays_held));
     if (!hn::AllFalse(doubles, is_released)) {
       now.value = hn::IfThenElse(is_released, trajectories.at(ready, now), now.value);
       now.t = hn::IfThenElse(is_released, ready, now.t);
       reference = hn::IfThenElse(is_released, now.value, reference);
       hn::StoreU(reference, doubles, unsolved_.column(Column::reference) + i);
     }
-    const auto far = hn::Add(reference, to_far);
-    const auto near = hn::Sub(reference, to_near);
+    const auto far = reference + to_far;
+    const auto near = reference - to_near;
     const auto margin = all(rounding);
     const auto within = hn::And(exist, hn::Not(stays_held));
 
     // Like Crossings::first().
-    const auto is_far = hn::Ge(now.value, far);
-    const auto is_near = hn::Le(now.value, near);
+    const auto is_far = now.value >= far;
+    const auto is_near = now.value <= near;
     const auto is_crossed = hn::Or(is_far, is_near);
-    auto crosses_near = hn::Le(end.value, hn::Add(near, margin));
+    auto crosses_near = end.value <= near + margin;
     auto until = end;
     if (has_bandwidth_) {
       const auto first_slope = trajectories.slope_at(now);
       const auto last_slope = trajectories.slope_at(end);
-      const auto turns = hn::And(hn::And(within, hn::Gt(end.value, near)),
-                                 hn::And(hn::Lt(first_slope, all(0)), hn::Gt(last_slope, all(0))));
+      const auto turns = hn::And(hn::And(within, end.value > near),
+                                 hn::And(all(0) > first_slope, last_slope > all(0)));
       crosses_near = hn::And(crosses_near, hn::Not(turns));
-      const auto to_meeting = hn::Div(
-          hn::Sub(hn::Sub(end.value, now.value), hn::Mul(last_slope, hn::Sub(end.t, now.t))),
-          hn::Sub(first_slope, last_slope));
-      const auto lowest = hn::Add(now.value, hn::Mul(first_slope, to_meeting));
-      const auto may_cross = hn::And(turns, hn::Le(lowest, hn::Add(near, margin)));
+      const auto to_meeting =
+          (end.value - now.value - last_slope * (end.t - now.t)) / (first_slope - last_slope);
+      const auto lowest = now.value + first_slope * to_meeting;
+      const auto may_cross = hn::And(turns, lowest <= near + margin);
       if (!hn::AllFalse(doubles, may_cross)) {
         const auto turn = trajectories.turn_after(now, end);
-        const auto crosses = hn::And(may_cross, hn::Le(turn.value, hn::Add(near, margin)));
+        const auto crosses = hn::And(may_cross, turn.value <= near + margin);
         until.t = hn::IfThenElse(crosses, turn.t, until.t);
         until.value = hn::IfThenElse(crosses, turn.value, until.value);
         crosses_near = hn::Or(crosses_near, crosses);
       }
     }
     crosses_near = hn::And(hn::Or(crosses_near, is_near), hn::Not(is_far));
-    const auto crosses_far = hn::Or(hn::Ge(end.value, hn::Sub(far, margin)), is_far);
+    const auto crosses_far = hn::Or(end.value >= far - margin, is_far);
     const auto crosses = hn::And(within, hn::Or(crosses_near, crosses_far));
     const auto level = hn::IfThenElse(crosses_near, near, far);
     const auto wanted = hn::And(crosses, hn::Not(is_crossed));
@@ -281,10 +257,9 @@ class RowSolver {
     auto value = hn::IfThenElse(is_crossed, now.value, level);
     auto next_reference = level;
 
-    const auto is_noise =
-        hn::And(within, hn::Le(noise, hn::IfThenElse(crosses, t, all(duration_))));
+    const auto is_noise = hn::And(within, noise <= hn::IfThenElse(crosses, t, all(duration_)));
     const auto happens = hn::Or(crosses, is_noise);
-    const auto is_ready = hn::Ge(hn::IfThenElse(is_noise, noise, t), ready);
+    const auto is_ready = hn::IfThenElse(is_noise, noise, t) >= ready;
     if (!hn::AllFalse(doubles, is_noise)) {
       t = hn::IfThenElse(is_noise, hn::Max(noise, now.t), t);
       value = hn::IfThenElse(is_noise, trajectories.at(t, now), value);
@@ -292,7 +267,7 @@ class RowSolver {
           hn::IfThenElse(is_noise, hn::IfThenElse(is_ready, value, reference), next_reference);
     }
     const auto fires = hn::And(happens, is_ready);
-    const auto is_off = hn::Xor(crosses_near, hn::Lt(sign, all(0)));
+    const auto is_off = hn::Xor(crosses_near, sign < all(0));
 
     const auto noise_bits = bits_of(doubles, is_noise);
     const auto fire_bits = bits_of(doubles, fires);
@@ -332,35 +307,34 @@ class RowSolver {
     keep(Column::to_far, to_far);
     keep(Column::to_near, to_near);
     keep(Column::next_noise, next_noise);
-    keep(Column::ready, hn::IfThenElse(fires, hn::Add(emitted, all(row_.model->gap)), ready));
+    keep(Column::ready, hn::IfThenElse(fires, emitted + all(row_.model->gap), ready));
     return hn::CountTrue(doubles, happens);
   }
 
-  /// Times at which events are emitted that are due at `t`: later by the latency.
+  /// Times at which the events of crossings at `t` are emitted: later by the latency.
   Values emissions(std::size_t i, Values t, std::uint64_t noise_bits) {
     const PixelModel& model = *row_.model;
     if (model.latency == 0 && !has_latency_jitter()) return t;
-    const auto emitted = hn::Add(t, all(model.latency));
+    const auto emitted = t + all(model.latency);
     if (!has_latency_jitter()) return emitted;
     const Bits bits;
     HWY_ALIGN std::uint64_t numbers[max_lanes / 2] = {};
     HWY_ALIGN std::uint64_t counters[max_lanes / 2] = {};
     for (std::size_t lane = 0; lane < std::min(lanes(), count_ - i); ++lane) {
       numbers[lane] = row_.pixels.number_of(x_of(i + lane));
-      // Noise has drawn its next event and its polarity before.
+      // Noise draws its next event and its polarity first.
       counters[lane] = unsolved_.draws[index_of(i + lane)] + 2 * (noise_bits >> lane & 1);
     }
-    const RandomSeries<Doubles> random(row_.model->random, hn::Load(bits, numbers),
-                                       Random::Purpose::event);
+    const RandomSeries random(row_.model->random, hn::Load(bits, numbers), Random::Purpose::event);
     const auto normal = random.normals(hn::Load(bits, counters)).first;
-    return hn::Max(t, hn::Add(emitted, hn::Mul(all(model.latency_jitter), normal)));
+    return hn::Max(t, emitted + all(model.latency_jitter) * normal);
   }
 
   bool has_latency_jitter() const { return row_.model->latency_jitter > 0; }
 
   static HWY_INLINE Values secants(Values level, const Points& a, const Points& b) {
-    const auto share = hn::Div(hn::Sub(level, a.value), hn::Sub(b.value, a.value));
-    return hn::Add(a.t, hn::Mul(hn::Min(hn::Max(share, all(0)), all(1)), hn::Sub(b.t, a.t)));
+    const auto share = (level - a.value) / (b.value - a.value);
+    return a.t + hn::Min(hn::Max(share, all(0)), all(1)) * (b.t - a.t);
   }
 
   std::size_t index_of(std::size_t i) {
@@ -368,7 +342,7 @@ class RowSolver {
   }
   int x_of(std::size_t i) { return row_.candidates.x[index_of(i)]; }
 
-  /// Adds the event of a crossing by a pixel whose columns are not updated yet.
+  /// Adds the event of a crossing; the columns of the pixel are not updated yet.
   void cross(std::size_t i, double t, double emitted, bool is_on) {
     const int x = x_of(i);
     const auto polarity = is_on ? Polarity::on : Polarity::off;
@@ -380,7 +354,7 @@ class RowSolver {
     row_.add_event(x, emitted, polarity, cause);
   }
 
-  /// Slope of a signal relative to its reference, at a time after its columns.
+  /// Slope of a signal relative to its reference, at a time after Column::t.
   double slope_at(std::size_t i, double t) {
     const auto at = [&](Column column) { return unsolved_.column(column)[i]; };
     const double lag = at(Column::value) - at(Column::offset) - at(Column::slope) * at(Column::t);

@@ -55,14 +55,14 @@ const std::vector<PulseEdge>& ExposurePulse::next(const DvsSettings& settings, d
 
 ShadeTables::ShadeTables(const DvsSettings& settings, double microseconds, double gain)
     : duration(microseconds) {
-  constexpr double min_cutoff_hz = 1e-3;  // minutes; a lower one makes no difference
+  constexpr double min_cutoff_hz = 1e-3;  // minutes: a lower cutoff makes no difference
   constexpr double noise_at_white = 0.25;
   const double max_bandwidth =
       2 * std::numbers::pi * std::max(settings.cutoff_frequency, min_cutoff_hz) / 1e6;
   const double max_noise_rate = settings.shot_noise_rate / 1e6;
   for (std::size_t i = 0; i < shades; ++i) {
     const double light = light_of(static_cast<double>(i) / 255, settings.linear_light) / gain;
-    // In (0, 1]; scales the bandwidth, and reduces the noise, relative to a dark pixel.
+    // In (0, 1]: scales the bandwidth up and the noise down.
     const double brightness =
         std::min(1.0, (light + settings.dark_light) / (1 + settings.dark_light));
     bandwidth[i] = max_bandwidth * brightness;

@@ -12,7 +12,7 @@
 
 namespace eventcamera {
 
-/// A common rise of all signals, or fall if `rise` is negative.
+/// Simultaneous rise of all signals, or fall if `rise` is negative.
 struct PulseEdge {
   static constexpr double duration = 100;  ///< microseconds
 
@@ -21,9 +21,9 @@ struct PulseEdge {
 };
 
 /// Cross-talk in cameras whose pixels output both frames and events, such as the DAVIS: when an
-/// exposure begins, all signals rise a little and fall again. All over the array, pixels close to
-/// an ON event fire at once, and hardly any fire during the pulse. The durations are from the
-/// recording slider-depth of a DAVIS240C (docs/realism.md).
+/// exposure begins, all signals rise a little and fall again. All pixels close to an ON event fire
+/// at once, and hardly any fire during the pulse. The durations are from the recording slider-depth
+/// of a DAVIS240C (docs/realism.md).
 class ExposurePulse {
  public:
   static constexpr double plateau = 800;  ///< from one edge to the other, microseconds
@@ -43,8 +43,8 @@ class ExposurePulse {
   double falls_in_ = 0;  ///< microseconds from the start of the next interval
 };
 
-/// Number of luma levels for bandwidth and noise, which depend on the light (v2e) but need not be
-/// exact.
+/// Number of luma levels for bandwidth and noise, which depend on the light (v2e) but need little
+/// precision.
 inline constexpr int shades = 256;
 
 /// Bandwidth and noise of pixels of each shade in a sub-interval.
@@ -79,7 +79,7 @@ struct SubInterval {
   const ShadeTables* tables;
 };
 
-/// Timeline since the first frame. Divides each interval into equal steps, and splits these where
+/// Timeline since the first frame. Divides each interval into equal steps, and splits them where
 /// pulse edges begin and end. One plan per number of steps.
 class Timeline {
  public:
@@ -96,8 +96,7 @@ class Timeline {
   /// Makes the plan of this many steps, if it is not made yet.
   void make_plan(int steps);
 
-  /// A plan that was made.
-  const Plan& plan(int steps) const { return plans_[static_cast<std::size_t>(steps)]; }
+  const Plan& plan(int steps) const { return plans_[steps]; }
 
   /// Ends the interval: the sub-intervals of the next one have larger numbers.
   void end();

@@ -51,14 +51,14 @@ struct Crossing {
   Polarity polarity;
 };
 
-/// A level missed by less than this counts as reached: the float rounding that accumulates over
-/// several events from one grey level to another and back.
+/// A level missed by less than this counts as reached: bound of the float rounding that accumulates
+/// over several events from one grey level to another and back.
 inline constexpr float rounding = 2e-6F;
 
 /// Precision of crossing times, microseconds.
 inline constexpr double crossing_precision = 0.001;
 
-/// More than bisection needs for that precision in any interval.
+/// More than bisection needs for this precision in any interval.
 inline constexpr int max_iterations = 64;
 
 /// Finds exact times at which a trajectory crosses levels.
@@ -109,7 +109,7 @@ inline std::optional<Crossing> Crossings::first(double lower, double upper,
   const double first_slope = slope_at(start);
   const bool ends_near = end_.value <= near;
   if (!ends_near && first_slope < 0 && last_slope_ > 0) {
-    // It stays above the intersection of the tangents at both ends, which is cheap to compute.
+    // It stays above the intersection of the tangents at its ends, which is cheap to compute.
     const double rise = end_.value - start.value;
     const double to_meeting =
         (rise - last_slope_ * (end_.t - start.t)) / (first_slope - last_slope_);

@@ -209,7 +209,7 @@ CameraCalibration::Point CameraCalibration::distorted(Point point) const {
   return {bent.x * fx + cx, bent.y * fy + cy};
 }
 
-/// Newton's method, with differences in place of derivatives, from the point itself.
+/// Newton's method with finite differences, starting at the point itself.
 CameraCalibration::Point CameraCalibration::undistorted(Point point) const {
   constexpr int max_steps = 50;
   constexpr double accuracy = 1e-6;  // pixels

@@ -11,7 +11,7 @@ namespace eventcamera {
 /// Keeps the events of a region of the sensor, whose top left pixel becomes (0, 0).
 class CropFilter {
  public:
-  /// Pixels removed at each side.
+  /// Numbers of pixels removed at each side.
   struct Settings {
     unsigned left = 0;
     unsigned right = 0;

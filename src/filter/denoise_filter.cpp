@@ -5,7 +5,6 @@
 
 #include "src/core/sensor_size.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/filter/denoise_filter.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -33,11 +32,10 @@ class Neighbours {
     for (int first = 0; first < side; first += static_cast<int>(hn::Lanes(lanes))) {
       auto column = hn::Zero(lanes);
       for (int y = 1; y <= radius; ++y)
-        column =
-            hn::Add(column, hn::Add(value(stamps(cell, first, -y)), value(stamps(cell, first, y))));
+        column = column + (value(stamps(cell, first, -y)) + value(stamps(cell, first, y)));
       const auto beside = value(stamps(cell, first, 0));
-      total = hn::Add(total, hn::And(column, hn::LoadU(lanes, in_square + first)));
-      total = hn::Add(total, hn::And(beside, hn::LoadU(lanes, beside_centre + first)));
+      total = total + hn::And(column, hn::LoadU(lanes, in_square + first));
+      total = total + hn::And(beside, hn::LoadU(lanes, beside_centre + first));
     }
     return static_cast<std::uint32_t>(hn::GetLane(hn::SumOfLanes(lanes, total)));
   }
@@ -82,8 +80,8 @@ HWY_INLINE void find_support(const StampedBatch<Stamp>& batch, Stamp correlation
     Stamp* const cell = batch.cells.at(event);
     // Negative for a stamp of 0, never.
     const auto minus_age = hn::Set(lanes, static_cast<std::int32_t>(correlation_time - now));
-    const auto sum = neighbours.sum(
-        cell, [&](auto stamps) HWY_ATTR { return value(hn::Add(stamps, minus_age)); });
+    const auto sum =
+        neighbours.sum(cell, [&](auto stamps) HWY_ATTR { return value(stamps + minus_age); });
     *cell = now;
     batch.is_kept[i] = sum >= needed;
   }
@@ -112,8 +110,8 @@ int nearest(const DoubleWindow::Window& signal, const DoubleWindow::Window& nois
   auto min = hn::Set(lanes, INT16_MAX);
   for (const auto* window : {&signal, &noise})
     for (std::size_t i = 0; i < window->x.size(); i += hn::Lanes(lanes)) {
-      const auto across = hn::Abs(hn::Sub(hn::LoadU(lanes, window->x.data() + i), at_x));
-      const auto down = hn::Abs(hn::Sub(hn::LoadU(lanes, window->y.data() + i), at_y));
+      const auto across = hn::Abs(hn::LoadU(lanes, window->x.data() + i) - at_x);
+      const auto down = hn::Abs(hn::LoadU(lanes, window->y.data() + i) - at_y);
       min = hn::Min(min, hn::SaturatedAdd(across, down));
     }
   return hn::GetLane(hn::MinOfLanes(lanes, min));

@@ -13,13 +13,13 @@
 namespace eventcamera {
 
 /// The double window filter (Guo and Delbruck, "Low Cost and Latency Event Camera Background
-/// Activity Denoising", TPAMI 2022): remembers the places of the last 36 events that were signal,
-/// and of the last 36 that were noise.
+/// Activity Denoising", TPAMI 2022): stores the positions of the last 36 signal events, and of the
+/// last 36 noise events.
 class DoubleWindow {
  public:
   DoubleWindow() { clear(); }
 
-  /// Keeps signal: events at most `distance` pixels across plus down from one in either window.
+  /// Keeps signal: events within `distance` pixels, across plus down, of one in either window.
   LabelledEvents filter(LabelledEvents events, unsigned distance);
 
   void clear();
@@ -44,16 +44,15 @@ class DoubleWindow {
   Window noise_;
 };
 
-/// How noise is distinguished from signal. The neighbours of a pixel are those around it, without
-/// itself.
+/// How noise is distinguished from signal. The neighbours of a pixel do not include the pixel.
 enum class DenoiseMethod {
   /// Background activity filter (Delbruck 2008): one of 8 neighbours fired within the correlation
   /// time.
   baf,
   /// Spatio-temporal correlation filter (Guo and Delbruck 2022): at least min_neighbours fired.
   stcf,
-  /// Each of 24 neighbours counts by the age of its last event of equal polarity, from 1 if new
-  /// down to 0 at the correlation time. The sum reaches the threshold.
+  /// The weights of 24 neighbours add up to the threshold: a weight falls from 1 to 0 over the
+  /// correlation time, with the age of the last event of equal polarity.
   time_kernel,
   /// Double window filter (Guo and Delbruck 2022), see DoubleWindow.
   dwf,
@@ -77,7 +76,7 @@ class DenoiseFilter {
   /// Keeps the sum of time_kernel within 32 bits.
   static constexpr Nanoseconds max_correlation_time = 50'000'000'000;
 
-  /// Reach of the neighbours of time_kernel, in pixels.
+  /// Radius of the neighbourhood of time_kernel, pixels.
   static constexpr int kernel_radius = 2;
 
   static Nanoseconds default_correlation_time(DenoiseMethod method);

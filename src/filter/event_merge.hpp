@@ -68,8 +68,8 @@ struct MergedInterval {
 };
 
 /// Merges sorted streams into one, interval by interval. Intervals follow each other without
-/// overlap, and times do not change. Events of one microsecond are in the order of the inputs, and
-/// of each input in its order. Only events at the very end of an interval, as simulators write
+/// overlap, and times do not change. Events of one microsecond are in the order of the inputs, then
+/// in the order of their input. Only events at the very end of an interval, as simulators write
 /// them, may precede events of earlier inputs in the same microsecond.
 class EventMerger {
  public:
@@ -77,7 +77,8 @@ class EventMerger {
 
   /// Returns the next interval, up to the earliest end of the inputs; there must be at least one,
   /// and all must be loaded. An interval without events ends at the next event or interval if
-  /// 32-bit times require it, or if nothing is known before. Unload the merged inputs afterwards.
+  /// 32-bit times require it, or if no input covers the time before. Unload the merged inputs
+  /// afterwards.
   MergedInterval next(Inputs inputs);
 
   /// Writes the events of that interval, relative to its start, and their labels if it is labelled.

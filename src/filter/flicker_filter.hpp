@@ -18,11 +18,11 @@ enum class FlickerMode {
 /// Finds pixels that flicker with a frequency in a band, as the anti-flicker block of Prophesee's
 /// sensors does for blocks of pixels. 8 bytes per pixel.
 ///
-/// A phase lasts from the first event of one polarity to the first of the other. A pixel counts
-/// phases, up to max_threshold: one more for each whose length fits a period in the band, one less
-/// for each that does not, none after the longest period without a change of polarity. It begins
-/// to flicker when the count reaches the start threshold, and stops when it is below the stop
-/// threshold.
+/// A phase lasts from the first event of one polarity to the first of the other. Each pixel has a
+/// counter from 0 to max_threshold: a phase whose length fits a period in the band increments it,
+/// any other phase decrements it, and the longest period without a change of polarity resets it. A
+/// pixel starts to flicker when the counter reaches the start threshold, and stops when it falls
+/// below the stop threshold.
 class FlickerFilter {
  public:
   static constexpr unsigned max_threshold = 7;

@@ -11,10 +11,10 @@
 
 namespace eventcamera {
 
-/// Limits the event rate. Keeps every n-th event, with n from the event count of the last reference
-/// period, or of this one so far, which spreads the drops over picture and period. A flood that
-/// begins within a period keeps up to 1.5 times its share; later periods repay that, with at most
-/// half of their share. Fractions of events accumulate.
+/// Limits the event rate. Keeps every n-th event, which spreads the drops over picture and period;
+/// n follows from the event count of the last reference period, or of this one so far. A burst
+/// within a period may keep up to 1.5 times the limit; later periods make up for it, with up to
+/// half of their limit each. Fractions of events accumulate.
 class RateFilter {
  public:
   struct Settings {

@@ -26,7 +26,6 @@ class ScaleFilter {
 
   LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings);
 
-  /// Resets the counts.
   void forget();
 
  private:

@@ -34,7 +34,7 @@ constexpr Stamp in_stamps(Nanoseconds time) {
   return static_cast<Stamp>((time + 999) / 1000);
 }
 
-/// A stamp after the epoch moves by `amount`.
+/// Stamp after the epoch has moved by `amount`.
 constexpr Stamp lowered(Stamp stamp, std::uint64_t amount) {
   return stamp > amount ? static_cast<Stamp>(stamp - amount) : 0;
 }
@@ -42,8 +42,8 @@ constexpr Stamp lowered(Stamp stamp, std::uint64_t amount) {
 /// Stamps the times of one stream.
 class StampClock {
  public:
-  /// Returns the stamp of `time`, at least max_stamp_age. Calls lower(amount) first if the epoch
-  /// moves, for the owner of stamps to lower them all.
+  /// Returns the stamp of `time`, at least max_stamp_age. If the epoch moves, calls lower(amount)
+  /// first: the owner of stamps must lower them all.
   template <class Lower>
   Stamp at(Microseconds time, const Lower& lower) {
     const auto stamp = static_cast<std::uint64_t>(time) - static_cast<std::uint64_t>(epoch_);
@@ -74,7 +74,7 @@ struct StampedCells {
   }
 };
 
-/// Events to decide on.
+/// Events to keep or drop.
 template <class Cell>
 struct StampedBatch {
   std::span<const Event> events;
@@ -83,8 +83,8 @@ struct StampedBatch {
   bool* is_kept;  ///< result, one for each event
 };
 
-/// Cells of pixels, which hold stamps, and a margin of pixels that never fire. A cell of all zeros
-/// has seen no event. Cells other than Stamp have lower(amount).
+/// Cells with stamps, one or two per pixel, and a margin of pixels that never fire. A cell of all
+/// zeros has seen no event. Cells other than Stamp have lower(amount).
 template <class Cell>
 class StampedPixels {
  public:

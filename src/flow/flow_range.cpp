@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/flow/flow_range.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/flow_range.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -11,15 +10,15 @@ HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-/// No wider than the boxes that are common.
+/// Capped at the usual width of boxes.
 using Floats = hn::CappedTag<float, 16>;
 
 FlowRange range_of(const ImageView<Flow>& flow, const Box& box) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
   const int count = 2 * box.width();
-  // Prefetches the box after the next, as far as the row goes: its rows are too far apart for the
-  // hardware prefetcher.
+  // Prefetches the box after the next, up to the end of the row: the rows of a box are too far
+  // apart for the hardware prefetcher.
   const int ahead = std::min(2 * count, 2 * (flow.width - box.right));
   auto lowest = hn::Zero(floats);
   auto highest = hn::Zero(floats);

@@ -8,9 +8,8 @@
 
 namespace eventcamera {
 
-/// Range that holds the flow of a part of a frame, and 0, in pixels.
+/// Range of the flow in a part of a frame, extended to include 0; pixels.
 struct FlowRange {
-  /// Along one axis.
   struct Axis {
     float min;
     float max;

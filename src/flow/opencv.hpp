@@ -17,9 +17,9 @@ inline cv::Mat opencv_image(const ImageView<std::uint8_t>& image) {
 
 /// Sets OpenCV's thread count during its lifetime.
 ///
-/// OpenCV has one thread count per process. Objects with the same count coexist; one with another
-/// count waits until they are gone, and later ones queue behind it. The last one restores the
-/// application's count.
+/// OpenCV has one thread count per process. Objects with the same count coexist; an object with
+/// another count waits until they are gone, and later ones queue behind it. The last one restores
+/// the application's count.
 class OpenCvThreads {
  public:
   explicit OpenCvThreads(int threads);
@@ -28,7 +28,6 @@ class OpenCvThreads {
   OpenCvThreads& operator=(const OpenCvThreads&) = delete;
 };
 
-/// FlowMethod::opencv_dis, in builds with OpenCV.
 std::unique_ptr<DenseFlow> make_opencv_dis();
 
 /// Sets the regularisation of the variational refinement as published. Since OpenCV 4.10 it is a

@@ -14,7 +14,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 
-/// Lane-wise sum of the products of two columns of vectors, exact in 32 bits.
+/// Lane-wise sums of the products of 16-bit vectors, exact in 32 bits.
 template <class Factors>
 class ProductSum {
  public:
@@ -24,7 +24,7 @@ class ProductSum {
   // Not defaulted: GCC 12 compiles a defaulted constructor without the target's instructions.
   ProductSum() : low_(hn::Zero(Lanes())), high_(hn::Zero(Lanes())) {}
   void add(Factor a, Factor b) { low_ = hn::ReorderWidenMulAccumulate(Lanes(), a, b, low_, high_); }
-  hn::Vec<Lanes> lanes() const { return hn::Add(low_, high_); }
+  hn::Vec<Lanes> lanes() const { return low_ + high_; }
 
  private:
   hn::Vec<Lanes> low_;
@@ -32,18 +32,17 @@ class ProductSum {
 };
 
 #if HWY_TARGET != HWY_SCALAR
-/// In each 128-bit block, lane c is the sum of the lanes of that block of sum c.
+/// In each 128-bit block, lane c of the result is the sum of the lanes of sum c.
 template <class Lanes, class Value = hn::Vec<Lanes>>
 HWY_INLINE Value add_lanes(Lanes lanes, Value sum0, Value sum1, Value sum2, Value sum3) {
   const hn::Repartition<std::int64_t, Lanes> pairs;
   const auto add_pairs = [&](Value a, Value b) {
-    return hn::BitCast(pairs,
-                       hn::Add(hn::InterleaveLower(lanes, a, b), hn::InterleaveUpper(lanes, a, b)));
+    return hn::BitCast(pairs, hn::InterleaveLower(lanes, a, b) + hn::InterleaveUpper(lanes, a, b));
   };
   const auto low = add_pairs(sum0, sum1);
   const auto high = add_pairs(sum2, sum3);
-  return hn::Add(hn::BitCast(lanes, hn::InterleaveLower(pairs, low, high)),
-                 hn::BitCast(lanes, hn::InterleaveUpper(pairs, low, high)));
+  return hn::BitCast(lanes, hn::InterleaveLower(pairs, low, high)) +
+         hn::BitCast(lanes, hn::InterleaveUpper(pairs, low, high));
 }
 #endif
 

@@ -2,11 +2,12 @@
 #include "src/flow/region_of_interest_flow.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace eventcamera {
 namespace {
 
-/// Extent of a region along one axis: at least [from, to) and its surroundings.
+/// Region along one axis: [from, to) and its surroundings, rounded up, within the frame.
 struct Range {
   int first;
   int last;
@@ -33,43 +34,31 @@ RegionOfInterestFlow::RegionOfInterestFlow(FlowMethod method, int width, int hei
 ImageView<Flow> RegionOfInterestFlow::find(const ImageView<std::uint8_t>& from,
                                            const ImageView<std::uint8_t>& to, const Box& changed,
                                            ThreadPool& threads) {
-  if (changed.empty()) {
-    whole_knows_last_ = false;
-    clear();
-    return flow_.view();
+  Box part;
+  if (!changed.empty()) {
+    const Range columns(changed.left, changed.right, width_);
+    const Range rows(changed.top, changed.bottom, height_);
+    part = {columns.first, rows.first, columns.last, rows.last};
   }
-  const Range columns(changed.left, changed.right, width_);
-  const Range rows(changed.top, changed.bottom, height_);
-  const Box part{columns.first, rows.first, columns.last, rows.last};
-  // A region of more than half the frame is extended to the whole frame, because then the work on
-  // `to` is reused by the next call.
+  // A region of more than half the frame is extended to the whole frame, so that the next call
+  // reuses the work on `to`.
   if (2 * static_cast<std::int64_t>(part.width()) * part.height() >
-      static_cast<std::int64_t>(width_) * height_)
-    return find_in_whole(from, to, threads);
-  whole_knows_last_ = false;
-  find_in_part(from, to, part, threads);
-  return flow_.view();
-}
-
-ImageView<Flow> RegionOfInterestFlow::find_in_whole(const ImageView<std::uint8_t>& from,
-                                                    const ImageView<std::uint8_t>& to,
-                                                    ThreadPool& threads) {
-  if (!whole_) whole_ = make_dense_flow(method_);
-  if (!whole_knows_last_) whole_->push(from, threads);
-  whole_->push(to, threads);
-  whole_knows_last_ = true;
-  return whole_->flow(threads);
-}
-
-void RegionOfInterestFlow::find_in_part(const ImageView<std::uint8_t>& from,
-                                        const ImageView<std::uint8_t>& to, const Box& part,
-                                        ThreadPool& threads) {
-  if (!part_) part_ = make_dense_flow(method_);
-  const auto found = part_->find(crop(from, part), crop(to, part), threads);
+      static_cast<std::int64_t>(width_) * height_) {
+    if (!whole_) whole_ = make_dense_flow(method_);
+    if (!std::exchange(whole_has_last_, true)) whole_->push(from, threads);
+    whole_->push(to, threads);
+    return whole_->flow(threads);
+  }
+  whole_has_last_ = false;
   clear();
-  for (int y = 0; y < part.height(); ++y)
-    std::copy_n(found.row(y), part.width(), flow_.row(part.top + y) + part.left);
+  if (!part.empty()) {
+    if (!part_) part_ = make_dense_flow(method_);
+    const auto found = part_->find(crop(from, part), crop(to, part), threads);
+    for (int y = 0; y < part.height(); ++y)
+      std::copy_n(found.row(y), part.width(), flow_.row(part.top + y) + part.left);
+  }
   filled_ = part;
+  return flow_.view();
 }
 
 void RegionOfInterestFlow::clear() {

@@ -8,11 +8,11 @@
 
 namespace eventcamera {
 
-/// Dense flow between successive frames, computed only around changed pixels; 0 elsewhere. Saves
+/// Dense flow between successive frames, computed only around changed pixels and 0 elsewhere. Saves
 /// most of the work if the camera does not move.
 class RegionOfInterestFlow {
  public:
-  /// Distance up to which a change affects the flow, in pixels: the reach of a window on a coarse
+  /// Distance up to which a change affects the flow, in pixels: about half a window on a coarse
   /// scale.
   static constexpr int surroundings = 48;
 
@@ -20,7 +20,6 @@ class RegionOfInterestFlow {
   /// memory of a DenseFlow.
   static constexpr int side_step = 64;
 
-  /// For frames of this size.
   RegionOfInterestFlow(FlowMethod method, int width, int height);
 
   FlowMethod method() const { return method_; }
@@ -32,17 +31,13 @@ class RegionOfInterestFlow {
                        const Box& changed, ThreadPool& threads);
 
  private:
-  ImageView<Flow> find_in_whole(const ImageView<std::uint8_t>& from,
-                                const ImageView<std::uint8_t>& to, ThreadPool& threads);
-  void find_in_part(const ImageView<std::uint8_t>& from, const ImageView<std::uint8_t>& to,
-                    const Box& part, ThreadPool& threads);
   void clear();
 
   FlowMethod method_;
   int width_;
   int height_;
   std::unique_ptr<DenseFlow> whole_;
-  bool whole_knows_last_ = false;
+  bool whole_has_last_ = false;
   std::unique_ptr<DenseFlow> part_;
   Image<Flow> flow_;  ///< 0 outside filled_
   Box filled_;

@@ -6,7 +6,6 @@
 
 #include "src/flow/scratch.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/resampling.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -20,10 +19,6 @@ using Floats = hn::CappedTag<float, row_padding>;
 using Words = hn::Rebind<std::int32_t, Floats>;
 using Vector = hn::Vec<Floats>;
 
-Vector between(Vector a, Vector b, Vector weight) {
-  return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
-}
-
 void resample_floats(const float* row, const Resampling& resampling, float* out) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
@@ -31,7 +26,7 @@ void resample_floats(const float* row, const Resampling& resampling, float* out)
     const auto first = hn::LoadU(Words(), resampling.first() + x);
     const auto a = hn::GatherIndex(floats, row, first);
     const auto b = hn::GatherIndex(floats, row + 1, first);
-    hn::StoreU(between(a, b, hn::LoadU(floats, resampling.weight() + x)), floats, out + x);
+    hn::StoreU(lerp(a, b, hn::LoadU(floats, resampling.weight() + x)), floats, out + x);
   }
 }
 
@@ -48,15 +43,13 @@ void resample_flows(const Flow* row, const Resampling& resampling, int begin, in
     const auto index = hn::ShiftLeft<1>(hn::LoadU(Words(), first));
     const auto weight = hn::LoadU(floats, resampling.weight() + x);
     const auto blend = [&](const auto& at) {
-      hn::StoreInterleaved2(hn::Mul(between(at(0), at(2), weight), times),
-                            hn::Mul(between(at(1), at(3), weight), times), floats, &out[x].x);
+      hn::StoreInterleaved2(lerp(at(0), at(2), weight) * times, lerp(at(1), at(3), weight) * times,
+                            floats, &out[x].x);
     };
     if (right - left <= 2 * lanes) {  // the usual case: the row becomes twice as long
       const auto low = hn::LoadU(floats, values + left);
       const auto high = hn::LoadU(floats, values + left + lanes);
-      blend([&](int i) {
-        return Lookup<Floats>(hn::Sub(index, hn::Set(Words(), left - i)))(low, high);
-      });
+      blend([&](int i) { return Lookup<Floats>(index - hn::Set(Words(), left - i))(low, high); });
     } else {
       blend([&](int i) { return hn::GatherIndex(floats, values + i, index); });
     }
@@ -68,7 +61,7 @@ void blend_flows(const Flow* upper, const Flow* lower, float weight, int width, 
   const int lanes = static_cast<int>(hn::Lanes(floats));
   const auto down = hn::Set(floats, weight);
   for (int i = 0; i < 2 * width; i += lanes)
-    hn::StoreU(between(hn::LoadU(floats, &upper->x + i), hn::LoadU(floats, &lower->x + i), down),
+    hn::StoreU(lerp(hn::LoadU(floats, &upper->x + i), hn::LoadU(floats, &lower->x + i), down),
                floats, &out->x + i);
 }
 

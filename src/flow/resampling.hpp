@@ -8,8 +8,8 @@
 
 namespace eventcamera {
 
-/// Maps the pixels of a row to positions on a row of another length and the same extent: between
-/// two of its pixels, or on its first or last one.
+/// Linear resampling of a row to another length: each output pixel lies between two input pixels,
+/// or on the first or last one.
 class Resampling {
  public:
   Resampling() = default;
@@ -18,7 +18,7 @@ class Resampling {
   int size() const { return size_; }
   /// First of the two pixels.
   const std::int32_t* first() const { return first_.data(); }
-  /// Weight of the second one, [0, 1); 0 if there is none.
+  /// Weight of the second pixel, [0, 1); 0 if there is none.
   const float* weight() const { return weight_.data(); }
 
  private:
@@ -31,11 +31,11 @@ class Resampling {
 /// end of `out`.
 void resample_row(const float* row, const Resampling& resampling, float* out);
 
-/// Resamples a row of a flow, likewise, and multiplies it by `factor`. Reads up to a vector past
-/// its end.
+/// Resamples a row of flow and multiplies it by `factor`. Reads and writes up to a vector past the
+/// ends.
 void resample_row(const Flow* row, const Resampling& resampling, float factor, Flow* out);
 
-/// The same for columns [first, last) alone.
+/// The same, only for columns [first, last).
 void resample_columns(const Flow* row, const Resampling& resampling, int first, int last,
                       float factor, Flow* out);
 

@@ -10,8 +10,8 @@ namespace eventcamera {
 /// length.
 inline constexpr int row_padding = 16;
 
-/// Returns at least `count` elements, which keep their values. The vector never shrinks, so sizes
-/// that alternate cause no allocations once the largest was seen.
+/// Grows a vector to at least `count` elements, and returns its data. It never shrinks, so that
+/// alternating sizes do not allocate.
 template <class T>
 T* scratch_of(std::vector<T>& vector, std::size_t count) {
   if (vector.size() < count) vector.resize(count);

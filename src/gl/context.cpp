@@ -6,15 +6,6 @@
 #include <string_view>
 
 namespace eventcamera::gl {
-namespace {
-
-std::string hexadecimal(GLenum code) {
-  char text[16];
-  std::snprintf(text, sizeof text, "0x%04x", code);
-  return text;
-}
-
-}  // namespace
 
 Context::Context(const Load& load) {
   const auto get_string = reinterpret_cast<PFNGLGETSTRINGPROC>(load("glGetString"));
@@ -82,7 +73,9 @@ void Context::check() const {
   const GLenum code = next_error();
   if (code == GL_NO_ERROR) return;
   if (code == GL_OUT_OF_MEMORY) throw Error("OpenGL is out of memory");
-  throw Error("OpenGL error " + hexadecimal(code));
+  char message[32];
+  std::snprintf(message, sizeof message, "OpenGL error 0x%04x", code);
+  throw Error(message);
 }
 
 }  // namespace eventcamera::gl

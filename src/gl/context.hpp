@@ -11,7 +11,7 @@
 
 namespace eventcamera::gl {
 
-/// OpenGL is missing, too old or lost, or a call failed. The text is for the user.
+/// OpenGL is missing, too old or lost, or a call failed. The message is for users.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -74,8 +74,8 @@ class Context {
   EVENTCAMERA_GL_FUNCTIONS(DECLARE)
 #undef DECLARE
 
-  /// Fences of EGL, which any thread can wait for, without a context. Null, like the display, if
-  /// the context is not one of EGL.
+  /// EGL fences: any thread can wait for them without a context. Null, like the display, if the
+  /// context is not one of EGL.
   PFNEGLCREATESYNCKHRPROC CreateSync = nullptr;
   PFNEGLCLIENTWAITSYNCKHRPROC WaitForSync = nullptr;
   PFNEGLDESTROYSYNCKHRPROC DestroySync = nullptr;
@@ -83,7 +83,7 @@ class Context {
   PFNEGLRELEASETHREADPROC ReleaseThread = nullptr;
   EGLDisplay egl_display = nullptr;
 
-  /// Called with the name of each kernel before it runs, to measure it; may be empty.
+  /// Called with the name of each kernel before it runs, for measurements; may be empty.
   std::function<void(std::string_view kernel)> on_kernel;
 
   /// First lines of every shader.
@@ -97,7 +97,7 @@ class Context {
     return max_buffer_size_;
   }
 
-  /// Stops deleting GL objects: a lost context has deleted them. Nothing else may be called
+  /// Stops deleting GL objects, which were deleted with a lost context. Nothing else may be called
   /// afterwards.
   void abandon();
 

@@ -5,47 +5,19 @@
 
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/gl/farneback.hpp"
-#include "src/gl/kernels.hpp"
 #include "src/gl/shaders.hpp"
 
 namespace eventcamera::gl {
 namespace {
 
-/// Limits flow to the surroundings of changed pixels, like RegionOfInterestFlow.
-class RegionOfInterest {
- public:
-  RegionOfInterest(const Context& gl, const LumaFormat& format)
-      : format_(format),
-        changed_box_(gl, "changed_box", shaders::changed_box),
-        stop_outside_(gl, "stop_outside", shaders::stop_outside),
-        box_(gl) {}
-
-  /// Sets the flow between two frames to 0 outside the region around all pixels that changed by
-  /// more than `threshold`.
-  void limit(const GreyFrame& before, const GreyFrame& now, int threshold, const Buffer& flow) {
-    const auto [width, height, bits] = format_;
-    box_.assign_zeros(4 * sizeof(int));
-    changed_box_.run({groups_of(64, GreyFrame::words_across(width)), height},
-                     {&before.buffer(), &now.buffer(), &box_}, {width, height, threshold});
-    stop_outside_.run(
-        {groups_of(64, width), height}, {&box_, &flow},
-        {width, height, RegionOfInterestFlow::surroundings, RegionOfInterestFlow::side_step});
-  }
-
- private:
-  LumaFormat format_;
-  Kernel changed_box_;
-  Kernel stop_outside_;
-  Buffer box_;
-};
-
 class InterpolatingSimulator final : public DenseSimulator {
  public:
   InterpolatingSimulator(const Context& gl, const LumaFormat& format)
       : DenseSimulator(gl, format),
-        luma_(gl),
         farneback_(gl, format),
-        region_(gl, format),
+        changed_box_(gl, "changed_box", shaders::changed_box),
+        stop_outside_(gl, "stop_outside", shaders::stop_outside),
+        box_(gl),
         kernel_(gl, format),
         frames_{{gl, format}, {gl, format}} {}
 
@@ -59,9 +31,22 @@ class InterpolatingSimulator final : public DenseSimulator {
     store(frame);
     const auto& now = frames_[now_];
     const Buffer& flow = farneback_.find();
-    region_.limit(last, now, std::min(thresholds.positive, thresholds.negative), flow);
+    limit_flow(last, now, std::min(thresholds.positive, thresholds.negative), flow);
     list.begin(steps);
     kernel_.run(last, now, flow, interpolation_, thresholds, list);
+  }
+
+  /// Sets the flow between two frames to 0 outside the region around all pixels that changed by
+  /// more than `threshold`, like RegionOfInterestFlow.
+  void limit_flow(const GreyFrame& before, const GreyFrame& now, int threshold,
+                  const Buffer& flow) {
+    const auto [width, height, bits] = format();
+    box_.assign_zeros(4 * sizeof(int));
+    changed_box_.run({groups_of(64, GreyFrame::words_across(width)), height},
+                     {&before.buffer(), &now.buffer(), &box_}, {width, height, threshold});
+    stop_outside_.run(
+        {groups_of(64, width), height}, {&box_, &flow},
+        {width, height, RegionOfInterestFlow::surroundings, RegionOfInterestFlow::side_step});
   }
 
   void store(const TextureFrame& frame) {
@@ -70,9 +55,10 @@ class InterpolatingSimulator final : public DenseSimulator {
     farneback_.push(frames_[now_]);
   }
 
-  LumaKernel luma_;
   FarnebackFlow farneback_;
-  RegionOfInterest region_;
+  Kernel changed_box_;
+  Kernel stop_outside_;
+  Buffer box_;
   InterpolationKernel kernel_;
   GreyFrame frames_[2];
   int now_ = 0;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "src/gl/kernels.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/shaders.hpp"
 
@@ -14,10 +13,7 @@ namespace {
 class FrameSimulator final : public Simulator {
  public:
   FrameSimulator(const Context& gl, const LumaFormat& format)
-      : Simulator(gl, format),
-        luma_(gl),
-        difference_(gl, format),
-        frames_{{gl, format}, {gl, format}} {}
+      : Simulator(gl, format), difference_(gl, format), frames_{{gl, format}, {gl, format}} {}
 
  private:
   void start(const TextureFrame& frame) override { luma_.run(frame, frames_[last_]); }
@@ -31,7 +27,6 @@ class FrameSimulator final : public Simulator {
     difference_.run(before, frames_[last_], Thresholds::of(settings, format().bits), 1, list);
   }
 
-  LumaKernel luma_;
   DifferenceKernel difference_;
   GreyFrame frames_[2];
   int last_ = 0;
@@ -52,7 +47,6 @@ class DiffSimulator final : public Simulator {
  public:
   DiffSimulator(const Context& gl, const LumaFormat& format)
       : Simulator(gl, format),
-        luma_(gl),
         difference_(gl, format),
         split_(gl, "split", shaders::split),
         move_(gl, "move_differences", shaders::move_differences),
@@ -111,7 +105,6 @@ class DiffSimulator final : public Simulator {
     }
   }
 
-  LumaKernel luma_;
   DifferenceKernel difference_;
   Kernel split_;
   Kernel move_;

@@ -35,7 +35,7 @@
 namespace eventcamera::gl {
 namespace {
 
-/// Of a pixel, as in the shader.
+/// Number of values of a pixel, as in the shader.
 constexpr int planes = 9;
 
 /// Threshold of dead pixels.
@@ -70,7 +70,6 @@ class PixelSimulator final : public DvsSimulator {
  public:
   PixelSimulator(const Context& gl, const LumaFormat& format)
       : DvsSimulator(gl, format),
-        luma_(gl),
         kernel_(gl, "dvs", shaders::dvs),
         grey_{{gl, format}, {gl, format}},
         state_(gl),
@@ -102,7 +101,7 @@ class PixelSimulator final : public DvsSimulator {
 
   bool needs_flow() const override { return settings_.upsampling == Upsampling::motion; }
 
-  /// True if the CPU prepares the frames.
+  /// True if the CPU must prepare the frames.
   bool needs_luma() const {
     return settings_.denoise != 0 || settings_.exposure_compensation || needs_flow();
   }
@@ -192,14 +191,14 @@ class PixelSimulator final : public DvsSimulator {
     return fired_.is_plain() && !has_late ? events_ : collect(list);
   }
 
-  /// Ends the interval with these events, and those of earlier intervals that are due. Events past
-  /// its end carry the rest of their times, as the shader writes it.
+  /// Ends the interval with these events, and deferred ones that are due. Events past its end carry
+  /// the fraction of their microsecond, as written by the shader.
   const EventBuckets& collect(std::span<const Event> events) {
     std::vector<IntervalEvents::Band> bands(static_cast<std::size_t>(band_count(format().height)));
     for (std::size_t i = 0; i < bands.size(); ++i) bands[i].begin(fired_, static_cast<int>(i));
     for (const Event& event : events) {
       const auto seventh = static_cast<int>(cause_of(event));
-      bands[static_cast<std::size_t>((event.y() & coordinate_bits) / rows_per_band)].add(
+      bands[(event.y() & coordinate_bits) / rows_per_band].add(
           event.t + (seventh > 0 ? (seventh - 0.5) / 7 : 0), without_cause(event));
     }
     for (auto& band : bands) band.end();
@@ -400,7 +399,7 @@ class PixelSimulator final : public DvsSimulator {
         plan = here();
         add_plan(timeline_.plan(steps), steps, shade_tables, words);
       }
-      words[static_cast<std::size_t>(tile)] = plan;
+      words[tile] = plan;
     }
 
     const auto response_bytes = std::as_bytes(std::span(responses));
@@ -464,7 +463,6 @@ class PixelSimulator final : public DvsSimulator {
     scene_.assign(scene_bytes_);
   }
 
-  LumaKernel luma_;
   Kernel kernel_;
   GreyFrame grey_[2];       ///< the last two frames
   int now_ = 0;             ///< index of the later one
@@ -479,7 +477,7 @@ class PixelSimulator final : public DvsSimulator {
   Unread unread_[max_queued];
   int last_ = 0;             ///< index of the last interval
   int count_ = 0;            ///< number of unread intervals
-  bool is_complete_ = true;  ///< the buffer of the last interval has all its events
+  bool is_complete_ = true;  ///< the last interval's events are known to fit into their buffer
   Image<Flow> read_flow_;
 
   FramePair<std::uint8_t> frames_;

@@ -51,8 +51,8 @@ void EventList::assign(const EventBuckets& events) {
         const bool is_on = event.polarity() == Polarity::on;
         const int mark = event.y() * marks_across_ + event.x / 32 + (is_on ? marks_a_step() : 0);
         const std::uint32_t bit = std::uint32_t{1} << event.x % 32;
-        marks[static_cast<std::size_t>(mark)][0] |= bit;
-        if (is_on) marks[static_cast<std::size_t>(mark)][1] |= bit;
+        marks[mark][0] |= bit;
+        if (is_on) marks[mark][1] |= bit;
       }
     });
   marks_.assign(std::as_bytes(std::span(marks)));

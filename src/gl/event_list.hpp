@@ -21,10 +21,10 @@ struct EventListKernels {
 };
 
 /// Collects the pixels that fire in the steps of an interval, and reads them back as a sorted list
-/// of events. Each interval has its own list, so that the GPU can already work on the next one.
+/// of events. Each interval has its own list, so that the GPU can work on the next one meanwhile.
 ///
-/// Kernels mark pixels in marks(), by step, then in raster order: two words for 32 pixels of a row,
-/// with a bit set for each pixel that fires, and for each that fires ON.
+/// Kernels write marks(), by step, then in raster order: two words for 32 pixels of a row, with a
+/// bit for each pixel that fires in the first, and for each that fires ON in the second.
 class EventList {
  public:
   EventList(const Context& gl, const LumaFormat& format, const EventListKernels& kernels);
@@ -32,10 +32,10 @@ class EventList {
   /// Begins an interval without steps.
   void clear() { times_.clear(); }
 
-  /// Begins an interval: all marks of its steps, from step `first` on, must be written.
+  /// Begins an interval; then all marks of its steps, from `first` on, must be written.
   void begin(const StepTimes& steps, int first = 1);
 
-  /// Marks events regardless of their times: OFF in one step, ON in another.
+  /// Marks events regardless of their times, OFF and ON in a step each.
   void assign(const EventBuckets& events);
 
   int steps() const { return static_cast<int>(times_.size()); }

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "src/gl/grey_frame.hpp"
+#include "src/gl/objects.hpp"
 #include "src/gl/shaders.hpp"
 
 namespace eventcamera::gl {

@@ -8,18 +8,17 @@
 
 namespace eventcamera::gl {
 
-/// Sorts lists of events with is_before(), by a radix sort. A list is a buffer that begins with the
-/// number of events and its capacity; if they do not fit, those that do are sorted. Events past the
+/// Radix sort of lists of events, in the order of is_before(). A list is a buffer that begins with
+/// the number of events and its capacity; events beyond the capacity are missing. Events past the
 /// end of the interval, which differ from without_cause(), come last, in raster order.
 class EventSort {
  public:
   EventSort(const Context& gl, const LumaFormat& format);
 
-  /// The list to write, as large as `sorted`.
+  /// Returns the list to write, as large as `sorted`.
   Buffer& unsorted(const Buffer& sorted);
 
-  /// Queues the sorting of unsorted() into `sorted`. Does not wait. `duration` of the interval,
-  /// microseconds.
+  /// Queues the sorting of unsorted() into `sorted`. `duration` is the interval's, in microseconds.
   void run(const Buffer& sorted, std::uint32_t duration) const;
 
  private:

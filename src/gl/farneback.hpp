@@ -3,8 +3,8 @@
 
 #include <list>
 
-#include "src/flow/farneback/pyramid.hpp"
-#include "src/gl/grey_frame.hpp"
+#include "src/flow/farneback/polynomial_expansion.hpp"
+#include "src/gl/objects.hpp"
 
 namespace eventcamera::gl {
 

@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "src/gl/event_list.hpp"
-#include "src/gl/grey_frame.hpp"
+#include "src/gl/objects.hpp"
 #include "src/simulate/simulator.hpp"
 #include "src/simulate/warp.hpp"
 
@@ -72,8 +72,7 @@ struct Picture {
   std::array<std::array<std::uint8_t, 4>, 4> colours;
 };
 
-/// Draws the marks of an event list like Accumulator draws events. For this, marks need neither be
-/// counted nor sorted.
+/// Draws the marks of an event list like Accumulator draws events, without counting or sorting.
 class DrawKernel {
  public:
   DrawKernel(const Context& gl, const LumaFormat& format);
@@ -83,8 +82,8 @@ class DrawKernel {
   const Context& gl_;
   LumaFormat format_;
   Kernel kernel_;
-  /// Output of the shader, copied to the texture on the GPU: in OpenGL ES 3.1, shaders can only
-  /// write to immutable textures, but GStreamer's textures are mutable.
+  /// Output of the shader, copied to the texture on the GPU: shaders of OpenGL ES 3.1 can write
+  /// only to immutable textures, but GStreamer's are mutable.
   Buffer pixels_;
 };
 

@@ -56,7 +56,7 @@ static std::string log_of(GLuint object, GetParameter get_parameter, GetLog get_
   get_parameter(object, GL_INFO_LOG_LENGTH, &length);
   std::string log(static_cast<std::size_t>(length), '\0');
   if (length > 0) get_log(object, length, &length, log.data());
-  log.resize(static_cast<std::size_t>(length));
+  log.resize(length);
   return log;
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 #include <string_view>
 
+#include "src/core/luma.hpp"
 #include "src/gl/context.hpp"
 
 namespace eventcamera::gl {
@@ -22,13 +23,12 @@ class Buffer {
   GLuint name() const { return name_; }
   std::size_t size() const { return size_; }
 
-  /// Makes it at least `size` bytes long; if it must grow, its contents are lost. Throws Error.
+  /// Grows the buffer to at least `size` bytes; growing loses its contents. Throws Error.
   void reserve(std::size_t size);
 
-  /// Replaces the contents from `offset` on. If it must grow for this, its contents are lost.
+  /// Replaces the contents from `offset` on, after reserve().
   void assign(std::span<const std::byte> bytes, std::size_t offset = 0);
 
-  /// Replaces the contents by `size` zeros.
   void assign_zeros(std::size_t size);
 
   /// Like reserve(), but a buffer that grows contains zeros.
@@ -36,8 +36,8 @@ class Buffer {
     if (size > size_) assign_zeros(size);
   }
 
-  /// Copies bytes from `offset` on to `out`, once the GPU has written them. Throws Error if the
-  /// context is lost.
+  /// Waits for the GPU and copies bytes from `offset` on to `out`. Throws Error if the context is
+  /// lost.
   void read(std::span<std::byte> out, std::size_t offset = 0) const;
 
  private:
@@ -47,7 +47,6 @@ class Buffer {
   std::size_t size_ = 0;
 };
 
-/// Number of workgroups along each axis.
 struct Groups {
   int x = 1;
   int y = 1;
@@ -59,7 +58,6 @@ constexpr int groups_of(int size, int count) {
   return (count + size - 1) / size;
 }
 
-/// A compute shader.
 class Kernel {
  public:
   /// `name` is for error messages and measurements, and must outlive this object. The source has no
@@ -69,8 +67,8 @@ class Kernel {
   Kernel(const Kernel&) = delete;
   Kernel& operator=(const Kernel&) = delete;
 
-  /// Runs it with `buffers` at bindings 0, 1, ... and the integers `values` at uniform locations 0,
-  /// 1, ... Kernels run one after another, and see what earlier ones wrote.
+  /// Queues a run with `buffers` at bindings 0, 1, ... and the integers `values` at uniform
+  /// locations 0, 1, ... Kernels run one after another, and see what earlier ones wrote.
   void run(Groups groups, std::initializer_list<const Buffer*> buffers,
            std::initializer_list<int> values) const;
 
@@ -88,14 +86,14 @@ class Fence {
   Fence(const Fence&) = delete;
   Fence& operator=(const Fence&) = delete;
 
-  /// Moves it to the end of the queue.
+  /// Moves the fence to the end of the queue.
   void set();
 
-  /// Waits until the GPU has reached it. Throws Error.
+  /// Waits until the GPU has reached the fence. Throws Error.
   void wait() const;
 
-  /// Like wait(), but needs no context: call it in a thread whose waiting delays nobody else.
-  /// Returns at once if the context is not one of EGL, and reports no errors: wait() does.
+  /// Like wait(), but needs no context, so another thread may call it. Does not report errors, and
+  /// returns at once if the context is not one of EGL.
   void wait_without_context() const;
 
  private:
@@ -104,6 +102,36 @@ class Fence {
   const Context& gl_;
   GLsync sync_ = nullptr;
   EGLSyncKHR egl_sync_ = EGL_NO_SYNC_KHR;  ///< instead of sync_, with EGL
+};
+
+/// Input frame of a simulator, a 2D texture of bytes.
+struct TextureFrame {
+  LumaFormat format;
+  GLuint texture;
+  /// Weights of the four channels in luma, in units of 1/LumaWeights::one. Their sum is
+  /// LumaWeights::one.
+  int weights[4];
+  int alpha = -1;  ///< channel of alpha; -1: opaque
+  int black = 0;   ///< luma of black, on which the frame is composited
+};
+
+inline std::size_t pixel_count(const LumaFormat& format) {
+  return static_cast<std::size_t>(format.width) * static_cast<std::size_t>(format.height);
+}
+
+/// The luma of a frame: bytes, four per word; each row starts with a new word.
+class GreyFrame {
+ public:
+  GreyFrame(const Context& gl, const LumaFormat& format) : buffer_(gl) {
+    buffer_.reserve(static_cast<std::size_t>(words_across(format.width)) *
+                    static_cast<std::size_t>(format.height) * 4);
+  }
+
+  static int words_across(int width) { return groups_of(4, width); }
+  const Buffer& buffer() const { return buffer_; }
+
+ private:
+  Buffer buffer_;
 };
 
 }  // namespace eventcamera::gl

@@ -3,11 +3,10 @@
 
 #include <list>
 
-#include "src/gl/grey_frame.hpp"
+#include "src/gl/objects.hpp"
 
 namespace eventcamera::gl {
 
-/// Gaussian pyramid of a picture.
 class Pyramid {
  public:
   struct Level {
@@ -61,10 +60,10 @@ class PointTracker {
   Kernel search_;
   Kernel spread_;
   Kernel motion_;
-  /// Of a level, then the number and the places of its blocks: OpenGL ES guarantees four buffers to
-  /// a shader.
+  /// Gradients of a level, then the number and the places of its blocks, in one buffer, because
+  /// OpenGL ES guarantees only four to a shader.
   Buffer slopes_;
-  std::list<Buffer> blocks_;  ///< of each level where they are not points, like points
+  std::list<Buffer> blocks_;  ///< stored like points, by level; not where blocks are points
 };
 
 }  // namespace eventcamera::gl

@@ -7,7 +7,6 @@
 #include "src/dvs/dvs_settings.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "src/gl/event_list.hpp"
-#include "src/gl/grey_frame.hpp"
 #include "src/gl/kernels.hpp"
 #include "src/gl/objects.hpp"
 #include "src/simulate/simulator.hpp"
@@ -19,12 +18,12 @@ namespace eventcamera::gl {
 /// current, except hold_until(), reset(), wait() and drop(). All other functions throw Error and
 /// std::bad_alloc; after that the simulator may only be destroyed.
 ///
-/// Processing of a frame: a LumaKernel turns its texture into a GreyFrame; a method (dense_,
-/// sparse_ or difference_simulators) compares it with the last one and marks the pixels that fire
-/// in each step; an EventList counts, sorts and reads back the marked pixels, or a DrawKernel draws
-/// them. dvs_simulator has its own list, whose events have their own times; EventSort sorts it.
-/// Each kernel is a compute shader (shaders/). Dense flow is computed in farneback, tracks in
-/// point_tracker, with the formulas and bounds of their namesakes in src/flow.
+/// A LumaKernel turns the texture of a frame into a GreyFrame. A simulator (dense_simulator.cpp,
+/// sparse_simulator.cpp, difference_simulators.cpp) compares it with the last one and marks the
+/// pixels that fire in each step. An EventList sorts and reads back the marked pixels, or a
+/// DrawKernel draws them. dvs_simulator.cpp writes events with individual times, which EventSort
+/// sorts. Each kernel is a compute shader (shaders/). farneback computes dense flow, point_tracker
+/// tracks, with the formulas and limits of their namesakes in src/flow.
 ///
 /// To keep both the caller and the GPU busy, queue() the next frame before read() of the previous
 /// interval's events.
@@ -47,25 +46,24 @@ class Simulator : public IntervalSimulator {
             const Picture& picture);
 
   /// Waits until the GPU has finished the first queued frame, if that is possible without a context
-  /// (EGL). Any thread may call it, so that read() need not wait in the context's.
+  /// (EGL). Any thread may call it, so that read() does not have to wait.
   void wait() const { queue_[first_].done.wait_without_context(); }
 
   /// Waits until the GPU has finished the first queued frame. Returns the sorted events of the
   /// interval that it ends, valid until the next call; nullptr if it ends none.
   const EventBuckets* read();
 
-  /// Forgets the queued frames.
   void drop() { queued_ = 0; }
 
  protected:
   Simulator(const Context& gl, const LumaFormat& format)
       : IntervalSimulator(format),
+        luma_(gl),
         gl_(gl),
         kernels_(gl),
         queue_{{{gl, format, kernels_}, Fence(gl)}, {{gl, format, kernels_}, Fence(gl)}},
         draw_(gl, format) {}
 
-  /// Stores the first frame.
   virtual void start(const TextureFrame& frame) = 0;
   /// Queues the marks of the pixels that fire between the last frame and this one, in `list`, and
   /// stores this one. If `list` has no steps, events() reads the events.
@@ -73,6 +71,8 @@ class Simulator : public IntervalSimulator {
                     EventList& list) = 0;
   /// Marks the events of an interval in `list`, to be drawn, unless mark() did.
   virtual void mark_events(const StepTimes&, const Settings&, EventList&) {}
+
+  LumaKernel luma_;
 
  private:
   struct Queued {
@@ -88,7 +88,6 @@ class Simulator : public IntervalSimulator {
   std::optional<StepTimes> process(const TextureFrame& frame, Nanoseconds time,
                                    const Settings& settings, EventList& list);
 
-  /// Adds a frame to the queue.
   Queued& next();
 
   const Context& gl_;
@@ -124,12 +123,12 @@ std::unique_ptr<Simulator> make_sparse_simulator(const Context& gl, const LumaFo
 /// in the last bits of floating-point numbers.
 std::unique_ptr<Simulator> make_diff_simulator(const Context& gl, const LumaFormat& format);
 
-/// Like eventcamera::DvsSimulator, without labels. Solved in single precision: a pixel in 10,000
-/// may fire another time, and an event in 1,000 differ by more than a microsecond. The CPU removes
-/// noise, finds gain and flow, and delays late events. hold_until() needs the context.
+/// Like eventcamera::DvsSimulator, without labels and in single precision: 1 of 10,000 pixels may
+/// fire other events, and the times of 1 of 1,000 events may differ by more than a microsecond. The
+/// CPU removes noise, computes gain and flow, and delays late events. hold_until() needs the
+/// context.
 class DvsSimulator : public Simulator {
  public:
-  /// Applies to the next frames.
   void set(const DvsSettings& settings) { settings_ = settings; }
   void set_flow(const std::optional<ImageView<Flow>>& flow) override { known_flow_ = flow; }
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "src/gl/kernels.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/shaders.hpp"
 
@@ -15,7 +14,6 @@ class SparseSimulator final : public Simulator {
  public:
   SparseSimulator(const Context& gl, const LumaFormat& format)
       : Simulator(gl, format),
-        luma_(gl),
         difference_(gl, format),
         changed_(gl, "changed", shaders::changed),
         move_(gl, "move_points", shaders::move_points),
@@ -66,7 +64,6 @@ class SparseSimulator final : public Simulator {
     tracker_.build(frames_[now_]);
   }
 
-  LumaKernel luma_;
   DifferenceKernel difference_;
   Kernel changed_;
   Kernel move_;

@@ -29,9 +29,9 @@ struct MatchFigures {
 /// polarity and at the same pixel or one of its eight neighbours. Several events may match the same
 /// one.
 ///
-/// Each pixel stores its last event of either polarity, so earlier matches are known when an event
-/// is added. An event without a close enough match waits at its pixel until a later match is added,
-/// or can no longer be added.
+/// Each pixel stores its last event of either polarity, so that earlier matches are known when an
+/// event is added. An event without a close enough match waits at its pixel for a later match,
+/// until that could no longer be close enough.
 class EventMatcher {
  public:
   EventMatcher(int width, int height);
@@ -40,7 +40,6 @@ class EventMatcher {
   /// stream.
   void add(StreamRole role, const AbsoluteEvent& event);
 
-  /// Similarity of the events so far.
   MatchFigures figures(StreamRole role) const;
 
  private:

@@ -93,7 +93,6 @@ class IntervalHistogram {
   std::uint64_t count_ = 0;
 };
 
-/// Times of the last event of each pixel.
 class LastTimes {
  public:
   LastTimes(int width, int height) : last_(width, height) {}
@@ -130,7 +129,6 @@ class EventStatistics {
     ++(event.polarity() == Polarity::on ? on_ : off_);
   }
 
-  /// Resets all counts.
   void restart() { *this = {map_.width(), map_.height()}; }
 
   /// Returns the statistics since the last restart(), `duration` ago.

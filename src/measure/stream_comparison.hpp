@@ -18,7 +18,6 @@
 
 namespace eventcamera {
 
-/// Similarity of two streams.
 struct SimilarityFigures {
   double map_correlation = 0;    ///< correlation of the event counts per pixel
   double rate_correlation = 0;   ///< correlation of the event counts per millisecond
@@ -39,7 +38,6 @@ class StreamSimilarity {
   /// stream.
   void add(StreamRole role, const AbsoluteEvent& event);
 
-  /// Extends both streams to `end`.
   void extend_to(Microseconds end) { rates_.extend_to(end); }
 
   const EventStatistics& statistics(StreamRole role) const { return statistics_[role]; }
@@ -71,7 +69,6 @@ class NoiseCeiling {
  public:
   NoiseCeiling(int width, int height) : halves_(width, height) {}
 
-  /// As for StreamSimilarity.
   void begin(Microseconds start) { halves_.begin(start); }
   void add(const AbsoluteEvent& event) {
     halves_.add(half_by_chance_() % 2 == 0 ? StreamRole::reference : StreamRole::candidate, event);

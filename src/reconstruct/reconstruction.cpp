@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/reconstruct/reconstruction.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/reconstruct/reconstruction.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -24,10 +23,10 @@ template <class At>
 HWY_INLINE void weigh(std::span<const float> weights, int width, const At& at, float* out) {
   const Lanes lanes;
   for (int x = 0; x < width; x += static_cast<int>(hn::Lanes(lanes))) {
-    auto sum = hn::Mul(hn::Set(lanes, weights[0]), hn::LoadU(lanes, at(x, 0)));
+    auto sum = hn::Set(lanes, weights[0]) * hn::LoadU(lanes, at(x, 0));
     for (int i = 1; i < static_cast<int>(weights.size()); ++i) {
-      const auto pair = hn::Add(hn::LoadU(lanes, at(x, -i)), hn::LoadU(lanes, at(x, i)));
-      sum = hn::Add(sum, hn::Mul(hn::Set(lanes, weights[static_cast<std::size_t>(i)]), pair));
+      const auto pair = hn::LoadU(lanes, at(x, -i)) + hn::LoadU(lanes, at(x, i));
+      sum = sum + hn::Set(lanes, weights[static_cast<std::size_t>(i)]) * pair;
     }
     hn::StoreU(sum, lanes, out + x);
   }

@@ -36,8 +36,8 @@ class Reconstruction {
     mean += mean_gain_ * (sign - mean);
   }
 
-  /// Smooths the picture, and finds its contrast. Call before read_row(). The result is the same to
-  /// the bit on every processor.
+  /// Smooths the picture and measures its contrast. Call before read_row(). The result is bit-exact
+  /// on all processors.
   void finish_picture();
 
   /// Passes the brightness of the pixels of a row to `use`: 0 for the mean, and from -1 to 1 for

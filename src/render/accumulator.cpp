@@ -1,29 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/render/accumulator.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/render/accumulator.cpp"
 #include <hwy/foreach_target.h>
 // Must come after foreach_target.h.
 #include <hwy/highway.h>
-
-#ifndef EVENTCAMERA_KIND_TABLES
-#define EVENTCAMERA_KIND_TABLES
-namespace eventcamera {
-
-/// Lookup tables for SIMD code: each byte of a pixel, by kind.
-struct KindTables {
-  KindTables(const Palette& palette, const PixelLayout& layout) {
-    const auto pixels = pixels_by_kind(palette, layout);
-    for (std::size_t kind = 0; kind < pixels.size(); ++kind)
-      for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i][kind] = pixels[kind][i];
-  }
-
-  alignas(16) std::array<std::array<std::uint8_t, 16>, 4> bytes{};
-};
-
-}  // namespace eventcamera
-#endif
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -61,7 +42,7 @@ class RowPainter {
   void draw_vector(Vector which, std::uint8_t* fired, std::uint8_t* out) const {
     const Bytes pixels;
     const auto zero = hn::Zero(pixels);
-    if (hn::AllTrue(pixels, hn::Eq(which, zero))) {
+    if (hn::AllTrue(pixels, which == zero)) {
       const auto lanes = hn::Lanes(pixels);
       for (std::size_t i = 0; i < bytes; ++i)
         hn::StoreU(hn::Load(pixels, silent_ + i * lanes), pixels, out + i * lanes);
@@ -74,7 +55,7 @@ class RowPainter {
   void store(Vector which, std::uint8_t* out) const {
     const Bytes pixels;
     const auto byte = [&](std::size_t i) {
-      return hn::TableLookupBytes(hn::LoadDup128(pixels, kinds_.bytes[i].data()), which);
+      return hn::TableLookupBytes(hn::LoadDup128(pixels, kinds_[i].data()), which);
     };
     if constexpr (bytes == 1)
       hn::StoreU(byte(0), pixels, out);
@@ -86,7 +67,7 @@ class RowPainter {
 
   void draw_pixels(std::uint8_t* fired, int width, std::uint8_t* out) const {
     for (int x = 0; x < width; ++x) {
-      for (std::size_t i = 0; i < bytes; ++i) *out++ = kinds_.bytes[i][fired[x]];
+      for (std::size_t i = 0; i < bytes; ++i) *out++ = kinds_[i][fired[x]];
       fired[x] = 0;
     }
   }
@@ -134,17 +115,18 @@ void Accumulator::add(std::span<const Event> events) {
 }
 
 void Accumulator::add(const EventBuckets& events, ThreadPool& threads) {
-  threads.for_each(events.bands(), [&](int band, int) { add_band(events, band); });
-}
-
-/// Adds one band at a time, so that its rows stay in the cache from step to step.
-void Accumulator::add_band(const EventBuckets& events, int band) {
-  events.visit_band(band, [this](std::span<const Event> part) { add(part); });
+  // By bands, whose rows stay in the cache from step to step.
+  threads.for_each(events.bands(), [&](int band, int) {
+    events.visit_band(band, [this](std::span<const Event> part) { add(part); });
+  });
 }
 
 void Accumulator::draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
                        std::ptrdiff_t stride, ThreadPool& threads) {
-  const KindTables kinds(palette, layout);
+  const auto pixels = pixels_by_kind(palette, layout);
+  KindTables kinds{};
+  for (std::size_t kind = 0; kind < pixels.size(); ++kind)
+    for (std::size_t i = 0; i < kinds.size(); ++i) kinds[i][kind] = pixels[kind][i];
   threads.for_each(band_count(fired_.height()), [&](int band, int) {
     HWY_DYNAMIC_DISPATCH(draw_band)
     (fired_, band, kinds, layout.bytes, reinterpret_cast<std::uint8_t*>(out), stride);

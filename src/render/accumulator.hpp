@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -11,6 +12,9 @@
 #include "src/render/palette.hpp"
 
 namespace eventcamera {
+
+/// Lookup tables for SIMD code: each byte of a pixel, by kind.
+using KindTables = std::array<std::array<std::uint8_t, 16>, 4>;
 
 /// Accumulates events into an image of the polarities that fired at each pixel.
 class Accumulator {
@@ -26,8 +30,6 @@ class Accumulator {
             std::ptrdiff_t stride, ThreadPool& threads);
 
  private:
-  void add_band(const EventBuckets& events, int band);
-
   Image<std::uint8_t> fired_;  // bit 0: OFF, bit 1: ON
 };
 

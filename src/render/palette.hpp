@@ -55,7 +55,6 @@ constexpr std::uint8_t luma(const Colour& colour) {
       (299 * colour.red + 587 * colour.green + 114 * colour.blue + 500) / 1000);
 }
 
-/// Pixel of a colour.
 constexpr PixelBytes pixel(const Colour& colour, const PixelLayout& layout) {
   if (layout.bytes == 1) return {luma(colour)};
   PixelBytes bytes{255, 255, 255, 255};

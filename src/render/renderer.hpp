@@ -138,8 +138,8 @@ struct RenderSettings {
 
 /// Draws pictures of the events up to given times. Events and pictures must be in time order.
 ///
-/// A picture has a pixel for each sensor pixel. If that exceeds max_pixels, as a hostile file may
-/// state, it has one for each 2x2, 3x3, ... sensor pixels.
+/// A picture has a pixel for each sensor pixel or, if that exceeds max_pixels (a hostile file may
+/// state any size), for each 2x2, 3x3, ... sensor pixels.
 class Renderer {
  public:
   static constexpr int max_pixels = 1 << 23;  ///< of a picture; 4K video fits
@@ -163,7 +163,6 @@ class Renderer {
   void draw(Microseconds start, Microseconds end, const PixelLayout& layout, std::byte* out,
             std::ptrdiff_t stride);
 
-  /// Size of the pictures.
   int width() const { return width_; }
   int height() const { return height_; }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/simulate/denoiser.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/denoiser.cpp"
 #include <hwy/foreach_target.h>
 // Must come after HWY_TARGET_INCLUDE.
@@ -33,14 +32,14 @@ void denoise_row(const Pixel* above, const Pixel* here, const Pixel* below, int 
     };
     const auto centre = load(here, x);
     const auto difference = [&](const Pixel* row, int at) {
-      return hn::Min(hn::Max(hn::Sub(load(row, at), centre), min), max);
+      return hn::Min(hn::Max(load(row, at) - centre, min), max);
     };
-    const auto corners = hn::Add(hn::Add(difference(above, x - 1), difference(above, x + 1)),
-                                 hn::Add(difference(below, x - 1), difference(below, x + 1)));
-    const auto sides = hn::Add(hn::Add(difference(above, x), difference(below, x)),
-                               hn::Add(difference(here, x - 1), difference(here, x + 1)));
-    const auto sum = hn::Add(hn::Add(corners, hn::Add(sides, sides)), hn::Set(wide, 8));
-    hn::StoreU(hn::DemoteTo(pixels, hn::Add(centre, hn::ShiftRight<4>(sum))), pixels, out + x);
+    const auto corners = difference(above, x - 1) + difference(above, x + 1) +
+                         (difference(below, x - 1) + difference(below, x + 1));
+    const auto sides = difference(above, x) + difference(below, x) +
+                       (difference(here, x - 1) + difference(here, x + 1));
+    const auto sum = corners + (sides + sides) + hn::Set(wide, 8);
+    hn::StoreU(hn::DemoteTo(pixels, centre + hn::ShiftRight<4>(sum)), pixels, out + x);
   };
   const auto one = [&](int x) {
     const int left = std::max(x - 1, 0);
@@ -71,15 +70,8 @@ void denoise_rows(const ImageView<Pixel>& frame, int limit, ThreadPool& threads,
   });
 }
 
-void denoise_8(const ImageView<std::uint8_t>& frame, int limit, ThreadPool& threads,
-               Image<std::uint8_t>& out) {
-  denoise_rows(frame, limit, threads, out);
-}
-
-void denoise_16(const ImageView<std::uint16_t>& frame, int limit, ThreadPool& threads,
-                Image<std::uint16_t>& out) {
-  denoise_rows(frame, limit, threads, out);
-}
+constexpr auto& denoise_8 = denoise_rows<std::uint8_t>;
+constexpr auto& denoise_16 = denoise_rows<std::uint16_t>;
 
 }  // namespace
 }  // namespace eventcamera::HWY_NAMESPACE
@@ -107,16 +99,16 @@ constexpr int block_size = 8;
 constexpr int block_area = block_size * block_size;
 /// Maximum number of blocks in a row and in a column.
 constexpr int max_blocks = 32;
-/// Fewer blocks are not enough for an estimate.
+/// Minimum number of blocks for an estimate.
 constexpr std::size_t min_blocks = 16;
-/// Share of blocks that are assumed to show only noise.
+/// Share of blocks assumed to show only noise.
 constexpr double still_share = 0.2;
 /// A fifth of the sample deviations of 64 values is below this share of the true one: with the
 /// normal approximation, 1 - 0.84 / sqrt(2 * 63).
 constexpr double quantile_bias = 0.925;
-/// Noise of this many standard deviations is smoothed.
+/// Noise up to this many standard deviations is smoothed.
 constexpr double sigmas = 4;
-/// Stronger smoothing would remove more edges than noise.
+/// Limit of the smoothing; more would remove more edges than noise.
 constexpr double max_automatic = 32;
 /// Grey levels from black or white that may hide noise.
 constexpr double margin = 4;

@@ -17,15 +17,13 @@ namespace eventcamera {
 constexpr double automatic_denoise = -1;
 
 /// Standard deviation of the noise of a frame camera, in grey levels (white is 255). Each pair of
-/// frames gives an estimate: the differences within blocks of 8x8 pixels, without their mean, which
-/// is a change of light. The first quintile of the blocks counts, because many blocks may move.
-/// Blocks near black or white do not count, nor do repeated frames.
+/// frames gives an estimate from the differences within blocks of 8x8 pixels, without their mean,
+/// which is a change of light. The estimate is the first quintile of the blocks, because many may
+/// show motion. Blocks near black or white, and repeated frames, are ignored.
 class NoiseLevel {
  public:
-  /// Forgets all frames.
   void restart() { *this = {}; }
 
-  /// Compares a frame with the previous one, of the same format.
   void update(const LumaView& frame);
 
   /// Median of the last estimates; 0 before the first.
@@ -41,28 +39,28 @@ class NoiseLevel {
   std::size_t count_ = 0;  ///< of all estimates
 };
 
-/// Removes the frame's noise, which an event camera would not see, but keeps edges: adds to each
-/// pixel the weighted mean of the differences to its 3x3 neighbourhood (weights 1 2 1 by 1 2 1, sum
-/// 16), each difference clamped to `limit` luma values. The border is replicated. `out` must have
-/// the size of `frame`. The reference implementation is `reference::denoised()`.
+/// Removes noise but keeps edges: adds to each pixel the weighted mean of the differences to its
+/// 3x3 neighbourhood (weights 1 2 1 by 1 2 1, sum 16), each clamped to `limit` luma values. The
+/// border is replicated. `out` must have the size of `frame`. The reference implementation is
+/// `reference::denoised()`.
 void denoise(const ImageView<std::uint8_t>& frame, int limit, ThreadPool& threads,
              Image<std::uint8_t>& out);
 void denoise(const ImageView<std::uint16_t>& frame, int limit, ThreadPool& threads,
              Image<std::uint16_t>& out);
 
-/// Removes the noise of the frame camera, which an event camera would not see.
+/// Removes the noise of the frame camera, which event cameras do not see.
 class Denoiser {
  public:
   explicit Denoiser(const LumaFormat& format) : format_(format) {}
 
-  /// Forgets all frames.
   void restart();
 
-  /// Largest difference between neighbouring pixels to smooth, in grey levels: `setting`, or for
-  /// automatic_denoise, as much as the noise needs. Keeps a first frame, whose noise is unknown.
+  /// Returns the largest difference between neighbouring pixels to smooth, in grey levels:
+  /// `setting` or, for automatic_denoise, as much as the noise needs. Keeps the first frame, whose
+  /// noise is not known yet.
   double amplitude_for(const LumaView& frame, double setting);
 
-  /// The first frame, denoised, once its noise is known; none if it was not kept, or has no noise.
+  /// Returns the kept first frame, denoised, once; none if there is none, or it has no noise.
   std::optional<LumaView> kept_first(double amplitude, ThreadPool& threads);
 
   /// Smooths differences up to `amplitude` grey levels. Returns a view that is valid until the next

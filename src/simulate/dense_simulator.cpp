@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/simulate/dense_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -31,26 +31,19 @@ class InterpolatingSimulator final : public DenseSimulator {
                 StepBuckets& events) override {
     now_.assign(frame.as<Pixel>());
     const auto thresholds = Thresholds::of(settings, format().bits);
-    const InterpolatedInterval<Pixel> interval{{last_.view(), now_.view(), steps.count()},
-                                               flow_of_interval(thresholds),
-                                               interpolation_,
-                                               steps,
-                                               thresholds};
-    kernel_.fire(interval, threads(), events);
-    std::swap(last_, now_);
-  }
-
-  /// Only pixels that changed by more than a threshold can fire, so flow is needed only around
-  /// them.
-  ImageView<Flow> flow_of_interval(const Thresholds& thresholds) {
     if (flow_) {
       frame_flow_.forget();
-      return *flow_;
+    } else {
+      // Only pixels that changed by more than a threshold can fire: others need no flow.
+      const Box changed = changed_box(last_.view(), now_.view(),
+                                      std::min(thresholds.positive, thresholds.negative));
+      flow_ = frame_flow_.find(method_, format().bits, last_, now_, changed, threads());
     }
-    const Box changed =
-        changed_box(last_.view(), now_.view(), std::min(thresholds.positive, thresholds.negative));
-    flow_ = frame_flow_.find(method_, format().bits, last_, now_, changed, threads());
-    return *flow_;
+    kernel_.fire(
+        InterpolatedInterval<Pixel>{
+            {last_.view(), now_.view(), steps.count()}, *flow_, interpolation_, steps, thresholds},
+        threads(), events);
+    std::swap(last_, now_);
   }
 
   Image<Pixel> last_;

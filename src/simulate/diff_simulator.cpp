@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/simulate/diff_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 
 #include <algorithm>
 #include <cstdlib>
@@ -49,12 +49,12 @@ struct PolarityFrames {
     now.differences.resize(now.first.back());
   }
 
-  /// Removes the last frame's pixels of a band from the image.
+  /// Removes the pixels of the last difference frame from a band of the image.
   void clear(std::size_t band) {
     for (std::size_t i = last.first[band]; i < last.first[band + 1]; ++i) {
       const auto& place = last.places[i];
       image.at(place.x, place.y) = 0;
-      is_black[static_cast<std::size_t>(place.y)] = 1;
+      is_black[place.y] = 1;
     }
   }
 
@@ -63,7 +63,7 @@ struct PolarityFrames {
     now.differences[i] = difference;
     image.at(place.x, place.y) =
         static_cast<std::uint8_t>(std::max(1, std::abs(difference) >> shift));
-    is_black[static_cast<std::size_t>(place.y)] = 0;
+    is_black[place.y] = 0;
   }
 
   /// Prepares to track to this difference frame and, in the next interval, from it.
@@ -88,7 +88,7 @@ struct alignas(64) MovingBand {
   std::vector<Strength> strengths;
 };
 
-/// One interpolated difference frame: the strength of each pixel, 0 for those that do not fire.
+/// Interpolated difference frame: the strength of each pixel, 0 if it does not fire.
 template <class Strength>
 class DifferenceFrame {
  public:
@@ -98,7 +98,7 @@ class DifferenceFrame {
         strengths_(static_cast<std::size_t>(64 * words_) * static_cast<std::size_t>(height)),
         touched_(static_cast<std::size_t>(words_) * static_cast<std::size_t>(height)) {}
 
-  /// Adds the pixels of a band at their positions after j steps. The strongest on a pixel wins.
+  /// Adds the pixels of a band at their positions after j steps; the strongest on a pixel wins.
   void add(const MovingBand<Strength>& band, int j) {
     auto* const strengths = strengths_.data();
     auto* const touched = touched_.data();
@@ -150,7 +150,7 @@ class DiffSimulator final : public Simulator {
         last_(format.width, format.height),
         on_(format.width, format.height),
         off_(format.width, format.height),
-        moving_(static_cast<std::size_t>(band_count(format.height))) {}
+        moving_(band_count(format.height)) {}
 
  private:
   void start(const LumaView& frame) override {
@@ -180,7 +180,7 @@ class DiffSimulator final : public Simulator {
     has_difference_ = true;
   }
 
-  /// Keeps D(i) = I(i) - I(i-1) at pixels that fired, separately for each polarity, and then I(i).
+  /// Keeps D(i) = I(i) - I(i-1) at the pixels that fired, by polarity, and stores I(i).
   void keep_difference(const ImageView<Pixel>& now, int last_step, StepBuckets& events) {
     on_.begin_next();
     off_.begin_next();
@@ -239,7 +239,7 @@ class DiffSimulator final : public Simulator {
       frames_.emplace_back(format().width, format().height);
     threads().for_each(steps.count() - 1, [&](int i, int thread) {
       const int j = i + 1;
-      auto& frame = frames_[static_cast<std::size_t>(thread)];
+      auto& frame = frames_[thread];
       for (const auto& band : moving_) frame.add(band, j);
       frame.fire(j, steps.microseconds(j), events);
     });

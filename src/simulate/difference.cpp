@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/difference.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -37,9 +36,9 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, const Thr
     // Excess over the threshold.
     const auto rise = hn::SaturatedSub(hn::SaturatedSub(b, a), positive);
     const auto fall = hn::SaturatedSub(hn::SaturatedSub(a, b), negative);
-    const auto fired = hn::Ne(hn::Or(rise, fall), zero);
+    const auto fired = hn::Or(rise, fall) != zero;
     if (hn::AllFalse(pixels, fired)) return;
-    out.add(x, y, bits_of(pixels, fired), bits_of(pixels, hn::Ne(rise, zero)));
+    out.add(x, y, bits_of(pixels, fired), bits_of(pixels, rise != zero));
   };
   // Most of a frame does not change: several vectors are skipped at once.
   constexpr int at_once = 4;
@@ -51,7 +50,7 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, const Thr
       const auto b = hn::LoadU(pixels, now + x + std::ptrdiff_t{i} * lanes);
       largest = hn::Max(largest, hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a)));
     }
-    return hn::AllTrue(pixels, hn::Eq(hn::SaturatedSub(largest, smaller), zero));
+    return hn::AllTrue(pixels, hn::SaturatedSub(largest, smaller) == zero);
   };
   int x = 0;
   while (x + lanes <= width) {
@@ -67,15 +66,8 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, const Thr
     fire(x, load_first(pixels, before + x, width - x), load_first(pixels, now + x, width - x));
 }
 
-void fire_row_8(const std::uint8_t* before, const std::uint8_t* now, int width, int y,
-                const Thresholds& thresholds, FiredPixels& out) {
-  fire_row(before, now, width, y, thresholds, out);
-}
-
-void fire_row_16(const std::uint16_t* before, const std::uint16_t* now, int width, int y,
-                 const Thresholds& thresholds, FiredPixels& out) {
-  fire_row(before, now, width, y, thresholds, out);
-}
+constexpr auto& fire_row_8 = fire_row<std::uint8_t>;
+constexpr auto& fire_row_16 = fire_row<std::uint16_t>;
 
 template <class Strength>
 void fire_words(Strength* strengths, std::uint8_t* touched, int words, int y, FiredPixels& out) {
@@ -90,23 +82,16 @@ void fire_words(Strength* strengths, std::uint8_t* touched, int words, int y, Fi
     std::uint64_t on = 0;
     for (int i = 0; i < 64; i += lanes) {
       const auto strength = hn::LoadU(pixels, first + i);
-      fired |= bits_of(pixels, hn::Ne(strength, zero)) << i;
-      on |= bits_of(pixels, hn::Ne(hn::And(strength, one), zero)) << i;
+      fired |= bits_of(pixels, strength != zero) << i;
+      on |= bits_of(pixels, hn::And(strength, one) != zero) << i;
       hn::StoreU(zero, pixels, first + i);
     }
     out.add(64 * word, y, fired, on);
   }
 }
 
-void fire_words_16(std::uint16_t* strengths, std::uint8_t* touched, int words, int y,
-                   FiredPixels& out) {
-  fire_words(strengths, touched, words, y, out);
-}
-
-void fire_words_32(std::uint32_t* strengths, std::uint8_t* touched, int words, int y,
-                   FiredPixels& out) {
-  fire_words(strengths, touched, words, y, out);
-}
+constexpr auto& fire_words_16 = fire_words<std::uint16_t>;
+constexpr auto& fire_words_32 = fire_words<std::uint32_t>;
 
 template <class Pixel>
 ChangedColumns changed(const Pixel* before, const Pixel* now, int width, int threshold) {
@@ -117,7 +102,7 @@ ChangedColumns changed(const Pixel* before, const Pixel* now, int width, int thr
     const auto a = hn::LoadU(pixels, before + x);
     const auto b = hn::LoadU(pixels, now + x);
     const auto difference = hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a));
-    return hn::AllTrue(pixels, hn::Eq(hn::SaturatedSub(difference, limit), hn::Zero(pixels)));
+    return hn::AllTrue(pixels, hn::SaturatedSub(difference, limit) == hn::Zero(pixels));
   };
   const auto one = [&](int x) { return std::abs(now[x] - before[x]) > threshold; };
   int first = 0;
@@ -129,15 +114,8 @@ ChangedColumns changed(const Pixel* before, const Pixel* now, int width, int thr
   return {first, last};
 }
 
-ChangedColumns changed_8(const std::uint8_t* before, const std::uint8_t* now, int width,
-                         int threshold) {
-  return changed(before, now, width, threshold);
-}
-
-ChangedColumns changed_16(const std::uint16_t* before, const std::uint16_t* now, int width,
-                          int threshold) {
-  return changed(before, now, width, threshold);
-}
+constexpr auto& changed_8 = changed<std::uint8_t>;
+constexpr auto& changed_16 = changed<std::uint16_t>;
 
 }  // namespace
 }  // namespace eventcamera::HWY_NAMESPACE

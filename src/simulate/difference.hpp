@@ -18,8 +18,9 @@ void fire_differences(const std::uint8_t* before, const std::uint8_t* now, int w
 void fire_differences(const std::uint16_t* before, const std::uint16_t* now, int width, int y,
                       const Thresholds& thresholds, FiredPixels& out);
 
-/// Adds the pixels of a row that are not 0, ON if odd, OFF if even, and clears them. `touched` has
-/// an element per 64 pixels, which is 0 only if all of them are 0, and is cleared as well.
+/// Adds the pixels of a row whose strength is not 0, ON if it is odd, OFF if even, and clears the
+/// strengths. `touched` has an element per 64 pixels, 0 only if all of these are 0; it is cleared
+/// too.
 void fire_strengths(std::uint16_t* strengths, std::uint8_t* touched, int words, int y,
                     FiredPixels& out);
 void fire_strengths(std::uint32_t* strengths, std::uint8_t* touched, int words, int y,

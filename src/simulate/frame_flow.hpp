@@ -26,7 +26,7 @@ class FrameFlow {
     return finder_->find(last_grey_.of(luma(last)), grey_.of(luma(now)), changed, threads);
   }
 
-  /// The next `last` is another frame.
+  /// Call if the next `last` is another frame.
   void forget() { finder_.reset(); }
 
  private:

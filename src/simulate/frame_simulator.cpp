@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/simulate/frame_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 
 #include "src/core/thread_pool.hpp"
 #include "src/simulate/difference.hpp"

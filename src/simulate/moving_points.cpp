@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/moving_points.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -19,8 +18,7 @@ using Position = hn::Vec<Positions>;
 /// moved() in 32 bits, enough for positions within a frame.
 Position move(Position start, Position motion, Position step) {
   const auto half = hn::Set(Positions(), 1 << 15);
-  return hn::ShiftRight<16>(
-      hn::Add(hn::Add(hn::ShiftLeft<16>(start), half), hn::Mul(motion, step)));
+  return hn::ShiftRight<16>(hn::ShiftLeft<16>(start) + half + motion * step);
 }
 
 /// Writes the index of each lane of the blocks.
@@ -35,7 +33,7 @@ void indices_of(std::span<const MovingPoints::Block> blocks, int j, int stride, 
           move(hn::Load(positions, block.x + i), hn::Load(positions, block.dx + i), step);
       const auto y =
           move(hn::Load(positions, block.y + i), hn::Load(positions, block.dy + i), step);
-      hn::StoreU(hn::Add(hn::Mul(y, row), x), positions, out);
+      hn::StoreU(y * row + x, positions, out);
       out += lanes;
     }
   }

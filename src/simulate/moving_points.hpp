@@ -3,17 +3,45 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
-#include "src/simulate/motion.hpp"
+#include "src/flow/lucas_kanade/point_tracker.hpp"
+#include "src/simulate/warp.hpp"
 
 namespace eventcamera {
 
-/// A list of moving points, packed so that the positions of several are computed at once.
+/// Position of a pixel after j steps from p, rounded to whole pixels.
+inline int moved(int p, Motion motion, int j) {
+  return static_cast<int>(
+      ((static_cast<std::int64_t>(p) << 16) + static_cast<std::int64_t>(motion) * j + (1 << 15)) >>
+      16);
+}
+
+/// A tracked pixel that stays within the frame through all steps of an interval.
+struct MovingPoint {
+  Point start;
+  Motion dx;
+  Motion dy;
+
+  Point at(int j) const { return {moved(start.x, dx, j), moved(start.y, dy, j)}; }
+};
+
+/// Returns the motion along a track; none if the track was lost or leaves the frame.
+inline std::optional<MovingPoint> moving_point(const Point& start, const Track& track, int steps,
+                                               int width, int height) {
+  if (!track.found) return std::nullopt;
+  const MovingPoint point{start, motion_per_step(track.flow.x, steps),
+                          motion_per_step(track.flow.y, steps)};
+  const Point end = point.at(steps);
+  if (end.x < 0 || end.x >= width || end.y < 0 || end.y >= height) return std::nullopt;
+  return point;
+}
+
+/// List of moving points, packed so that the positions of several are computed at once.
 class MovingPoints {
  public:
-  /// Removes all points but keeps their memory.
   void clear() { size_ = 0; }
 
   void push_back(const MovingPoint& point) {
@@ -30,8 +58,8 @@ class MovingPoints {
   /// Number of chunks of chunk_size points; the last one may have fewer.
   std::size_t chunks() const { return (size_ + chunk_size - 1) / chunk_size; }
 
-  /// Computes the positions of a chunk after j steps as indices of the pixels of an image whose
-  /// rows are `stride` pixels apart. Valid as long as `memory` is not changed.
+  /// Returns the positions of a chunk after j steps, as pixel indices in an image whose rows are
+  /// `stride` pixels apart. Valid as long as `memory` is not changed.
   std::span<const std::int32_t> at(int j, int stride, std::size_t chunk,
                                    std::vector<std::int32_t>& memory) const;
 

@@ -11,8 +11,8 @@ std::vector<std::uint32_t> row_delays(Nanoseconds readout, int height) {
   std::vector<std::uint32_t> delays(static_cast<std::size_t>(height));
   for (int y = 0; y < height; ++y) {
     const int rows_before = readout < 0 ? height - 1 - y : y;
-    delays[static_cast<std::size_t>(y)] = static_cast<std::uint32_t>(
-        std::abs(readout) * rows_before / std::max(1, height - 1) / 1000);
+    delays[y] = static_cast<std::uint32_t>(std::abs(readout) * rows_before /
+                                           std::max(1, height - 1) / 1000);
   }
   return delays;
 }
@@ -27,7 +27,7 @@ void DelayedRows::set(const StepBuckets& events, Nanoseconds duration, Nanosecon
   events.visit_buckets([&](std::span<const Event> list, const FiredPixels& pixels) {
     add_list(list);
     pixels.visit_rows([&](int y, std::span<const FiredPixels::Group> groups, std::size_t size) {
-      const std::uint64_t t = std::uint64_t{pixels.time()} + delays_[static_cast<std::size_t>(y)];
+      const std::uint64_t t = std::uint64_t{pixels.time()} + delays_[y];
       add({t, y, size, {}, groups});
     });
   });
@@ -57,7 +57,7 @@ void DelayedRows::add_list(std::span<const Event> events) {
     const auto last = std::find_if(first, events.end(), [&](const Event& event) {
       return event.t != first->t || event.y() != first->y();
     });
-    const std::uint64_t t = std::uint64_t{first->t} + delays_[static_cast<std::size_t>(first->y())];
+    const std::uint64_t t = std::uint64_t{first->t} + delays_[first->y()];
     const std::span row(first, last);
     add({t, first->y(), row.size(), row, {}});
     first = last;

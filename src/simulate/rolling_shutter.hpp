@@ -12,27 +12,26 @@
 
 namespace eventcamera {
 
-/// Delay of each row of a frame from the row that the camera reads first, microseconds rounded
-/// down. `readout` is the time from the first row read to the last: from top to bottom or, if
+/// Delay of each row of a frame after the row that the camera reads first, in microseconds, rounded
+/// down. `readout` is the time from the first row read to the last, from top to bottom or, if
 /// negative, from bottom to top.
 std::vector<std::uint32_t> row_delays(Nanoseconds readout, int height);
 
 /// Events of an interval between two frames of a camera with a rolling shutter: StepBuckets,
 /// delayed by row. Events past the end of the interval are deferred to the next one.
 ///
-/// All events of a row and step have the same time, so it sorts rows, not events.
+/// Sorts rows instead of events, because all events of a row and step have the same time.
 class DelayedRows final : public EventBuckets {
  public:
   explicit DelayedRows(int height) : height_(height) {}
 
-  /// Replaces the events by the events of the next interval and the deferred ones that are due.
+  /// Replaces the events by those of the next interval and the deferred ones that are due.
   /// `events` must stay unchanged while this is used. `readout` is as for row_delays().
   void set(const StepBuckets& events, Nanoseconds duration, Nanoseconds readout);
 
   /// Time from the end of the interval to the last deferred event, if any.
   std::optional<Nanoseconds> latest() const;
 
-  /// Drops the deferred events.
   void restart() { deferred_ = {}; }
 
   std::size_t size() const override { return size_; }

@@ -23,8 +23,8 @@ struct Settings {
   int threads = 0;                 ///< thread limit for one frame; 0 = one per processor
   bool labels = false;             ///< label the events, if the simulator can
   double denoise = 0;  ///< largest noise in the frames, grey levels, or automatic_denoise
-  /// Time in which the camera reads a frame, from its first row to its last; negative if it reads
-  /// the last row first. A frame's time is the time of the row read first.
+  /// Time from reading a frame's first row to reading its last; negative if the camera reads the
+  /// last row first. A frame's time is that of the row read first.
   Nanoseconds rolling_shutter = 0;
 };
 
@@ -73,19 +73,17 @@ class IntervalSimulator {
   IntervalSimulator(const IntervalSimulator&) = delete;
   IntervalSimulator& operator=(const IntervalSimulator&) = delete;
 
-  /// Time of the last frame, if any.
   std::optional<Nanoseconds> last_time() const { return last_time_; }
 
   /// Holds the last frame, if any, until `time`, which must not be before it: the next interval
-  /// starts at `time`. Returns the sorted events of (time of the last frame, time] that fire
-  /// without any change (noise) or in late rows of the last frame, valid until the next call;
-  /// nullptr if there are none.
+  /// starts at `time`. Returns the sorted events of (time of the last frame, time], noise and
+  /// events of late rows, valid until the next call; nullptr if there are none.
   const EventBuckets* hold_until(Nanoseconds time, const Settings& settings = {});
 
   /// Continues at `time`, which must not be before the last frame, as if no time had passed.
   void skip_until(Nanoseconds time) { last_time_ = time; }
 
-  /// Time of the last event in the rows that a rolling shutter read after the last interval, if
+  /// Time of the last event in late rows, which a rolling shutter read after the last interval, if
   /// any.
   std::optional<Nanoseconds> late_until() const;
 
@@ -161,7 +159,6 @@ class Simulator : public IntervalSimulator {
 
   /// Settings::denoise, unless the simulator has its own.
   virtual double denoise_setting(const Settings& settings) const { return settings.denoise; }
-  /// Stores the first frame.
   virtual void start(const LumaView& frame) = 0;
   /// Fills `events` with the events between the last frame and this one, and stores this one. Sets
   /// flow_ if it needs flow that is not known.

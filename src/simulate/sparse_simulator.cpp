@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/simulate/sparse_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -15,7 +15,7 @@
 namespace eventcamera {
 namespace {
 
-/// Background that is uncovered where a pixel in motion starts.
+/// Background uncovered where a moving pixel started.
 template <class Pixel>
 struct Uncovered {
   std::uint16_t x;
@@ -23,13 +23,13 @@ struct Uncovered {
   Pixel brightness;
 };
 
-/// Tracked pixels in motion that start in one band of rows, in raster order. On its own cache
-/// lines, because threads fill neighbouring bands concurrently.
+/// Tracked pixels that start in one band of rows, in raster order. On its own cache lines, because
+/// threads fill neighbouring bands concurrently.
 template <class Pixel>
 struct alignas(64) MovingBand {
   MovingPoints points;
   std::vector<Pixel> brightness;
-  std::vector<std::vector<Uncovered<Pixel>>> uncovered;  ///< by each step
+  std::vector<std::vector<Uncovered<Pixel>>> uncovered;  ///< by step
   int top;  ///< the pixels start in and cross rows [top, bottom)
   int bottom;
 };
@@ -76,14 +76,14 @@ class Painter {
         auto& out = events.pixels(j, 0);
         out.begin(steps.microseconds(j));
         for (int y = 0; y < interval.now.height; ++y) {
-          const bool touched = interval.touched[static_cast<std::size_t>(y)] != 0;
+          const bool touched = interval.touched[y] != 0;
           if (!touched && !ends) continue;
           fire_differences(touched ? frames_[at].row(y) : interval.last.row(y),
                            ends ? interval.now.row(y) : frames_[at + 1].row(y), interval.now.width,
                            y, thresholds, out);
         }
       }
-      std::swap(frames_.front(), frames_[static_cast<std::size_t>(count)]);
+      std::swap(frames_.front(), frames_[count]);
     }
   }
 
@@ -91,18 +91,17 @@ class Painter {
   template <class Body>
   static void for_each_touched(const Interval<Pixel>& interval, const Body& body) {
     for (int y = 0; y < interval.now.height; ++y)
-      if (interval.touched[static_cast<std::size_t>(y)] != 0) body(y);
+      if (interval.touched[y] != 0) body(y);
   }
 
   /// Draws the background that the pixels uncover in step j into still_.
   void uncover(const Interval<Pixel>& interval, int j) {
     for (const auto& band : interval.bands)
-      for (const auto& [x, y, brightness] : band.uncovered[static_cast<std::size_t>(j)])
-        still_.at(x, y) = brightness;
+      for (const auto& [x, y, brightness] : band.uncovered[j]) still_.at(x, y) = brightness;
   }
 
-  /// Draws the touched rows of `count` frames, those of step `begin` and later, into frames_[to]
-  /// and later.
+  /// Draws the touched rows of the frames of steps begin ... begin + count - 1 into frames_[to] and
+  /// the following ones.
   void paint(const Interval<Pixel>& interval, int begin, std::size_t to, int count) {
     const auto frames = std::span(frames_).subspan(to, static_cast<std::size_t>(count));
     int j = begin;
@@ -125,11 +124,11 @@ class Painter {
     }
   }
 
-  /// Frames drawn at once, while a chunk of the moving pixels is in the cache.
+  /// Number of frames drawn together while a chunk of the moving pixels is in the cache.
   static constexpr int steps_at_once = 4;
 
   Image<Pixel> still_;  ///< the touched rows without the pixels that have left their start
-  std::vector<Image<Pixel>> frames_;  ///< the last one drawn before, and those drawn at once
+  std::vector<Image<Pixel>> frames_;  ///< the previous one, and those drawn together
   std::vector<std::int32_t> places_;  ///< indices in a frame of the pixels of a chunk
 };
 
@@ -139,8 +138,8 @@ class SparseSimulator final : public Simulator {
   explicit SparseSimulator(const LumaFormat& format)
       : Simulator(format),
         last_(format.width, format.height),
-        bands_(static_cast<std::size_t>(band_count(format.height))),
-        touched_(static_cast<std::size_t>(format.height)) {}
+        bands_(band_count(format.height)),
+        touched_(format.height) {}
 
  private:
   void start(const LumaView& frame) override {
@@ -159,13 +158,13 @@ class SparseSimulator final : public Simulator {
     const int m = steps.count();
     events.reset(m, 1);
     const Interval<Pixel> interval{last_.view(), now, bands_, touched_};
-    // Each thread draws consecutive steps, so that all frames but the first are used twice.
+    // Each thread draws consecutive steps, so that it uses all frames but its first twice.
     const int runs = std::min(threads().threads(), m);
     while (static_cast<int>(painters_.size()) < runs)
       painters_.emplace_back(format().width, format().height);
     threads().for_each(runs, [&](int run, int) {
-      painters_[static_cast<std::size_t>(run)].fire(
-          interval, m * run / runs + 1, m * (run + 1) / runs, steps, thresholds, events);
+      painters_[run].fire(interval, m * run / runs + 1, m * (run + 1) / runs, steps, thresholds,
+                          events);
     });
     last_.assign(now);
   }
@@ -180,14 +179,13 @@ class SparseSimulator final : public Simulator {
       first_.push_back(first_.back() + changes_.pixels(1, band).size());
     changed_.resize(first_.back());
     threads().for_each(bands, [this](int band, int) {
-      Point* out = changed_.data() + first_[static_cast<std::size_t>(band)];
+      Point* out = changed_.data() + first_[band];
       changes_.pixels(1, band).visit([&](std::span<const Event> changes) {
         for (const auto& change : changes) *out++ = {change.x, change.y()};
       });
     });
   }
 
-  /// Tracks the changed pixels into this frame.
   void follow_changed(const ImageView<Pixel>& now, int steps) {
     const auto tracks = tracker_.track(changed_, threads());
     threads().for_each(static_cast<int>(bands_.size()), [&](int i, int) {
@@ -215,7 +213,7 @@ class SparseSimulator final : public Simulator {
     });
     std::fill(touched_.begin(), touched_.end(), 0);
     for (const auto& band : bands_)
-      for (int y = band.top; y < band.bottom; ++y) touched_[static_cast<std::size_t>(y)] = 1;
+      for (int y = band.top; y < band.bottom; ++y) touched_[y] = 1;
   }
 
   Image<Pixel> last_;

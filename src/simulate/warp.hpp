@@ -2,13 +2,27 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <type_traits>
 
 #include "src/core/image.hpp"
-#include "src/simulate/motion.hpp"
+#include "src/core/sensor_size.hpp"
 
 namespace eventcamera {
+
+/// Displacement in one step, in 1/65536 of a pixel: up to max_side. All arithmetic after the
+/// conversion from float is integer, so results are the same on every processor.
+using Motion = std::int32_t;
+
+/// The flow of an interval (pixels) divided by its steps. NaN counts as 0; flows are clamped to
+/// max_side.
+inline Motion motion_per_step(float flow, int steps) {
+  if (!(flow == flow)) return 0;
+  constexpr float max_length = max_side;
+  return static_cast<Motion>(std::lrint(std::clamp(flow, -max_length, max_length) *
+                                        (65536.0F / static_cast<float>(steps))));
+}
 
 /// How the frame I(a) between I(i-1) and I(i), 0 < a < 1, is sampled along the flow F.
 enum class Interpolation {

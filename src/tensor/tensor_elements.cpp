@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/tensor/tensor_elements.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -51,8 +50,7 @@ void standardize(float* values, std::size_t count, float mean, float divisor) {
   const auto means = hn::Set(floats, mean);
   const auto divisors = hn::Set(floats, divisor);
   convert(values, count, values, [&](auto value) {
-    return hn::IfThenZeroElse(hn::Eq(value, hn::Zero(floats)),
-                              hn::Div(hn::Sub(value, means), divisors));
+    return hn::IfThenZeroElse(value == hn::Zero(floats), (value - means) / divisors);
   });
 }
 
@@ -73,13 +71,12 @@ void to_float16(const float* values, std::size_t count, std::uint16_t* out) {
     const auto bits = hn::BitCast(words, magnitude);
     const auto is_odd = hn::And(hn::ShiftRight<dropped_bits>(bits), hn::Set(words, 1));
     const auto rounded = hn::ShiftRight<dropped_bits>(
-        hn::Add(hn::Add(bits, hn::Set(words, (1U << (dropped_bits - 1)) - 1)), is_odd));
+        bits + hn::Set(words, (1U << (dropped_bits - 1)) - 1) + is_odd);
     const auto normal =
-        hn::Min(hn::Sub(rounded, hn::Set(words, bias_difference)), hn::Set(words, infinity));
-    const auto subnormal =
-        hn::Sub(hn::BitCast(words, hn::Add(magnitude, half)), hn::BitCast(words, half));
-    const auto is_subnormal = hn::Lt(hn::BitCast(signed_words, bits),
-                                     hn::Set(signed_words, static_cast<std::int32_t>(min_normal)));
+        hn::Min(rounded - hn::Set(words, bias_difference), hn::Set(words, infinity));
+    const auto subnormal = hn::BitCast(words, magnitude + half) - hn::BitCast(words, half);
+    const auto is_subnormal = hn::BitCast(signed_words, bits) <
+                              hn::Set(signed_words, static_cast<std::int32_t>(min_normal));
     const auto sign =
         hn::ShiftRight<16>(hn::And(hn::BitCast(words, value), hn::Set(words, 0x80000000U)));
     const auto joined =
@@ -95,7 +92,7 @@ void to_uint8(const float* values, std::size_t count, const ByteScale& scale, st
   const auto zero = hn::Set(floats, scale.zero);
   const auto max = hn::Set(floats, 255.0F);
   convert(values, count, out, [&](auto value) {
-    const auto scaled = hn::Add(hn::Mul(value, steps), zero);
+    const auto scaled = value * steps + zero;
     return hn::DemoteTo(bytes, hn::NearestInt(hn::Min(hn::Max(scaled, hn::Zero(floats)), max)));
   });
 }

@@ -43,7 +43,6 @@ class WindowQueue {
     std::span<const AbsoluteEvent> events;  ///< valid until add() or reset()
   };
 
-  /// Outcome of add().
   struct Added {
     InvalidEvents invalid{};           ///< dropped
     std::size_t excess = 0;            ///< dropped: more than max_events in a window
@@ -54,9 +53,9 @@ class WindowQueue {
       : settings_(settings), validator_(width, height) {}
 
   /// Adds an interval, and its events in [start, end]; their times are relative to `base`. Late
-  /// events count as events of the end of the last window, or interval where windows consist of
-  /// intervals. Afterwards, call next() until there is no more window, and add the events that are
-  /// waiting, if any, again.
+  /// events get the time of the end of the last window or, if windows consist of intervals, of the
+  /// last interval. Then call next() until there is no more window, and add the waiting events, if
+  /// any, again.
   Added add(std::span<const Event> events, Microseconds base, Nanoseconds start, Nanoseconds end);
 
   /// Returns the next window if it is complete.
@@ -71,7 +70,6 @@ class WindowQueue {
   /// End of the last interval; nothing before the first.
   std::optional<Nanoseconds> reached() const { return reached_; }
 
-  /// Forgets all events and times.
   void reset();
 
  private:

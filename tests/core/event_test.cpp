@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/core/event.hpp"
-
+// Events, their labels, buckets and times; kernels equal their plain reference on every SIMD
+// target.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,11 +9,17 @@
 #include <random>
 #include <span>
 #include <tuple>
+#include <utility>
 #include <vector>
 
+#include "src/core/event.hpp"
 #include "src/core/event_buckets.hpp"
+#include "src/core/fired_pixels.hpp"
+#include "src/core/interval_times.hpp"
+#include "src/core/label.hpp"
 #include "src/core/time_slices.hpp"
 #include "src/simulate/simulator.hpp"
+#include "tests/core/targets.hpp"
 
 namespace {
 
@@ -121,27 +127,190 @@ TEST(TimeSlices, AreSortedByAnyNumberOfThreads) {
   }
 }
 
-TEST(StepTimes, ShareOutTheInterval) {
-  const StepTimes steps(33'333'333, 11);
-  EXPECT_EQ(steps.count(), 11);
-  EXPECT_EQ(steps.microseconds(1), 3030U);
-  EXPECT_EQ(steps.microseconds(11), 33'333U);
-}
-
-TEST(StepTimes, HaveAMicrosecondEach) {
-  EXPECT_EQ(StepTimes(5'000, 11).count(), 5);
-  EXPECT_EQ(StepTimes(5'999, 11).count(), 5);
-  EXPECT_EQ(StepTimes(1, 11).count(), 1);
+TEST(StepTimes, ShareOutTheIntervalAndHaveAMicrosecondEach) {
+  const StepTimes shared(33'333'333, 11);
+  EXPECT_EQ(shared.count(), 11);
+  EXPECT_EQ(shared.microseconds(1), 3030U);
+  EXPECT_EQ(shared.microseconds(11), 33'333U);
+  for (const auto& [duration, count] : {std::pair{5'000, 5}, {5'999, 5}, {1, 1}})
+    EXPECT_EQ(StepTimes(duration, 11).count(), count);
   EXPECT_EQ(StepTimes(1, 11).microseconds(1), 0U);
   const StepTimes steps(5'500, 11);
   for (int j = 2; j <= steps.count(); ++j)
     EXPECT_GT(steps.microseconds(j), steps.microseconds(j - 1));
+  const StepTimes longest(max_interval, 256);
+  EXPECT_EQ(longest.microseconds(256), 0xffffffffU);
+  EXPECT_EQ(longest.microseconds(128), 0x7fffffffU);
 }
 
-TEST(StepTimes, ReachOverTheLongestInterval) {
-  const StepTimes steps(max_interval, 256);
-  EXPECT_EQ(steps.microseconds(256), 0xffffffffU);
-  EXPECT_EQ(steps.microseconds(128), 0x7fffffffU);
+TEST(Label, LiesInMemoryAsTheMetaHasIt) {
+  const Label label{.object_class = 0x0102, .cause = Cause::hot_pixel};
+  const unsigned char expected[] = {0x02, 0x01, 4, 0};
+  EXPECT_EQ(std::memcmp(&label, expected, sizeof label), 0);
+}
+
+/// Events 0 ... count - 1 at these columns, whose labels have the columns as their class.
+struct Numbered {
+  std::vector<Event> events;
+  std::vector<Label> labels;
+
+  explicit Numbered(int count) {
+    for (int i = 0; i < count; ++i) {
+      events.push_back(Event::at(i, 0, 0, Polarity::on));
+      labels.push_back({static_cast<std::uint16_t>(i), Cause::light});
+    }
+  }
+};
+
+TEST(LabelledEvents, AreKeptWithTheirLabels) {
+  Numbered numbered(10);
+  const LabelledEvents all{numbered.events, numbered.labels};
+  const auto kept = all.keep_if([](const Event& event) { return event.x % 3 == 1; });
+  ASSERT_EQ(kept.events.size(), 3U);
+  ASSERT_EQ(kept.labels.size(), 3U);
+  EXPECT_EQ(kept.events.data(), numbered.events.data());
+  EXPECT_EQ(kept.labels.data(), numbered.labels.data());
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(kept.events[i].x, 3 * i + 1);
+    EXPECT_EQ(kept.labels[i].object_class, 3 * i + 1);
+  }
+}
+
+TEST(LabelledEvents, MayHaveNoLabelsAndMayBeChanged) {
+  Numbered numbered(10);
+  const LabelledEvents all{numbered.events, {}};
+  int calls = 0;
+  const auto kept = all.keep_if([&](Event& event) {
+    EXPECT_EQ(event.x, calls++);
+    event.x = static_cast<std::uint16_t>(event.x + 100);
+    return event.x >= 105;
+  });
+  EXPECT_EQ(calls, 10);
+  ASSERT_EQ(kept.events.size(), 5U);
+  EXPECT_TRUE(kept.labels.empty());
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(kept.events[i].x, 105 + i);
+  EXPECT_EQ(numbered.labels, Numbered(10).labels);
+}
+
+/// Pixels of which about one in `rarity` fires, and their events in raster order.
+struct Fired {
+  explicit Fired(int rarity) {
+    std::minstd_rand random(static_cast<unsigned>(rarity));
+    pixels.begin(4711);
+    for (int y = 0; y < 32768; y += 2339) {
+      for (int x = y % 7; x < 1000; x += 64) {
+        std::uint64_t fired = 0;
+        std::uint64_t on = 0;
+        for (int i = 0; i < 64; ++i) {
+          const std::uint64_t bit = std::uint64_t{1} << i;
+          const bool is_on = random() % 64 < 32;
+          if (is_on) on |= bit;
+          if (static_cast<int>(random() >> 8) % rarity != 0) continue;
+          fired |= bit;
+          events.push_back(Event::at(x + i, y, 4711, is_on ? Polarity::on : Polarity::off));
+        }
+        pixels.add(x, y, fired, on);
+      }
+    }
+  }
+
+  FiredPixels pixels;
+  std::vector<Event> events;
+};
+
+TEST(FiredPixels, AreWrittenAsTheirEventsOnEveryTarget) {
+  targets::for_each([](const char* target) {
+    for (const int rarity : {1, 2, 9, 100, 5000}) {
+      const Fired fired(rarity);
+      ASSERT_EQ(fired.pixels.size(), fired.events.size());
+      std::vector<Event> written(fired.events.size() + 1);
+      const auto past_the_end = Event::at(1, 2, 3, Polarity::on);
+      written.back() = past_the_end;
+      fired.pixels.write_to(written.data());
+      EXPECT_EQ(written.back(), past_the_end) << target << ", one in " << rarity;
+      written.pop_back();
+      EXPECT_EQ(written, fired.events) << target << ", one in " << rarity;
+
+      std::vector<Event> visited;
+      fired.pixels.visit([&](std::span<const Event> events) {
+        visited.insert(visited.end(), events.begin(), events.end());
+      });
+      EXPECT_EQ(visited, fired.events) << target << ", one in " << rarity;
+    }
+  });
+}
+
+TEST(FiredPixels, BeginAgain) {
+  Fired fired(3);
+  fired.pixels.begin(1);
+  EXPECT_EQ(fired.pixels.size(), 0U);
+  fired.pixels.write_to(nullptr);
+  fired.pixels.add(65530, 32767, 0b100001, 0b100000);
+  EXPECT_EQ(fired.pixels.on_size(), 1U);
+  std::vector<Event> events(2);
+  fired.pixels.write_to(events.data());
+  EXPECT_EQ(events, (std::vector{Event::at(65530, 32767, 1, Polarity::off),
+                                 Event::at(65535, 32767, 1, Polarity::on)}));
+}
+
+constexpr Microseconds start = (Microseconds{1} << 40) + 12'345;
+
+std::vector<AbsoluteEvent> random_events(std::size_t count) {
+  std::mt19937 random(static_cast<unsigned>(count));
+  std::vector<AbsoluteEvent> events;
+  auto t = start;
+  for (std::size_t i = 0; i < count; ++i, t += random() % 3)
+    events.push_back(
+        {t, static_cast<std::uint16_t>(random()), static_cast<std::uint16_t>(random())});
+  return events;
+}
+
+/// An element past the end, which nothing may change, is in the result too.
+std::vector<Event> expected(std::span<const AbsoluteEvent> events) {
+  std::vector<Event> out;
+  for (const auto& event : events)
+    out.push_back({static_cast<std::uint32_t>(event.t - start), event.x, event.y_p});
+  out.push_back({});
+  return out;
+}
+
+TEST(IntervalTimes, EqualThePlainReferenceAtEverySize) {
+  targets::for_each([](const char* target) {
+    for (std::size_t count = 0; count < 70; ++count) {
+      const auto events = random_events(count);
+      std::vector<Event> out(count + 1);
+      EXPECT_TRUE(to_interval_times(start, start, events, out.data())) << target << ' ' << count;
+      EXPECT_EQ(out, expected(events)) << target << ' ' << count;
+    }
+  });
+}
+
+TEST(IntervalTimes, NoticeEveryFall) {
+  targets::for_each([](const char* target) {
+    for (std::size_t count = 1; count < 40; ++count)
+      for (std::size_t late = 0; late < count; ++late) {
+        auto events = random_events(count);
+        const auto before = late == 0 ? start : events[late - 1].t;
+        for (std::size_t i = late; i < count; ++i) events[i].t = before - 1;
+        std::vector<Event> out(count + 1);
+        EXPECT_FALSE(to_interval_times(start, start, events, out.data()))
+            << target << ' ' << count << ' ' << late;
+        EXPECT_EQ(out, expected(events)) << target << ' ' << count << ' ' << late;
+      }
+  });
+}
+
+TEST(IntervalTimes, AreComparedOverTheirWholeRange) {
+  constexpr auto far = Microseconds{3} << 61;
+  targets::for_each([](const char* target) {
+    for (std::size_t count = 3; count < 40; ++count) {
+      auto events = random_events(count);
+      events[count - 2].t = far;
+      events[count - 1].t = -far;  // further back than 64 bits can tell
+      std::vector<Event> out(count);
+      EXPECT_FALSE(to_interval_times(start, start, events, out.data())) << target << ' ' << count;
+    }
+  });
 }
 
 }  // namespace

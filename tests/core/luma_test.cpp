@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "src/core/rgb_luma.hpp"
 #include "tests/core/targets.hpp"
 
 namespace {

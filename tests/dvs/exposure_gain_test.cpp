@@ -87,28 +87,13 @@ TEST(ExposureGain, EqualsTheReference) {
   }
 }
 
-/// Events of a video, by interval.
-template <class Pixel>
-std::vector<std::vector<Event>> play(const std::vector<Image<Pixel>>& frames, int bits,
-                                     const DvsSettings& settings, int threads = 2) {
-  auto simulator = make_dvs_simulator({frames[0].width(), frames[0].height(), bits});
-  simulator->set(settings);
-  Settings common;
-  common.threads = threads;
-  std::vector<std::vector<Event>> intervals;
-  Nanoseconds time = 0;
-  for (const auto& frame : frames) {
-    if (const auto* events = simulator->push(scene::luma(frame.view(), bits), time, common))
-      intervals.push_back(scene::copy(*events));
-    time += scene::frame_time;
-  }
-  return intervals;
-}
-
-double count(const std::vector<std::vector<Event>>& intervals) {
-  double sum = 0;
-  for (const auto& interval : intervals) sum += static_cast<double>(interval.size());
-  return sum;
+/// Events of a video.
+std::vector<TimedEvent> play(const std::vector<Image<std::uint8_t>>& frames,
+                             const DvsSettings& settings) {
+  Playback playback({frames[0].width(), frames[0].height(), 8}, settings);
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    playback.push(frames[i], 8, static_cast<Nanoseconds>(i) * scene::frame_time);
+  return playback.events;
 }
 
 TEST(ExposureCompensation, LeavesALampAlone) {
@@ -125,16 +110,16 @@ TEST(ExposureCompensation, LeavesALampAlone) {
     std::vector<Image<std::uint8_t>> frames;
     frames.reserve(6);
     for (int i = 0; i < 6; ++i) frames.push_back(room(i < 3 ? 0 : lamp));
-    const auto expected = play(frames, 8, {});
-    EXPECT_GT(count(expected), 500) << lamp;
-    EXPECT_TRUE(play(frames, 8, {.exposure_compensation = true}) == expected) << lamp;
+    const auto expected = play(frames, {});
+    EXPECT_GT(expected.size(), 500U) << lamp;
+    EXPECT_TRUE(play(frames, {.exposure_compensation = true}) == expected) << lamp;
   }
   // Brighter all over, but too suddenly for an exposure.
   std::vector<Image<std::uint8_t>> frames;
   for (const double light : {0.3, 0.3, 0.5})
     frames.push_back(
         exposed<std::uint8_t>(scene_of(width, height, 0, 0, 0.2, 0.9), light, 8, false));
-  EXPECT_TRUE(play(frames, 8, {.exposure_compensation = true}) == play(frames, 8, {}));
+  EXPECT_TRUE(play(frames, {.exposure_compensation = true}) == play(frames, {}));
 }
 
 TEST(ExposureCompensation, KeepsSaturatedPixelsAsTheyWere) {
@@ -151,9 +136,9 @@ TEST(ExposureCompensation, KeepsSaturatedPixelsAsTheyWere) {
     std::vector<Image<std::uint8_t>> frames;
     for (const int i : {0, 1, 2, 3, 4, 5, 6, 5, 4, 3, 2, 1, 0}) frames.push_back(frame(ramp(i)));
     const DvsSettings settings{.upsampling = upsampling};
-    EXPECT_GT(count(play(frames, 8, settings)), width * (height - 20));
-    EXPECT_LT(count(play(frames, 8, {.exposure_compensation = true, .upsampling = upsampling})),
-              width * height / 100);
+    EXPECT_GT(play(frames, settings).size(), std::size_t{width} * (height - 20));
+    EXPECT_LT(play(frames, {.exposure_compensation = true, .upsampling = upsampling}).size(),
+              std::size_t{width} * height / 100);
   }
 }
 

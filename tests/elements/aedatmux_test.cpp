@@ -11,30 +11,19 @@ namespace {
 using namespace harness;
 using namespace aedat_recordings;
 
-/// What the buffers hold that were not pulled before.
-Content rest_of(GstHarness* h) {
+/// Waits for the end of the file, and returns what was not pulled before.
+Content rest_of_file(GstHarness* h) {
   Bytes bytes;
-  while (const Buffer buffer{gst_harness_try_pull(h)}) {
+  for (const auto& buffer : pull_until_eos(h)) {
     const auto piece = bytes_of(buffer.get());
     bytes.insert(bytes.end(), piece.begin(), piece.end());
   }
   return Content(bytes);
 }
 
-/// Waits for the end of the file, and returns what was not pulled before.
-Content rest_of_file(GstHarness* h) {
-  EXPECT_TRUE(next_event(h, GST_EVENT_EOS));
-  return rest_of(h);
-}
-
 /// Pushes a segment in which this timestamp has this running time.
 void push_segment(GstHarness* h, GstClockTime pts, GstClockTime running_time, double rate = 1) {
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  segment.start = segment.time = pts;
-  segment.base = running_time;
-  segment.rate = rate;
-  EXPECT_TRUE(gst_harness_push_event(h, gst_event_new_segment(&segment)));
+  harness::push_segment(h, {.start = pts, .time = pts, .base = running_time, .rate = rate});
 }
 
 /// The muxer with one sink pad.
@@ -52,7 +41,7 @@ struct Mux : Harness {
 
   /// Ends the file, and returns what is not pulled yet.
   Content end() {
-    EXPECT_TRUE(gst_harness_push_event(get(), gst_event_new_eos()));
+    push_eos(get());
     return rest_of_file(get());
   }
 };
@@ -62,9 +51,8 @@ TEST(AedatMux, WritesTheTimesOfTheStream) {
   EXPECT_EQ(mux.push(5 * GST_SECOND + 999, {{0, 1, 2}, {7, 3, 0x8004}}), GST_FLOW_OK);
   EXPECT_EQ(mux.push(5 * GST_SECOND + 10 * GST_MSECOND, {{9'999, 345, 259}}), GST_FLOW_OK);
   const auto content = mux.end();
-  EXPECT_EQ(content.events, (Events{AbsoluteEvent::at(1, 2, 5'000'000, Polarity::off),
-                                    AbsoluteEvent::at(3, 4, 5'000'007, Polarity::on),
-                                    AbsoluteEvent::at(345, 259, 5'019'999, Polarity::off)}));
+  EXPECT_EQ(content.events,
+            (Events{off_at(1, 2, 5'000'000), on_at(3, 4, 5'000'007), off_at(345, 259, 5'019'999)}));
   EXPECT_FALSE(content.has_table) << "nothing could seek to where the header tells of it";
 }
 
@@ -78,8 +66,8 @@ TEST(AedatMux, WritesTheTimesOfTheStreamInEachSegment) {
   EXPECT_EQ(mux.push(20 * GST_MSECOND, {{0, 1, 2}, {9'999, 3, 4}}), GST_FLOW_OK);
   Events expected;
   for (int start = 0; start < 30'000; start += 10'000) {
-    expected.push_back(AbsoluteEvent::at(1, 2, start, Polarity::off));
-    expected.push_back(AbsoluteEvent::at(3, 4, start + 9'999, Polarity::off));
+    expected.push_back(off_at(1, 2, start));
+    expected.push_back(off_at(3, 4, start + 9'999));
   }
   EXPECT_EQ(mux.end().events, expected);
 }
@@ -98,16 +86,13 @@ struct EventsAndVideo : TwoInputs {
               GST_FLOW_OK);
   }
 
-  Content end() const {
-    for (const auto& h : {first.get(), second.get()})
-      gst_harness_push_event(h, gst_event_new_eos());
+  Content content() const {
+    end();
     return rest_of_file(first.get());
   }
 
   void push_frame(GstClockTime pts) const {
-    GstBuffer* const frame = gst_buffer_new_memdup("0123456789abcdef", 16);
-    GST_BUFFER_PTS(frame) = pts;
-    EXPECT_EQ(gst_harness_push(second.get(), frame), GST_FLOW_OK);
+    EXPECT_EQ(gst_harness_push(second.get(), filled(16, 7, pts, GST_CLOCK_TIME_NONE)), GST_FLOW_OK);
   }
 };
 
@@ -122,12 +107,11 @@ TEST(AedatMux, WritesFramesWithTheEventsOfTheirRunningTime) {
   push_segment(events, 5 * GST_SECOND + 10 * GST_MSECOND, 5 * GST_MSECOND);
   mux.push_events(5 * GST_SECOND + 10 * GST_MSECOND);
   mux.push_frame(GST_SECOND + 7 * GST_MSECOND);
-  const auto content = mux.end();
+  const auto content = mux.content();
   ASSERT_EQ(content.pictures.size(), 2U);
   EXPECT_EQ(content.pictures[0].times[0], 5'008'000);
   EXPECT_EQ(content.pictures[1].times[0], 5'012'000);
-  EXPECT_EQ(content.events, (Events{AbsoluteEvent::at(1, 2, 5'000'000, Polarity::off),
-                                    AbsoluteEvent::at(1, 2, 5'010'000, Polarity::off)}));
+  EXPECT_EQ(content.events, (Events{off_at(1, 2, 5'000'000), off_at(1, 2, 5'010'000)}));
 }
 
 /// At twice the rate, a gap of 40 ms ends before a frame of running time 30 ms.
@@ -135,11 +119,11 @@ TEST(AedatMux, WritesEventsAfterAGapBeforeLaterFrames) {
   const EventsAndVideo mux;
   auto* const events = mux.first.get();
   push_segment(events, 0, 0, 2);
-  gst_harness_push_event(events, gst_event_new_gap(0, 40 * GST_MSECOND));
+  push_gap(events, 0, 40 * GST_MSECOND);
   mux.push_frame(30 * GST_MSECOND);
   push_segment(events, 40 * GST_MSECOND, 20 * GST_MSECOND);
   mux.push_events(40 * GST_MSECOND);
-  const auto content = mux.end();
+  const auto content = mux.content();
   ASSERT_EQ(content.pictures.size(), 1U);
   EXPECT_EQ(content.pictures[0].times[0], 50'000) << "the segment of the events after the gap";
 }
@@ -151,8 +135,7 @@ TEST(AedatMux, LeavesOutWhatDoesNotFit) {
   EXPECT_EQ(mux.push(0, {{0, 1, 1}}), GST_FLOW_OK);
   EXPECT_EQ(mux.Harness::push(gst_buffer_new_memdup("123", 3)), GST_FLOW_OK);
   EXPECT_EQ(mux.push(2 * GST_SECOND, {{0, 1, 1}}), GST_FLOW_OK);
-  EXPECT_EQ(mux.end().events, (Events{AbsoluteEvent::at(6, 7, 1'000'005, Polarity::off),
-                                      AbsoluteEvent::at(1, 1, 2'000'000, Polarity::off)}));
+  EXPECT_EQ(mux.end().events, (Events{off_at(6, 7, 1'000'005), off_at(1, 1, 2'000'000)}));
   for (const char* dropped :
        {"a buffer without a timestamp", "2 events earlier than", "2 events outside"}) {
     const auto warning = mux.warning();
@@ -167,10 +150,7 @@ TEST(AedatMux, WritesFramesInTheSizeOfTheirCaps) {
   Bytes pixels(3 * 16);
   std::iota(pixels.begin(), pixels.end(), std::uint8_t{0});
   GstBuffer* const buffer = gst_buffer_new_memdup(pixels.data(), pixels.size());
-  gsize offsets[GST_VIDEO_MAX_PLANES] = {0};
-  gint strides[GST_VIDEO_MAX_PLANES] = {16};
-  gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, GST_VIDEO_FORMAT_GRAY8, 16, 999,
-                                 1, offsets, strides);
+  add_video_meta(buffer, GST_VIDEO_FORMAT_GRAY8, 16, 999, {{0, 16}});
   GST_BUFFER_PTS(buffer) = GST_SECOND;
   EXPECT_EQ(mux.Harness::push(buffer), GST_FLOW_OK);
   const auto pictures = mux.end().pictures;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Contracts of every element that takes events or frames: segments, flushes, DISCONT, GAP, custom
-// events and EOS.
+// events, EOS, errors and states.
 #include <gst/base/gstbasesink.h>
 
 #include <cstring>
@@ -23,25 +23,12 @@ class Output {
     std::string name;            ///< of an event; or "buffer"
     GstClockTime base;           ///< of the segment that it belongs to; none before the first
     GstClockTime discontinuity;  ///< PTS of a buffer that is flagged DISCONT; else none
-    std::vector<guint8> bytes;   ///< of a buffer
+    std::string bytes;           ///< of a buffer
   };
 
   explicit Output(GstPad* pad) {
-    gst_pad_add_probe(
-        pad,
-        static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM |
-                                     GST_PAD_PROBE_TYPE_EVENT_FLUSH),
-        +[](GstPad*, GstPadProbeInfo* info, gpointer self) {
-          auto& output = *static_cast<Output*>(self);
-          if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0)
-            output.add(GST_PAD_PROBE_INFO_BUFFER(info));
-          else if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER_LIST) != 0)
-            output.add(gst_buffer_list_get(GST_PAD_PROBE_INFO_BUFFER_LIST(info), 0));
-          else
-            output.add(GST_PAD_PROBE_INFO_EVENT(info));
-          return GST_PAD_PROBE_OK;
-        },
-        this, nullptr);
+    watch(pad,
+          {[this](GstBuffer* buffer) { add(buffer); }, [this](GstEvent* event) { add(event); }});
   }
 
   /// Items of this name.
@@ -54,8 +41,8 @@ class Output {
     const std::lock_guard lock(mutex_);
     return items_;
   }
-  std::vector<std::vector<guint8>> buffers_after_flushes() const {
-    std::vector<std::vector<guint8>> buffers;
+  std::vector<std::string> buffers_after_flushes() const {
+    std::vector<std::string> buffers;
     for (const auto& item : all()) {
       if (item.name == "buffer") buffers.push_back(item.bytes);
       if (item.name == "flush-stop") buffers.clear();
@@ -71,20 +58,16 @@ class Output {
       base_ = segment->base;
     }
     if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP) base_ = GST_CLOCK_TIME_NONE;
-    const GstStructure* structure = gst_event_get_structure(event);
-    const bool is_custom = GST_EVENT_TYPE(event) == GST_EVENT_CUSTOM_DOWNSTREAM;
-    add(is_custom ? gst_structure_get_name(structure) : GST_EVENT_TYPE_NAME(event));
+    add(event_name(event));
   }
   void add(GstBuffer* buffer) {
-    std::vector<guint8> bytes(gst_buffer_get_size(buffer));
-    if (!bytes.empty()) gst_buffer_extract(buffer, 0, bytes.data(), bytes.size());
     add("buffer", GST_BUFFER_IS_DISCONT(buffer) ? GST_BUFFER_PTS(buffer) : GST_CLOCK_TIME_NONE,
-        std::move(bytes));
+        bytes_of(buffer));
   }
   void add(const std::string& name, GstClockTime discontinuity = GST_CLOCK_TIME_NONE,
-           std::vector<guint8> bytes = {}) {
+           const std::string& bytes = {}) {
     const std::lock_guard lock(mutex_);
-    items_.push_back({name, base_, discontinuity, std::move(bytes)});
+    items_.push_back({name, base_, discontinuity, bytes});
   }
 
   mutable std::mutex mutex_;
@@ -148,15 +131,8 @@ class Consumer {
     steps_.emplace_back(
         [make](const Input& input) { gst_pad_push_event(input.pad.get(), make()); });
   }
-  void push_segment(GstClockTime base = 0, GstSegmentFlags flags = GST_SEGMENT_FLAG_NONE,
-                    GstFormat format = GST_FORMAT_TIME, double rate = 1) {
-    GstSegment segment;
-    gst_segment_init(&segment, format);
-    segment.base = base;
-    segment.flags = flags;
-    segment.rate = rate;
-    if (rate < 0) segment.stop = GST_SECOND;
-    push([segment] { return gst_event_new_segment(&segment); });
+  void push_segment(const SegmentFields& fields = {}) {
+    push([fields] { return segment_event(fields); });
   }
   /// Pushes a buffer of 10 ms after the first 10 ms into each input: a frame, or these events.
   void push_events(const std::vector<GstEventCameraEvent>& events,
@@ -167,7 +143,7 @@ class Consumer {
       if (!events.empty()) std::memcpy(bytes.data(), events.data(), bytes.size() - extra_bytes);
       GstBuffer* const buffer =
           input.takes_frames ? frame(1) : gst_buffer_new_memdup(bytes.data(), bytes.size());
-      GST_BUFFER_PTS(buffer) = input.takes_frames ? 10 * GST_MSECOND : pts;
+      if (!input.takes_frames) GST_BUFFER_PTS(buffer) = pts;
       GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;
       gst_pad_push(input.pad.get(), buffer);
     });
@@ -244,10 +220,8 @@ class Consumer {
   };
 
   static GstBuffer* frame(guint index) {
-    constexpr gsize size = gsize{64} * 48;
-    GstBuffer* const buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
-    gst_buffer_memset(buffer, 0, index % 2 == 1 ? 0xff : 0, size);
-    return buffer;
+    return filled(gsize{64} * 48, index % 2 == 1 ? 0xff : 0, index * 10 * GST_MSECOND,
+                  10 * GST_MSECOND);
   }
   /// Events of neighbouring pixels, so that a denoiser keeps the last one.
   static GstBuffer* neighbours(guint index) {
@@ -274,7 +248,7 @@ INSTANTIATE_TEST_SUITE_P(, EveryConsumer, testing::ValuesIn(seekable_consumers()
 TEST_P(EveryConsumer, EndsEachSegmentOnceAfterItsStart) {
   Consumer it(GetParam());
   for (const GstClockTime base : {0 * GST_SECOND, 1 * GST_SECOND}) {
-    it.push_segment(base, GST_SEGMENT_FLAG_SEGMENT);
+    it.push_segment({.base = base, .flags = GST_SEGMENT_FLAG_SEGMENT});
     it.push([] { return gst_event_new_segment_done(GST_FORMAT_TIME, 0); });
   }
   it.end();
@@ -288,14 +262,6 @@ TEST_P(EveryConsumer, EndsEachSegmentOnceAfterItsStart) {
   }
 }
 
-TEST_P(EveryConsumer, ForwardsCustomEventsAndTagsWithoutData) {
-  Consumer it(GetParam());
-  it.push_segment();
-  it.push_custom_event_and_tag();
-  it.end();
-  it.expect_custom_events_and_tags();
-}
-
 TEST_P(EveryConsumer, EndsAfterGaps) {
   Consumer it(GetParam());
   it.push_segment();
@@ -306,12 +272,14 @@ TEST_P(EveryConsumer, EndsAfterGaps) {
 }
 
 TEST_P(EveryConsumer, ForwardsCustomEventsAndTags) {
-  Consumer it(GetParam());
-  it.push_segment();
-  for (guint i = 0; i < 3; ++i) it.push_interval(i);
-  it.push_custom_event_and_tag();
-  it.end();
-  it.expect_custom_events_and_tags();
+  for (const guint intervals : {0, 3}) {
+    Consumer it(GetParam());
+    it.push_segment();
+    for (guint i = 0; i < intervals; ++i) it.push_interval(i);
+    it.push_custom_event_and_tag();
+    it.end();
+    it.expect_custom_events_and_tags();
+  }
 }
 
 /// The output after a flush is that of an element which receives nothing before, also if a segment
@@ -338,7 +306,7 @@ TEST_P(EveryConsumer, StartsOverAfterAFlush) {
       it.play();
     }
     for (auto* consumer : {&it, &fresh}) {
-      consumer->push_segment(1 * GST_SECOND);
+      consumer->push_segment({.base = 1 * GST_SECOND});
       for (guint i = 0; i < 3; ++i) consumer->push_interval(before + i);
       consumer->end();
       consumer->expect_segments();
@@ -406,15 +374,15 @@ TEST_P(EveryConsumer, SkipsInvalidEvents) {
 
 TEST_P(EveryConsumer, RefusesToRunBackwards) {
   Consumer it(GetParam());
-  it.push_segment(0, GST_SEGMENT_FLAG_NONE, GST_FORMAT_TIME, -1);
-  EXPECT_NE(testing::PrintToString(it.faults()).find("backwards"), std::string::npos);
+  it.push_segment({.stop = GST_SECOND, .rate = -1});
+  EXPECT_TRUE(contains(testing::PrintToString(it.faults()), "backwards"));
 }
 
 TEST_P(EveryConsumer, RefusesEventsWithoutTimes) {
   Consumer it(GetParam());
   if (!it.takes_events() || is_writer(GetParam())) GTEST_SKIP();
-  it.push_segment(0, GST_SEGMENT_FLAG_NONE, GST_FORMAT_BYTES);
-  EXPECT_NE(testing::PrintToString(it.faults()).find("no timestamps"), std::string::npos);
+  it.push_segment({.format = GST_FORMAT_BYTES});
+  EXPECT_TRUE(contains(testing::PrintToString(it.faults()), "no timestamps"));
 }
 
 /// Elements whose output continues where their input does not: files and datagrams have no flags,
@@ -463,8 +431,103 @@ TEST_P(EveryJoiner, AsksOnceForTheStreamThatIsMissing) {
                                  (kind + ", width=8, height=4, framerate=" + framerate).c_str());
   }
   h.wait_for_events();
-  EXPECT_NE(h.warning().find("link a s"), std::string::npos);
+  EXPECT_TRUE(contains(h.warning(), "link a s"));
   EXPECT_EQ(h.warning(), "");
+}
+
+/* errors, where GStreamer tries again what was refused */
+
+constexpr auto small = "application/x-event-camera, format=XYTP, width=32, height=24";
+constexpr auto large = "application/x-event-camera, format=XYTP, width=16384, height=16384";
+
+struct Refusal {
+  const char* launch;
+  const char* caps;
+  const char* error;
+  double rate = 1;
+};
+
+void PrintTo(const Refusal& refusal, std::ostream* out) {
+  *out << refusal.launch << ": " << refusal.error;
+}
+
+constexpr Refusal refusals[] = {
+    {"eventcrop left=40", small, "Cannot filter the events: cropping 40 columns"},
+    {"eventmask location=/nowhere", small, "Cannot filter the events: cannot read the mask"},
+    {"eventtensor bins=256", large, "Cannot make tensors that take more than 1 GiB"},
+    {"evtenc", large, "This file format cannot hold the stream"},
+    {"evtparse", "application/x-event-camera, format=EVT3, framerate=0/1",
+     "Cannot read this camera"},
+    {"eventdatagrampay format=jaer", large, "jAER's addresses support sensors of up to 1024x512"},
+    {"rtpeventpay", large,
+     "EVT3 words support sensors of 1x1 to 2048x2048 pixels, not 16384x16384; set format=XYTP"},
+    {"eventdatagramdepay width=32 height=24", "application/x-event-datagram",
+     "Cannot receive events backwards", -1},
+    {"evtdec", "application/x-event-camera, format=EVT3, width=32, height=24",
+     "Cannot read events backwards", -1},
+    {"evtparse", "application/x-event-camera, format=EVT3, width=32, height=24, framerate=0/1",
+     "Cannot parse events backwards", -1},
+    {"rtpeventdepay",
+     "application/x-rtp, media=application, clock-rate=1000000, "
+     "encoding-name=X-EVENT-CAMERA, width=32, height=24",
+     "Cannot receive events backwards", -1},
+    {"rtpeventpay", small, "Cannot send events backwards", -1},
+};
+
+class EveryRefusal : public testing::TestWithParam<Refusal> {};
+INSTANTIATE_TEST_SUITE_P(, EveryRefusal, testing::ValuesIn(refusals));
+
+/// Sticky events that are refused come again before each buffer and event that follows.
+TEST_P(EveryRefusal, IsToldOncePerStart) {
+  const auto& refusal = GetParam();
+  Harness h(refusal.launch);
+  for (int start = 0; start < 2; ++start) {
+    gst_harness_set_src_caps_str(h.get(), refusal.caps);
+    push_segment(h.get(), {.stop = GST_SECOND, .rate = refusal.rate});
+    for (const GstClockTime time : {0, 10})
+      EXPECT_NE(h.push(buffer_of(time * GST_MSECOND, {{0, 1, 1}}, GST_MSECOND)), GST_FLOW_OK);
+    push_eos(h.get());
+    EXPECT_TRUE(contains(h.error(), refusal.error));
+    EXPECT_EQ(h.error(), "");
+    gst_element_set_state(h->element, GST_STATE_READY);
+    gst_element_set_state(h->element, GST_STATE_PLAYING);
+    gst_harness_push_event(h.get(), gst_event_new_stream_start("again"));
+  }
+}
+
+/* states */
+
+INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
+
+class AllStates : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(, AllStates, testing::ValuesIn(element_names()), element_lines::test_name);
+
+/// As GStreamer's generic tests of all elements do.
+TEST_P(AllStates, AreReachedFromEachOther) {
+  const auto element = Kind(GetParam()).make();
+  const auto states = {GST_STATE_NULL, GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_PLAYING};
+  for (const auto from : states)
+    for (const auto to : states)
+      for (const auto state : {from, to, from})
+        EXPECT_NE(gst_element_set_state(element.get(), state), GST_STATE_CHANGE_FAILURE)
+            << gst_element_state_get_name(from) << " and " << gst_element_state_get_name(to);
+  EXPECT_EQ(gst_element_set_state(element.get(), GST_STATE_NULL), GST_STATE_CHANGE_SUCCESS);
+  EXPECT_EQ(GST_OBJECT_REFCOUNT_VALUE(element.get()), 1);
+}
+
+TEST_P(EverySimulator, PlaysAgainAfterAStop) {
+  Pipeline pipeline(
+      "videotestsrc name=source pattern=ball num-buffers=6 ! video/x-raw,width=80,height=60 ! " +
+      with_upload(GetParam()) + " ! fakesink name=sink signal-handoffs=true");
+  int buffers = 0;
+  g_signal_connect(pipeline["sink"], "handoff",
+                   G_CALLBACK(+[](GstElement*, GstBuffer*, GstPad*, int* count) { ++*count; }),
+                   &buffers);
+  for (int times = 1; times <= 3; ++times) {
+    ASSERT_TRUE(pipeline.play()) << pipeline.error;
+    pipeline.set(GST_STATE_NULL);
+    EXPECT_EQ(buffers, 5 * times);
+  }
 }
 
 }  // namespace

@@ -12,9 +12,7 @@
 namespace {
 
 using namespace harness;
-using eventcamera::AbsoluteEvent;
-using eventcamera::Event;
-using eventcamera::Polarity;
+using namespace eventcamera;
 
 constexpr int width = 640;
 constexpr int height = 480;
@@ -63,46 +61,30 @@ GstBuffer* jaer(guint32 number, guint32 t, GstClockTime arrival) {
   return datagram(bytes, arrival);
 }
 
-struct Format {
-  const char* name;
-  const char* properties;
-  bool has_times = true;
-};
-
-void PrintTo(const Format& format, std::ostream* out) {
-  *out << format.name;
-}
-
-const Format formats[] = {
-    {"spif", "format=spif", false},
-    {"spif_big_endian", "format=spif byte-order=big-endian", false},
-    {"spif_timestamps", "format=spif-timestamps"},
-    {"spif_timestamps_big_endian", "format=spif-timestamps byte-order=big-endian"},
-    {"t64", "format=t64-x16-y16-on8"},
-    {"t32", "format=t32-x16-y15-on1"},
-    {"es", "format=es"},
-    {"jaer", "format=jaer"},
-    {"jaer_without_number", "format=jaer sequence-number=false"},
-};
-
-class EveryFormat : public testing::TestWithParam<Format> {};
-INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats),
-                         [](const auto& tested) { return std::string(tested.param.name); });
+class EveryFormat : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EveryFormat,
+                         testing::Values("format=spif", "format=spif byte-order=big-endian",
+                                         "format=spif-timestamps",
+                                         "format=spif-timestamps byte-order=big-endian",
+                                         "format=t64-x16-y16-on8", "format=t32-x16-y15-on1",
+                                         "format=es", "format=jaer",
+                                         "format=jaer sequence-number=false"));
 
 TEST_P(EveryFormat, BringsEveryEvent) {
-  const std::string properties = GetParam().properties;
+  const std::string properties = GetParam();
+  const bool has_times = !properties.starts_with("format=spif") || contains(properties, "stamps");
   Harness h("eventdatagrampay " + properties + " ! eventdatagramdepay " + properties + depay_size);
   h.caps(events_caps);
   const auto sent = stream(50'000);
   push_events(h, sent);
-  gst_harness_push_event(h.get(), gst_event_new_eos());
+  push_eos(h.get());
   const auto received = pull_events(h);
   ASSERT_EQ(received.size(), sent.size());
   for (std::size_t i = 0; i < sent.size(); ++i) {
     ASSERT_EQ(received[i].x, sent[i].x);
     ASSERT_EQ(received[i].y_p, sent[i].y_p);
     // Without times, it is that of the datagram.
-    const auto earliest = GetParam().has_times ? sent[i].t : sent[i].t - 5000;
+    const auto earliest = has_times ? sent[i].t : sent[i].t - 5000;
     ASSERT_LE(received[i].t, sent[i].t);
     ASSERT_GE(received[i].t, earliest);
   }
@@ -112,41 +94,14 @@ TEST_P(EveryFormat, BringsEveryEvent) {
   EXPECT_EQ(stat_of(h.element(), "events"), sent.size());
 }
 
-TEST_P(EveryFormat, RejectsRandomDatagrams) {
-  const std::string properties = GetParam().properties;
-  Harness pay("eventdatagrampay " + properties);
-  pay.caps(events_caps, "application/x-event-datagram");
-  const auto sent = stream(5000);
-  push_events(pay, sent);
-  gst_harness_push_event(pay.get(), gst_event_new_eos());
-  Depay h(properties);
-  std::mt19937 random(1);
-  guint64 bad = 0;
-  while (auto good = pay.pull()) {
-    const auto arrival = GST_BUFFER_PTS(good.get());
-    for (int i = 0; i < 3; ++i, ++bad) {
-      std::vector<guint8> bytes(200 + random() % 1300);
-      for (auto& byte : bytes) byte = static_cast<guint8>(random());
-      ASSERT_EQ(h.push(datagram(bytes, arrival)), GST_FLOW_OK);
-    }
-    ASSERT_EQ(h.push(good.release()), GST_FLOW_OK);
-  }
-  EXPECT_EQ(pull_events(h).size(), sent.size());
-  EXPECT_EQ(stat_of(h.element(), "rejected-packets"), bad);
-  EXPECT_NE(h.warning().find("Set format, width and height"), std::string::npos);
-  EXPECT_EQ(h.warning(), "");
-  EXPECT_EQ(h.error(), "");
-}
-
 /* payloader */
 
 /// One of successive buffers with 10 events each.
 GstBuffer* ten_events(int number, GstClockTime duration = 200 * GST_MSECOND) {
   std::vector<Event> events;
   for (guint64 i = 0; i < 10; ++i)
-    events.push_back(Event::at(static_cast<int>(i), 2,
-                               static_cast<std::uint32_t>(duration / GST_USECOND * i / 10),
-                               Polarity::on));
+    events.push_back(
+        on(static_cast<int>(i), 2, static_cast<std::uint32_t>(duration / GST_USECOND * i / 10)));
   return buffer_of(static_cast<GstClockTime>(number) * duration, events, duration);
 }
 
@@ -158,8 +113,7 @@ TEST(Payloader, LetsNoEventWaitIfNoBufferComes) {
   h.caps(events_caps, "application/x-event-datagram");
   for (int i = 0; i < 2; ++i) {
     const auto start = g_get_monotonic_time();
-    h.push(buffer_of(static_cast<GstClockTime>(i) * GST_SECOND, {Event::at(1, 2, 3, Polarity::on)},
-                     GST_MSECOND));
+    h.push(buffer_of(static_cast<GstClockTime>(i) * GST_SECOND, {on(1, 2, 3)}, GST_MSECOND));
     const Buffer buffer(gst_harness_pull(h.get()));
     ASSERT_TRUE(buffer);
     EXPECT_EQ(gst_buffer_get_size(buffer.get()), 8);
@@ -177,21 +131,8 @@ TEST(Payloader, SendsDuringGapsAndBeforeSegmentsStartOrEnd) {
   };
   EXPECT_TRUE(sends([&] { push_segment(h.get()); }));
   EXPECT_TRUE(sends([&] { end_segment(h.get()); }));
-  EXPECT_TRUE(
-      sends([&] { gst_harness_push_event(h.get(), gst_event_new_gap(0, GST_SECOND * 2)); }));
-  EXPECT_FALSE(
-      sends([&] { gst_harness_push_event(h.get(), gst_event_new_gap(0, GST_SECOND / 5)); }));
-}
-
-/// A queue sends refused caps again, before the next buffer.
-TEST(Payloader, RefusesThemEachTime) {
-  Harness h("eventdatagrampay format=jaer");
-  h.caps(events_caps, "application/x-event-datagram");
-  h.caps("application/x-event-camera, format=XYTP, width=1280, height=720",
-         "application/x-event-datagram");
-  EXPECT_NE(h.error().find("up to 1024x512 pixels"), std::string::npos);
-  EXPECT_EQ(h.push(buffer_of(0, {Event::at(1200, 5, 1, Polarity::on)}, GST_MSECOND)),
-            GST_FLOW_NOT_NEGOTIATED);
+  EXPECT_TRUE(sends([&] { push_gap(h.get(), 0, GST_SECOND * 2); }));
+  EXPECT_FALSE(sends([&] { push_gap(h.get(), 0, GST_SECOND / 5); }));
 }
 
 TEST(Latency, IsAddedAndAnnounced) {
@@ -216,7 +157,7 @@ TEST(Depayloader, NeedsTheSensorSize) {
        {"", "width=640", "height=480", "format=jaer width=1280 height=720"}) {
     Pipeline pipeline("eventdatagramdepay " + settings + " ! fakesink");
     EXPECT_FALSE(pipeline.play());
-    EXPECT_NE(pipeline.error.find("width and height"), std::string::npos) << settings;
+    EXPECT_TRUE(contains(pipeline.error, "width and height")) << settings;
   }
 }
 
@@ -258,7 +199,7 @@ TEST(Depayloader, ReceivesOneOfTwoSenders) {
   }
   EXPECT_EQ(gst_harness_buffers_received(h.get()), 10U);
   EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 10U);
-  EXPECT_NE(h.warning().find("second sender"), std::string::npos);
+  EXPECT_TRUE(contains(h.warning(), "second sender"));
   EXPECT_EQ(h.warning(), "");
   send(2000, 9'500'000, 4000 * GST_MSECOND);  // the first one has left
   EXPECT_EQ(gst_harness_buffers_received(h.get()), 11U);
@@ -274,6 +215,8 @@ TEST(Depayloader, IsNotHeldByASenderOfInvalidDatagrams) {
   }
   EXPECT_EQ(gst_harness_buffers_received(h.get()), 10U);
   EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 10U);
+  EXPECT_TRUE(contains(h.warning(), "Set format, width and height"));
+  EXPECT_EQ(h.warning() + h.error(), "");
 }
 
 TEST(Depayloader, FillsSilenceWithGaps) {
@@ -284,8 +227,7 @@ TEST(Depayloader, FillsSilenceWithGaps) {
   const auto buffer = h.pull();
   const auto gap = h.pull_event(GST_EVENT_GAP);
   ASSERT_TRUE(gap);
-  EXPECT_EQ(gap_of(gap.get()).start, 5 * GST_SECOND);
-  EXPECT_EQ(gap_of(gap.get()).duration, 299'999 * GST_USECOND);
+  EXPECT_EQ(gap_of(gap.get()), (Gap{5 * GST_SECOND, 299'999 * GST_USECOND}));
   EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), 5 * GST_SECOND + 299'999 * GST_USECOND);
   EXPECT_FALSE(GST_BUFFER_IS_DISCONT(buffer.get()));
   EXPECT_EQ(events_of(buffer.get()).at(0).t, 1);
@@ -327,32 +269,21 @@ TEST(Depayloader, SaysThatItHearsNothing) {
     const Owned<GstMessage> message(
         gst_bus_timed_pop_filtered(bus.get(), 60 * GST_SECOND, GST_MESSAGE_WARNING));
     ASSERT_TRUE(message) << receiver;
-    EXPECT_NE(text_of(message.get()).find("No packets for 3 seconds"), std::string::npos);
+    EXPECT_TRUE(contains(text_of(message.get()), "No packets for 3 seconds"));
   }
-}
-
-TEST(Depayloader, GivesEventsWithoutTimesThatOfTheirArrival) {
-  Depay h("format=spif");
-  h.push(datagram({1, 0, 2, 0x80, 1, 0, 3, 0x80}, 7 * GST_MSECOND));
-  h.push(datagram({1, 0, 4, 0x80}, 9 * GST_MSECOND));
-  EXPECT_EQ(pull_events(h), (std::vector{AbsoluteEvent::at(2, 1, 7000, Polarity::off),
-                                         AbsoluteEvent::at(3, 1, 7000, Polarity::off),
-                                         AbsoluteEvent::at(4, 1, 9000, Polarity::off)}));
 }
 
 TEST(Depayloader, NeedsArrivalTimesForEventsWithoutTimes) {
   Depay h("format=spif");
   EXPECT_EQ(h.push(datagram({1, 0, 2, 0x80}, GST_CLOCK_TIME_NONE)), GST_FLOW_ERROR);
-  EXPECT_NE(h.error().find("do-timestamp=true"), std::string::npos);
+  EXPECT_TRUE(contains(h.error(), "do-timestamp=true"));
 }
 
 TEST(Depayloader, SegmentsHaveTheSequenceNumberOfUpstream) {
   Depay h("format=t32-x16-y15-on1");
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  GstEvent* event = gst_event_new_segment(&segment);
-  const guint32 number = gst_event_get_seqnum(event);
-  gst_harness_push_event(h.get(), event);
+  push_segment(h.get());
+  const Owned<GstEvent> segment(gst_pad_get_sticky_event(h->srcpad, GST_EVENT_SEGMENT, 0));
+  const auto number = gst_event_get_seqnum(segment.get());
   h.push(t32(5'000'000, 0, GST_SECOND));
   h.push(t32(0, 0, 2 * GST_SECOND));
   for (int i = 0; i < 2; ++i) {

@@ -8,6 +8,19 @@
 #include "src/core/event.hpp"
 #include "tests/elements/harness.hpp"
 
+inline eventcamera::Event on(int x, int y, std::uint32_t t = 0) {
+  return eventcamera::Event::at(x, y, t, eventcamera::Polarity::on);
+}
+inline eventcamera::Event off(int x, int y, std::uint32_t t = 0) {
+  return eventcamera::Event::at(x, y, t, eventcamera::Polarity::off);
+}
+inline eventcamera::AbsoluteEvent on_at(int x, int y, eventcamera::Microseconds t) {
+  return eventcamera::AbsoluteEvent::at(x, y, t, eventcamera::Polarity::on);
+}
+inline eventcamera::AbsoluteEvent off_at(int x, int y, eventcamera::Microseconds t) {
+  return eventcamera::AbsoluteEvent::at(x, y, t, eventcamera::Polarity::off);
+}
+
 /// Triggers on their way from a reader to a writer.
 inline GstEvent* event_of(std::span<const eventcamera::Trigger> triggers) {
   std::vector<gint64> numbers;

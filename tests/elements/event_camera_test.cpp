@@ -28,22 +28,6 @@ VideoDevice kria() {
           .sensor = "imx636 6-003c"};
 }
 
-TEST(EventCameras, AreRecognised) {
-  const auto of_pi5 = event_camera_of(pi5());
-  ASSERT_TRUE(of_pi5);
-  EXPECT_EQ(of_pi5->name, "Event camera genx320");
-  EXPECT_EQ(of_pi5->format, EvtFormat::evt21);
-  EXPECT_EQ(of_pi5->sensor, (SensorSize{320, 320}));
-  EXPECT_TRUE(of_pi5->is_grey);
-
-  const auto of_kria = event_camera_of(kria());
-  ASSERT_TRUE(of_kria);
-  EXPECT_EQ(of_kria->name, "Event camera imx636");
-  EXPECT_EQ(of_kria->format, EvtFormat::evt21);
-  EXPECT_EQ(of_kria->sensor, (SensorSize{1280, 720}));
-  EXPECT_FALSE(of_kria->is_grey);
-}
-
 TEST(EventCameras, HaveTheFormatThatTheirDriversTell) {
   const std::pair<const char*, EvtFormat> fourccs[] = {{"PSEE", EvtFormat::evt2},
                                                        {"PSE1", EvtFormat::evt21_legacy},

@@ -13,9 +13,7 @@
 
 namespace event_files {
 
-using eventcamera::AbsoluteEvent;
-using eventcamera::Microseconds;
-using eventcamera::Polarity;
+using namespace eventcamera;
 using harness::Harness;
 using harness::Owned;
 using Events = std::vector<AbsoluteEvent>;
@@ -62,6 +60,7 @@ inline const Format& format_of(std::string_view name) {
   return *std::ranges::find(formats, name, &Format::name);
 }
 
+/// Instantiated in file_reading_test.cpp.
 class EveryFormat : public testing::TestWithParam<Format> {
  protected:
   const Format& format() const { return GetParam(); }
@@ -122,7 +121,7 @@ struct Reader : Harness {
   }
   explicit Reader(const Format& format, const std::string& properties = "")
       : Reader(format.reader + properties, format.caps) {
-    harness::push_segment(get(), GST_FORMAT_BYTES);
+    harness::push_segment(get(), {.format = GST_FORMAT_BYTES});
   }
 
   void push_bytes(std::string_view bytes) {

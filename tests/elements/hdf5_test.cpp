@@ -5,9 +5,6 @@
 
 #include <algorithm>
 #include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <random>
 
 #include "src/formats/byte_source.hpp"
 #include "src/formats/hdf5/hdf5_reader.hpp"
@@ -17,12 +14,7 @@
 namespace {
 
 using namespace harness;
-using eventcamera::AbsoluteEvent;
-using eventcamera::Hdf5Format;
-using eventcamera::Hdf5Reader;
-using eventcamera::Hdf5Writer;
-using eventcamera::Microseconds;
-using eventcamera::Polarity;
+using namespace eventcamera;
 using Events = std::vector<AbsoluteEvent>;
 
 constexpr int width = 320;
@@ -42,83 +34,52 @@ Events some_events() {
   return events;
 }
 
-class Folder {
- public:
-  Folder()
-      : path_(std::filesystem::temp_directory_path() /
-              ("hdf5-test-" + std::to_string(std::random_device()()))) {
-    std::filesystem::create_directories(path_);
-  }
-  ~Folder() { std::filesystem::remove_all(path_); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  std::string operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
-
 std::vector<std::uint8_t> contents(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
+  const auto text = text_in(path);
+  return {text.begin(), text.end()};
 }
 
-class Hdf5 : public testing::TestWithParam<const char*> {
- protected:
-  bool is_dsec() const { return std::string(GetParam()).starts_with("dsec"); }
-
-  std::string written(const Events& events) const {
-    const auto path = folder_ / (std::string(GetParam()) + ".h5");
-    Hdf5Writer writer(path, {is_dsec() ? Hdf5Format::dsec : Hdf5Format::metavision,
-                             Hdf5Writer::Compression::gzip,
-                             {width, height}});
-    writer.append(events);
-    writer.close();
-    return path;
-  }
-
-  Folder folder_;
-};
-INSTANTIATE_TEST_SUITE_P(, Hdf5, testing::Values("dsec", "metavision"),
-                         [](const auto& test) { return test.param; });
-
 Events read(const std::string& path) {
-  eventcamera::MemoryBytes bytes(contents(path));
+  MemoryBytes bytes(contents(path));
   Hdf5Reader reader(bytes);
   Events events;
   while (reader.read(10'000, events) > 0) continue;
   EXPECT_EQ(reader.corruption().places, 0U) << reader.corruption().first;
-  EXPECT_EQ(reader.size(), (eventcamera::SensorSize{width, height}));
+  EXPECT_EQ(reader.size(), (SensorSize{width, height}));
   return events;
 }
 
-TEST_P(Hdf5, IsWritten) {
+TEST(Hdf5Elements, WriteWhatTheyRead) {
   const auto events = some_events();
-  const auto path = folder_ / "out.h5";
-  Player player("filesrc location=" + in_quotes(written(events)) +
-                " ! eventhdf5dec ! tee name=t  t. ! queue ! eventhdf5sink format=" + GetParam() +
-                " location=" + in_quotes(path) + "  t. ! queue");
-  ASSERT_TRUE(player.play()) << player.error;
-  // The file is complete at the end of the stream, not only after the stop.
-  EXPECT_TRUE(read(path) == events);
-  // Again, overwriting the existing file.
-  for (const auto state : {GST_STATE_READY, GST_STATE_NULL}) {
-    ASSERT_TRUE(player.reaches(state));
-    std::ofstream(path, std::ios::trunc) << "of another program";
-    ASSERT_TRUE(player.play()) << player.error;
-    EXPECT_TRUE(read(path) == events);
+  for (const auto& [name, format] :
+       {std::pair{"dsec", Hdf5Format::dsec}, {"metavision", Hdf5Format::metavision}}) {
+    const TemporaryFolder folder;
+    const auto in = folder / "in.h5";
+    const auto out = folder / "out.h5";
+    Hdf5Writer writer(in, {format, Hdf5Writer::Compression::gzip, {width, height}});
+    writer.append(events);
+    writer.close();
+    Player player("filesrc location=" + in_quotes(in) +
+                  " ! eventhdf5dec ! tee name=t  t. ! queue ! eventhdf5sink format=" + name +
+                  " location=" + in_quotes(out) + "  t. ! queue");
+    // The file is complete at the end of the stream, and again where another one is overwritten.
+    for (const auto state : {GST_STATE_READY, GST_STATE_NULL, GST_STATE_NULL}) {
+      ASSERT_TRUE(player.play()) << player.error;
+      EXPECT_TRUE(read(out) == events) << name;
+      ASSERT_TRUE(player.reaches(state));
+      std::ofstream(out, std::ios::trunc) << "of another program";
+    }
   }
 }
 
 /// Through EVT words and back.
 TEST(Hdf5Elements, KeepTriggers) {
-  using eventcamera::Trigger;
+  using namespace eventcamera;
   const auto events = some_events();
   const std::vector<Trigger> triggers{{events.front().t - 1'500, 1, true},
                                       {events[777].t, 7, false},
                                       {events.back().t + 7'000, 0, false}};
-  const Folder folder;
+  const TemporaryFolder folder;
   const auto in = folder / "in.hdf5";
   const auto out = folder / "out.hdf5";
   Hdf5Writer writer(in, {Hdf5Format::metavision, Hdf5Writer::Compression::none, {width, height}});
@@ -132,150 +93,125 @@ TEST(Hdf5Elements, KeepTriggers) {
   ASSERT_TRUE(player.play()) << player.error;
   EXPECT_TRUE(read(out) == events);
   std::vector<Trigger> found;
-  eventcamera::MemoryBytes bytes(contents(out));
+  MemoryBytes bytes(contents(out));
   Hdf5Reader reader(bytes);
   while (reader.read_triggers(1000, found) > 0) continue;
   EXPECT_EQ(found, triggers);
   EXPECT_EQ(player.stat("out", "triggers"), triggers.size());
 }
 
-/// Sink fed by the test.
+/// A sink fed by the test.
 struct Sink : Harness {
-  explicit Sink(const std::string& launch) : Harness(launch) {}
+  explicit Sink(const std::string& path, const std::string& settings = "")
+      : Harness("eventhdf5sink " + settings + " location=" + in_quotes(path)) {
+    gst_harness_set_src_caps_str(get(), events_caps);
+  }
 
-  void caps(const char* caps) { gst_harness_set_src_caps_str(get(), caps); }
   GstFlowReturn push(const Events& events, Microseconds start) {
     return Harness::push(buffer_of(events, start));
   }
-  void end() { gst_harness_push_event(get(), gst_event_new_eos()); }
 };
 
-TEST_P(Hdf5, IsWrittenToAnotherFileAfterAStop) {
-  const auto first = folder_ / "first.h5";
-  const auto second = folder_ / "second.h5";
-  Sink sink("eventhdf5sink format=" + std::string(GetParam()) + " location=" + in_quotes(first));
-  sink.caps(events_caps);
-  const auto late = AbsoluteEvent::at(5, 5, 1'000'000, Polarity::on);
-  const auto early = AbsoluteEvent::at(6, 6, 1003, Polarity::off);
+class Hdf5Sink : public testing::Test {
+ protected:
+  const AbsoluteEvent late = on_at(5, 5, 1'000'000);
+  const AbsoluteEvent early = off_at(6, 6, 1003);
+  const TemporaryFolder folder;
+  const std::string path = folder / "out.h5";
+};
+
+TEST_F(Hdf5Sink, WritesToAnotherFileAfterAStop) {
+  const auto second = folder / "second.h5";
+  Sink sink(path);
   EXPECT_EQ(sink.push({late}, 1'000'000), GST_FLOW_OK);
-  const Owned<GstElement> element(gst_harness_find_element(sink.get(), "eventhdf5sink"));
-  ASSERT_EQ(gst_element_set_state(element.get(), GST_STATE_READY), GST_STATE_CHANGE_SUCCESS);
-  EXPECT_TRUE(read(first) == Events{late});
-  g_object_set(element.get(), "location", second.c_str(), nullptr);
-  gst_element_set_state(element.get(), GST_STATE_PLAYING);
-  sink.caps(events_caps);
+  ASSERT_EQ(gst_element_set_state(sink.element(), GST_STATE_READY), GST_STATE_CHANGE_SUCCESS);
+  EXPECT_TRUE(read(path) == Events{late});
+  g_object_set(sink.element(), "location", second.c_str(), nullptr);
+  gst_element_set_state(sink.element(), GST_STATE_PLAYING);
+  gst_harness_set_src_caps_str(sink.get(), events_caps);
   EXPECT_EQ(sink.push({early}, 0), GST_FLOW_OK);
-  sink.end();
-  EXPECT_EQ(sink.warning(), "");
-  EXPECT_EQ(sink.error(), "");
-  EXPECT_TRUE(read(first) == Events{late});
+  push_eos(sink.get());
+  EXPECT_EQ(sink.warning() + sink.error(), "");
+  EXPECT_TRUE(read(path) == Events{late});
   EXPECT_TRUE(read(second) == Events{early});
 }
 
-TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
-  const auto path = folder_ / "out.h5";
-  Sink sink("eventhdf5sink format=" + std::string(GetParam()) + " location=" + in_quotes(path));
-  sink.caps(events_caps);
-  const Events events = {AbsoluteEvent::at(5, 5, 1000, Polarity::on),
-                         AbsoluteEvent::at(width, 5, 1001, Polarity::on),
-                         AbsoluteEvent::at(5, height, 1002, Polarity::on),
-                         AbsoluteEvent::at(6, 6, 1003, Polarity::off)};
+TEST_F(Hdf5Sink, LeavesOutWhatItCannotWrite) {
+  Sink sink(path);
+  const Events events = {on_at(5, 5, 1000), on_at(width, 5, 1001), on_at(5, height, 1002), early};
   EXPECT_EQ(sink.push(events, 0), GST_FLOW_OK);
   EXPECT_TRUE(sink.warning().starts_with("Dropped 2 events outside"));
-  // Time goes backwards.
-  EXPECT_EQ(sink.push({events[0]}, 0), GST_FLOW_OK);
+  EXPECT_EQ(sink.push({events[0]}, 0), GST_FLOW_OK);  // time goes back
   EXPECT_EQ(sink.warning(), "");
-  sink.end();
+  push_eos(sink.get());
   EXPECT_TRUE(sink.warning().starts_with("Dropped 1 event earlier"));
-  EXPECT_EQ(sink.warning(), "");
-  EXPECT_EQ(sink.error(), "");
-  EXPECT_TRUE(read(path) == (Events{events[0], events[3]}));
+  EXPECT_EQ(sink.warning() + sink.error(), "");
+  EXPECT_TRUE(read(path) == (Events{events[0], early}));
 }
 
-TEST_P(Hdf5, IsWrittenAnewAfterAFlush) {
-  const auto path = folder_ / "out.h5";
-  Sink sink("eventhdf5sink format=" + std::string(GetParam()) + " location=" + in_quotes(path));
-  sink.caps(events_caps);
-  const auto late = AbsoluteEvent::at(5, 5, 1'000'000, Polarity::on);
-  const auto early = AbsoluteEvent::at(6, 6, 1003, Polarity::off);
+TEST_F(Hdf5Sink, WritesAnewAfterAFlush) {
+  Sink sink(path);
   for (const bool ended : {false, true}) {
     EXPECT_EQ(sink.push({late}, 1'000'000), GST_FLOW_OK);
-    if (ended) sink.end();
+    if (ended) push_eos(sink.get());
     flush({sink.get()});
     push_segment(sink.get());
   }
   EXPECT_EQ(sink.push({early}, 0), GST_FLOW_OK);
-  sink.end();
-  EXPECT_EQ(sink.warning(), "");
-  EXPECT_EQ(sink.error(), "");
+  push_eos(sink.get());
+  EXPECT_EQ(sink.warning() + sink.error(), "");
   EXPECT_TRUE(read(path) == Events{early});
 }
 
-TEST_P(Hdf5, IsOfOneSize) {
-  Sink sink("eventhdf5sink format=" + std::string(GetParam()) +
-            " location=" + in_quotes(folder_ / "out.h5"));
-  sink.caps("application/x-event-camera, format=XYTP, width=64, height=48, framerate=0/1");
-  sink.caps(events_caps);  // nothing is written yet
-  EXPECT_EQ(sink.push({AbsoluteEvent::at(200, 5, 0, Polarity::on)}, 0), GST_FLOW_OK);
-  sink.caps("application/x-event-camera, format=XYTP, width=320, height=240, framerate=30/1");
+TEST_F(Hdf5Sink, KeepsTheSizeOfTheSensor) {
+  Sink sink(path);
+  const auto small = "application/x-event-camera, format=XYTP, width=64, height=48, framerate=0/1";
+  push_caps(sink.get(), small);
+  push_caps(sink.get(), events_caps);  // nothing is written yet
+  EXPECT_EQ(sink.push({on_at(200, 5, 0)}, 0), GST_FLOW_OK);
+  push_caps(sink.get(),
+            "application/x-event-camera, format=XYTP, width=320, height=240, framerate=30/1");
   EXPECT_EQ(sink.error(), "");
-  gst_harness_push_event(
-      sink.get(),
-      gst_event_new_caps(
-          Owned<GstCaps>(gst_caps_from_string("application/x-event-camera, format=XYTP, width=64, "
-                                              "height=48, framerate=30/1"))
-              .get()));
-  EXPECT_NE(sink.error().find("The sensor size changes"), std::string::npos);
+  push_caps(sink.get(), small);
+  EXPECT_TRUE(contains(sink.error(), "The sensor size changes"));
 }
 
-TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
-  const Folder folder;
-  gst_init(nullptr, nullptr);
-  {
-    Sink sink("eventhdf5sink location=/no/such/folder/out.h5");
-    sink.caps(events_caps);
-    EXPECT_NE(sink.error().find("Cannot write /no/such/folder/out.h5. Set location to"),
-              std::string::npos);
-  }
-  {
-    Sink sink("eventhdf5sink format=metavision location=" + in_quotes(folder / "out.h5"));
-    sink.caps("application/x-event-camera, format=XYTP, width=4000, height=48, framerate=0/1");
-    EXPECT_NE(sink.error().find("at most 2048 pixels"), std::string::npos);
-  }
-  {
-    Sink sink("eventhdf5sink location=" + in_quotes(folder / "out.h5"));
-    sink.caps(events_caps);
-    GstBuffer* buffer = gst_buffer_new_memdup("seven b", 7);
-    GST_BUFFER_PTS(buffer) = 0;
-    EXPECT_EQ(sink.Harness::push(buffer), GST_FLOW_ERROR);
-    EXPECT_NE(sink.error().find("partial event"), std::string::npos);
-  }
-  {
-    // As on a full disk.
-    rlimit before = {};
-    getrlimit(RLIMIT_FSIZE, &before);
-    const rlimit limit = {100'000, before.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
-    Sink sink("eventhdf5sink compression=none location=" + in_quotes(folder / "out.h5"));
-    sink.caps(events_caps);
-    while (sink.push(some_events(), 2'000'000) == GST_FLOW_OK) continue;
-    setrlimit(RLIMIT_FSIZE, &before);
-    std::signal(SIGXFSZ, handler);
-    EXPECT_TRUE(sink.error().starts_with("The disk is full"));
-  }
+TEST_F(Hdf5Sink, SaysWhatCannotBeWritten) {
+  EXPECT_TRUE(contains(Sink("/no/such/folder/out.h5").error(),
+                       "Cannot write /no/such/folder/out.h5. Set location to"));
+  Sink large(path, "format=metavision");
+  push_caps(large.get(),
+            "application/x-event-camera, format=XYTP, width=4000, height=48, framerate=0/1");
+  EXPECT_TRUE(contains(large.error(), "at most 2048 pixels"));
+
+  Sink partial(path);
+  EXPECT_EQ(partial.Harness::push(filled(7, 0, 0, GST_MSECOND)), GST_FLOW_ERROR);
+  EXPECT_TRUE(contains(partial.error(), "partial event"));
+
   const Owned<GstElement> nowhere(gst_element_factory_make("eventhdf5sink", nullptr));
   EXPECT_EQ(gst_element_set_state(nowhere.get(), GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
   gst_element_set_state(nowhere.get(), GST_STATE_NULL);
 }
 
+TEST_F(Hdf5Sink, SaysThatTheDiskIsFull) {
+  rlimit before = {};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit limit = {100'000, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &limit);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  Sink sink(path, "compression=none");
+  while (sink.push(some_events(), 2'000'000) == GST_FLOW_OK) continue;
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_TRUE(sink.error().starts_with("The disk is full"));
+}
+
 TEST(Hdf5Dec, HasAPathAndAUnit) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const auto path = folder / "events.h5";
   {
     Hdf5Writer writer(path, {Hdf5Format::dsec, Hdf5Writer::Compression::gzip, {width, height}});
-    writer.append(Events{AbsoluteEvent::at(5, 6, 0, Polarity::on),
-                         AbsoluteEvent::at(7, 8, 3007, Polarity::off)});
+    writer.append(Events{on_at(5, 6, 0), off_at(7, 8, 3007)});
     writer.close();
   }
   const auto reader = "filesrc location=" + in_quotes(path) + " ! eventhdf5dec ";
@@ -285,13 +221,11 @@ TEST(Hdf5Dec, HasAPathAndAUnit) {
   EXPECT_EQ(player.events[1].t, 3);
   Player other(reader + "events-path=right");
   EXPECT_FALSE(other.play());
-  EXPECT_NE(other.error.find("no events at events-path /right; it has some at /events"),
-            std::string::npos)
-      << other.error;
+  EXPECT_TRUE(contains(other.error, "no events at events-path /right; it has some at /events"));
 }
 
 TEST(Hdf5Dec, SaysWhatCannotBeRead) {
-  const Folder folder;
+  const TemporaryFolder folder;
   EXPECT_FALSE(
       Player("filesrc location=" + in_quotes(folder / "none.h5") + " ! eventhdf5dec").play());
   std::ofstream(folder / "text.h5") << "t,x,y,p\n";
@@ -299,7 +233,7 @@ TEST(Hdf5Dec, SaysWhatCannotBeRead) {
     Player player("filesrc location=" + in_quotes(folder / "text.h5") + " ! " + way +
                   "eventhdf5dec");
     EXPECT_FALSE(player.play());
-    EXPECT_NE(player.error.find("not an HDF5 file"), std::string::npos) << player.error;
+    EXPECT_TRUE(contains(player.error, "not an HDF5 file"));
   }
 }
 

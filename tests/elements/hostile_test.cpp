@@ -29,7 +29,7 @@ class BufferMaker {
         of_frames
             ? frame(pts, static_cast<gsize>(one_in(4) ? below(2 * width * height) : width * height))
             : events(pts, true);
-    if (of_frames && one_in(2)) add_video_meta(buffer);
+    if (of_frames && one_in(2)) add_any_video_meta(buffer);
     if (!of_frames && one_in(4))
       gst_buffer_set_size(buffer, below(static_cast<int>(gst_buffer_get_size(buffer)) + 1));
     if (one_in(3)) GST_BUFFER_PTS(buffer) = hostile_time(pts);
@@ -73,20 +73,13 @@ class BufferMaker {
   }
 
   GstBuffer* frame(GstClockTime pts, gsize size) {
-    GstBuffer* const buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
-    gst_buffer_memset(buffer, 0, static_cast<guint8>(random_()), size);
-    GST_BUFFER_PTS(buffer) = pts;
-    GST_BUFFER_DURATION(buffer) = interval;
-    return buffer;
+    return filled(size, static_cast<guint8>(random_()), pts, interval);
   }
 
-  void add_video_meta(GstBuffer* buffer) {
-    gsize offsets[GST_VIDEO_MAX_PLANES] = {static_cast<gsize>(below(100))};
-    gint strides[GST_VIDEO_MAX_PLANES] = {below(3 * width) - width};
-    gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE,
-                                   one_in(4) ? GST_VIDEO_FORMAT_NV12 : GST_VIDEO_FORMAT_GRAY8,
-                                   static_cast<guint>(1 + below(2 * width)),
-                                   static_cast<guint>(1 + below(2 * height)), 1, offsets, strides);
+  void add_any_video_meta(GstBuffer* buffer) {
+    const std::vector<Plane> planes{{static_cast<gsize>(below(100)), below(3 * width) - width}};
+    add_video_meta(buffer, one_in(4) ? GST_VIDEO_FORMAT_NV12 : GST_VIDEO_FORMAT_GRAY8,
+                   1 + below(2 * width), 1 + below(2 * height), planes);
   }
 
   std::mt19937 random_{1};  // NOLINT(bugprone-random-generator-seed): reproducible

@@ -12,6 +12,31 @@
 #include "tests/elements/event_buffer.hpp"
 #include "tests/elements/harness.hpp"
 
+/// Path of a temporary file or folder that does not exist yet.
+inline std::filesystem::path temporary_path() {
+  return std::filesystem::temp_directory_path() /
+         ("eventsim-test-" + std::to_string(std::random_device()()));
+}
+
+inline std::string text_in(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+/// A folder, deleted with this object.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() { std::filesystem::create_directories(path_); }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  std::string operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_ = temporary_path();
+};
+
 /// A file, deleted with this object.
 class TemporaryFile {
  public:
@@ -31,13 +56,12 @@ class TemporaryFile {
   std::string sink() const { return " ! filesink location=" + in_quotes(path_); }
 
   std::vector<std::uint8_t> bytes() const {
-    std::ifstream file(path_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    const auto text = text_in(path_);
+    return {text.begin(), text.end()};
   }
 
  private:
-  std::filesystem::path path_ = std::filesystem::temp_directory_path() /
-                                ("eventsim-test-" + std::to_string(std::random_device()()));
+  std::filesystem::path path_ = temporary_path();
 };
 
 class Pipeline {
@@ -79,11 +103,16 @@ class Pipeline {
     return wait();
   }
   bool wait() {
-    constexpr auto types = static_cast<GstMessageType>(
-        GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING | GST_MESSAGE_SEGMENT_DONE);
+    constexpr auto types =
+        static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING |
+                                    GST_MESSAGE_SEGMENT_DONE | GST_MESSAGE_LATENCY);
     while (const harness::Owned<GstMessage> message{
         gst_bus_timed_pop_filtered(bus_.get(), 60 * GST_SECOND, types)}) {
       end = GST_MESSAGE_TYPE(message.get());
+      if (end == GST_MESSAGE_LATENCY) {
+        gst_bin_recalculate_latency(GST_BIN(get()));
+        continue;
+      }
       if (end == GST_MESSAGE_EOS || end == GST_MESSAGE_SEGMENT_DONE) return true;
       if (end == GST_MESSAGE_ERROR) {
         error = harness::text_of(message.get());

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "src/core/image.hpp"
@@ -42,19 +43,15 @@ std::string bytes_of(const Image<Pixel>& image) {
   return bytes;
 }
 
-GstBuffer* frame_of(int i) {
+GstBuffer* frame_of(int i, const std::optional<Image<Flow>>& flow = {}) {
   const auto bytes = bytes_of(image_of(i));
   GstBuffer* buffer = gst_buffer_new_memdup(bytes.data(), bytes.size());
   GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(i) * interval;
-  return buffer;
-}
-
-GstBuffer* frame_of(int i, const Image<Flow>& flow) {
-  GstBuffer* buffer = frame_of(i);
-  const auto rows = bytes_of(flow);
-  GBytes* bytes = g_bytes_new(rows.data(), rows.size());
-  gst_buffer_add_event_camera_flow_meta(buffer, width, height, bytes);
-  g_bytes_unref(bytes);
+  if (!flow) return buffer;
+  const auto rows = bytes_of(*flow);
+  GBytes* const flow_bytes = g_bytes_new(rows.data(), rows.size());
+  gst_buffer_add_event_camera_flow_meta(buffer, width, height, flow_bytes);
+  g_bytes_unref(flow_bytes);
   return buffer;
 }
 
@@ -76,7 +73,7 @@ struct Simulator {
   FlowMethod method;
 };
 
-class EverySimulator : public testing::TestWithParam<Simulator> {
+class EveryFlowSimulator : public testing::TestWithParam<Simulator> {
  protected:
   /// The flow that the simulator finds from frame i to the next one.
   Image<Flow> own_flow(int i) {
@@ -89,14 +86,10 @@ class EverySimulator : public testing::TestWithParam<Simulator> {
   }
 
   /// Bytes of the events, where each frame has the flow that `flow_from` gives.
-  std::string events_with(const std::function<Image<Flow>(int)>& flow_from) {
+  static std::string events_with(const std::function<std::optional<Image<Flow>>(int)>& flow_from) {
     Harness h = without_upload(GetParam().launch);  // glupload drops flow
     h.caps(video);
     for (int i = 0; i < frame_count; ++i) EXPECT_EQ(h.push(frame_of(i, flow_from(i))), GST_FLOW_OK);
-    return events_of(h);
-  }
-
-  static std::string events_of(Harness& h) {
     std::string bytes;
     while (const auto buffer = h.pull()) bytes += harness::bytes_of(buffer.get());
     return bytes;
@@ -104,41 +97,37 @@ class EverySimulator : public testing::TestWithParam<Simulator> {
 
   /// Bytes of the events, where no frame has a flow.
   static std::string own_events() {
-    Harness h = without_upload(GetParam().launch);  // glupload drops flow
-    h.caps(video);
-    for (int i = 0; i < frame_count; ++i) h.push(frame_of(i));
-    return events_of(h);
+    return events_with([](int) { return std::nullopt; });
   }
 
   eventcamera::ThreadPool threads;
   eventcamera::RegionOfInterestFlow finder{GetParam().method, width, height};
 };
 INSTANTIATE_TEST_SUITE_P(
-    , EverySimulator,
+    , EveryFlowSimulator,
     testing::Values(Simulator{"eventsim-dense", 2, FlowMethod::dis_lq},
                     Simulator{"eventsim-dense interpolation=blend", 2, FlowMethod::dis_lq},
                     Simulator{"eventsim-dvs preset=ideal upsampling=motion", 0, FlowMethod::dis_mq},
                     Simulator{"gleventsim-dvs preset=ideal upsampling=motion", 0,
                               FlowMethod::dis_mq}));
 
-TEST_P(EverySimulator, UsesTheFlowOfItsFrames) {
+TEST_P(EveryFlowSimulator, UsesTheFlowOfItsFrames) {
   const auto expected = own_events();
   ASSERT_GT(expected.size(), 8000U);
   EXPECT_TRUE(events_with([&](int i) { return own_flow(i); }) == expected);
   EXPECT_FALSE(events_with([](int) { return Image<Flow>(width, height); }) == expected);
 }
 
-TEST_P(EverySimulator, FindsTheFlowOfFramesWithoutIt) {
-  Harness h = without_upload(GetParam().launch);  // glupload drops flow
-  h.caps(video);
-  for (int i = 0; i < frame_count; ++i) {
-    const auto flow = own_flow(i);  // which depends on the one before
-    h.push(i % 2 == 0 ? frame_of(i, flow) : frame_of(i));
-  }
-  EXPECT_TRUE(events_of(h) == own_events());
+TEST_P(EveryFlowSimulator, FindsTheFlowOfFramesWithoutIt) {
+  const auto flow_of_every_second = [&](int i) -> std::optional<Image<Flow>> {
+    auto flow = own_flow(i);  // which depends on the one before
+    if (i % 2 == 1) return std::nullopt;
+    return flow;
+  };
+  EXPECT_TRUE(events_with(flow_of_every_second) == own_events());
 }
 
-TEST_P(EverySimulator, TakesAnyNumbersOfFlow) {
+TEST_P(EveryFlowSimulator, TakesAnyNumbersOfFlow) {
   const float numbers[] = {std::numeric_limits<float>::quiet_NaN(),
                            std::numeric_limits<float>::infinity(),
                            -1e38F,
@@ -153,7 +142,7 @@ TEST_P(EverySimulator, TakesAnyNumbersOfFlow) {
                  return flow;
                }).empty());
   // What is not finite counts as 0.
-  const auto filled = [&](float number) {
+  const auto with_all = [&](float number) {
     return events_with([&](int) {
       Image<Flow> flow(width, height);
       for (int y = 0; y < height; ++y)
@@ -161,11 +150,11 @@ TEST_P(EverySimulator, TakesAnyNumbersOfFlow) {
       return flow;
     });
   };
-  EXPECT_TRUE(filled(numbers[0]) == filled(0));
-  EXPECT_FALSE(filled(3) == filled(0));
+  EXPECT_TRUE(with_all(numbers[0]) == with_all(0));
+  EXPECT_FALSE(with_all(3) == with_all(0));
 }
 
-TEST_P(EverySimulator, WritesTheFlowOfEachInterval) {
+TEST_P(EveryFlowSimulator, WritesTheFlowOfEachInterval) {
   Harness h = without_upload(GetParam().launch + std::string(" write-flow=true"));
   h.caps(video);
   for (int i = 0; i < frame_count; ++i) h.push(frame_of(i));
@@ -199,9 +188,7 @@ TEST(FlowOfFrames, MustHaveTheirSize) {
   Harness h("eventsim-dense");
   h.caps("video/x-raw, format=GRAY8, width=64, height=96, framerate=25/1");
   EXPECT_EQ(h.push(frame_of(0, Image<Flow>(width, height))), GST_FLOW_ERROR);
-  EXPECT_EQ(h.error(),
-            "The optical flow of a frame has 96x64 pixels, and the video has 64x96. Add the flow "
-            "after the video is scaled or cropped.");
+  EXPECT_TRUE(contains(h.error(), "Add the flow after the video is scaled or cropped"));
 }
 
 TEST(FlowOfFrames, IsNotWrittenWhereNoneIsNeeded) {

@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Behaviour under stream changes: caps, memory, load.
+// Behaviour under stream changes, and the memory of output buffers.
+#include <new>
+#include <set>
+#include <tuple>
+
+#include "gst/base/buffer_bytes.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -11,46 +16,19 @@ std::string video(int width, int height, const char* format = "GRAY8", int fps =
          ", height=" + std::to_string(height) + ", framerate=" + std::to_string(fps) + "/1";
 }
 
-/// A bright square that moves to the right.
-int moving_square(int x, int y, int frame) {
-  return x >= 4 + 3 * frame && x < 14 + 3 * frame && y >= 6 && y < 16 ? 220 : 40 + (x * 7 + y) % 9;
-}
-
-std::vector<std::string> intervals(Harness& h, int frames, int padding = 0) {
-  std::vector<std::string> bytes;
-  for (int i = 0; i < frames; ++i) {
-    EXPECT_EQ(
-        h.push(h.frame(
-            i * 40 * GST_MSECOND, [i](int x, int y) { return moving_square(x, y, i); }, padding)),
-        GST_FLOW_OK);
-    if (const auto buffer = h.pull()) bytes.push_back(bytes_of(buffer.get()));
-  }
-  return bytes;
-}
-
 /// True for elements with per-pixel thresholds and individual event times.
 bool is_physical(const std::string& element) {
   return element.ends_with("eventsim-dvs");
 }
 
-class EverySimulator : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(, EverySimulator, testing::ValuesIn(simulators));
-
-TEST_P(EverySimulator, GivesTheSameBytesForAnyStrideAndNumberOfThreads) {
-  Harness h(GetParam());
-  h.caps(video(61, 43));
-  const auto expected = intervals(h, 4);
-  ASSERT_EQ(expected.size(), 3U);
-  Harness padded(std::string(GetParam()) + " n-threads=1");
-  padded.caps(video(61, 43));
-  // GStreamer 1.22 uploads rows of whole words only.
-  EXPECT_EQ(intervals(padded, 4, is_on_gpu(GetParam()) ? 20 : 19), expected);
-}
 
 TEST_P(EverySimulator, BeginsAnewWhenTheSizeChanges) {
   Harness h(GetParam());
   h.caps(video(61, 43));
-  ASSERT_EQ(intervals(h, 4).size(), 3U);
+  h.push(h.flat(80 * GST_MSECOND, 10));
+  h.push(h.flat(120 * GST_MSECOND, 210));
+  EXPECT_TRUE(h.pull());
   h.caps(video(33, 29));
   h.push(h.flat(160 * GST_MSECOND, 10));
   EXPECT_FALSE(h.pull());
@@ -63,7 +41,7 @@ TEST_P(EverySimulator, BeginsAnewWhenTheSizeChanges) {
   // A pixel with a reference level fires at each threshold it passes.
   const std::size_t each = is_physical(GetParam()) ? 8 : 1;
   EXPECT_EQ(events.size(), each * 33U * 29U);
-  EXPECT_NE(h.out_caps().find("width=(int)33"), std::string::npos);
+  EXPECT_TRUE(contains(h.out_caps(), "width=(int)33"));
 }
 
 TEST_P(EverySimulator, LosesNoIntervalWhenOnlyTheFormatOrTheFramerateChanges) {
@@ -101,14 +79,8 @@ TEST_P(EverySimulator, SwitchesFromEventsToVideoWithoutLosingAnInterval) {
 GstFlowReturn push_with_meta(const char* format, int stride, gsize offset, gsize size) {
   Harness h("eventsim-frame");
   h.caps(video(320, 240, format));
-  GstBuffer* buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
-  gst_buffer_memset(buffer, 0, 100, size);
-  GST_BUFFER_PTS(buffer) = 0;
-  gsize offsets[GST_VIDEO_MAX_PLANES] = {offset};
-  gint strides[GST_VIDEO_MAX_PLANES] = {stride};
-  gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE,
-                                 gst_video_format_from_string(format), 320, 240, 1, offsets,
-                                 strides);
+  GstBuffer* buffer = filled(size, 100, 0, GST_CLOCK_TIME_NONE);
+  add_video_meta(buffer, gst_video_format_from_string(format), 320, 240, {{offset, stride}});
   const GstFlowReturn flow = h.push(buffer);
   EXPECT_EQ(flow != GST_FLOW_OK, h.message(GST_MESSAGE_ERROR) != nullptr);
   return flow;
@@ -129,22 +101,21 @@ TEST(Stream, RefusesMetasThatLie) {
 TEST(Stream, RefusesFramesSmallerThanTheirCaps) {
   struct Meta {
     GstVideoFormat format;
-    guint width;
-    guint planes;
+    int width;
+    std::vector<Plane> planes;
     const char* error;
   };
-  for (const auto& meta : {Meta{GST_VIDEO_FORMAT_NV12, 60, 2, "NV12 of 60x44 pixels"},
-                           Meta{GST_VIDEO_FORMAT_GRAY8, 62, 1, "GRAY8 of 62x44 pixels"},
-                           Meta{GST_VIDEO_FORMAT_NV12, 62, 1, "NV12 of 62x44 pixels"}}) {
+  const std::vector<Plane> one_plane{{0, 62}};
+  const std::vector<Plane> two_planes{{0, 62}, {gsize{62} * 44, 62}};
+  for (const auto& meta : {Meta{GST_VIDEO_FORMAT_NV12, 60, two_planes, "NV12 of 60x44 pixels"},
+                           Meta{GST_VIDEO_FORMAT_GRAY8, 62, one_plane, "GRAY8 of 62x44 pixels"},
+                           Meta{GST_VIDEO_FORMAT_NV12, 62, one_plane, "NV12 of 62x44 pixels"}}) {
     Harness h("eventsim-frame");
     h.caps(video(62, 44, "NV12"));
     GstBuffer* buffer = h.flat(0, 100);
-    gsize offsets[GST_VIDEO_MAX_PLANES] = {0, 62 * 44};
-    gint strides[GST_VIDEO_MAX_PLANES] = {62, 62};
-    gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, meta.format, meta.width, 44,
-                                   meta.planes, offsets, strides);
+    add_video_meta(buffer, meta.format, meta.width, 44, meta.planes);
     EXPECT_EQ(h.push(buffer), GST_FLOW_ERROR);
-    EXPECT_NE(h.error().find(meta.error), std::string::npos);
+    EXPECT_TRUE(contains(h.error(), meta.error));
   }
 }
 
@@ -211,7 +182,7 @@ TEST(Stream, WarnsOnceOfInterlacedVideo) {
   h.caps(video(61, 43, "I420") + ", interlace-mode=interleaved");
   h.push(h.flat(0, 50));
   h.push(h.flat(40 * GST_MSECOND, 50));
-  EXPECT_NE(h.warning().find("deinterlace"), std::string::npos);
+  EXPECT_TRUE(contains(h.warning(), "deinterlace"));
   EXPECT_EQ(h.warning(), "");
 }
 
@@ -227,7 +198,7 @@ TEST(Stream, WarnsOnceOfRotatedVideo) {
   EXPECT_EQ(h.warning(), "");
   push_orientation(h, "rotate-90");
   push_orientation(h, "rotate-180");
-  EXPECT_NE(h.warning().find("videoflip video-direction=auto"), std::string::npos);
+  EXPECT_TRUE(contains(h.warning(), "videoflip video-direction=auto"));
   EXPECT_EQ(h.warning(), "");
 }
 
@@ -240,60 +211,132 @@ TEST(Stream, WarnsOfAFileWithoutTheTimesOfBuffers) {
   }
 }
 
-TEST(EventCamera, MapsEventsAtAnyAddress) {
-  gst_init(nullptr, nullptr);
-  const guint8 bytes[] = {0, 1, 0, 0, 0, 2, 0, 3, 0x80};
-  GstBuffer* whole = gst_buffer_new_memdup(bytes, sizeof bytes);
-  GstBuffer* odd = gst_buffer_copy_region(whole, GST_BUFFER_COPY_MEMORY, 1, 8);
-  GST_BUFFER_PTS(odd) = 5 * GST_MSECOND + 999;
-  GstEventCameraMap map;
-  ASSERT_TRUE(gst_event_camera_map(&map, odd));
-  ASSERT_EQ(map.n_events, 1U);
-  EXPECT_EQ(map.start, 5000U);
-  EXPECT_EQ(GPOINTER_TO_SIZE(map.events) % alignof(GstEventCameraEvent), 0U);
-  EXPECT_EQ(map.events[0].t, 1U);
-  EXPECT_EQ(map.events[0].x, 2);
-  EXPECT_EQ(gst_event_camera_event_get_y(&map.events[0]), 3U);
-  EXPECT_TRUE(gst_event_camera_event_is_on(&map.events[0]));
-  gst_event_camera_unmap(&map);
-  gst_buffer_set_size(odd, 7);
-  EXPECT_FALSE(gst_event_camera_map(&map, odd));  // partial event
-  gst_buffer_unref(odd);
-  GST_BUFFER_PTS(whole) = GST_CLOCK_TIME_NONE;
-  gst_buffer_set_size(whole, 8);
-  EXPECT_FALSE(gst_event_camera_map(&map, whole));  // no time
-  gst_buffer_unref(whole);
+/* buffers */
+
+/// An element, and whether it draws.
+class EveryOutput : public testing::TestWithParam<std::tuple<const char*, bool>> {};
+INSTANTIATE_TEST_SUITE_P(, EveryOutput,
+                         testing::Combine(testing::ValuesIn(simulators), testing::Bool()));
+
+TEST_P(EveryOutput, ComesFromAPool) {
+  const auto& [element, draws] = GetParam();
+  Harness h(element);
+  h.caps("video/x-raw, format=GRAY8, width=64, height=48, framerate=25/1",
+         draws ? pictures_of(element) : GST_EVENT_CAMERA_MEDIA_TYPE);
+  std::set<GstBuffer*> buffers;
+  for (int i = 0; i < 10; ++i) {
+    h.push(h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, i % 2 == 0 ? 50 : 200));
+    const auto buffer = h.pull();
+    ASSERT_EQ(buffer != nullptr, draws || i > 0);
+    if (!buffer) continue;
+    EXPECT_NE(buffer->pool, nullptr);
+    buffers.insert(buffer.get());
+  }
+  EXPECT_LE(buffers.size(), 2U);
 }
 
-TEST(EventCamera, ReadsAndWritesCaps) {
+/// Frames in which a given number of rows changes.
+class Rows {
+ public:
+  explicit Rows(Harness& h) : h_(h) {}
+
+  /// Pushes a frame and returns the output.
+  Buffer change(gsize rows) {
+    for (gsize y = 0; y < rows; ++y) bright_[y] = !bright_[y];
+    GstBuffer* const frame = gst_buffer_new_allocate(nullptr, size * size, nullptr);
+    for (gsize y = 0; y < size; ++y)
+      gst_buffer_memset(frame, y * size, bright_[y] ? 200 : 50, size);
+    GST_BUFFER_PTS(frame) = 40 * GST_MSECOND * count_++;
+    EXPECT_EQ(h_.push(frame), GST_FLOW_OK);
+    return h_.pull();
+  }
+
+ private:
+  static constexpr gsize size = 1000;
+
+  Harness& h_;
+  bool bright_[size] = {};
+  GstClockTime count_ = 0;
+};
+
+gsize room_of(const Buffer& buffer) {
+  gsize room = 0;
+  gst_buffer_get_sizes(buffer.get(), nullptr, &room);
+  return room;
+}
+
+constexpr const char* large_video =
+    "video/x-raw, format=GRAY8, width=1000, height=1000, framerate=25/1";
+
+/// A buffer that returns to its pool must not be mapped.
+TEST(WritableBytes, AreUnmappedByAnException) {
   gst_init(nullptr, nullptr);
-  const auto read = [](const char* text, GstEventCameraInfo* info) {
-    Owned<GstCaps> caps(gst_caps_from_string(text));
-    return gst_event_camera_info_from_caps(info, caps.get()) == TRUE;
+  const Buffer buffer(gst_buffer_new_allocate(nullptr, 16, nullptr));
+  // Unlike gst_buffer_map(), this does not map a copy instead.
+  const auto can_be_read = [memory = gst_buffer_peek_memory(buffer.get(), 0)] {
+    GstMapInfo map;
+    if (!gst_memory_map(memory, &map, GST_MAP_READ)) return false;
+    gst_memory_unmap(memory, &map);
+    return true;
   };
-  GstEventCameraInfo info;
-  ASSERT_TRUE(
-      read("application/x-event-camera,format=XYTP,width=640,height=480,framerate=30/1", &info));
-  EXPECT_EQ(info.width, 640);
-  EXPECT_EQ(info.height, 480);
-  EXPECT_EQ(info.fps_n, 30);
-  Owned<GstCaps> caps(gst_event_camera_info_to_caps(&info));
-  GstEventCameraInfo back;
-  ASSERT_TRUE(gst_event_camera_info_from_caps(&back, caps.get()));
-  EXPECT_EQ(back.height, 480);
-  info.fps_d = 0;
-  caps.reset(gst_event_camera_info_to_caps(&info));
-  ASSERT_TRUE(gst_event_camera_info_from_caps(&back, caps.get()));
-  EXPECT_EQ(back.fps_n, 0);
-  EXPECT_EQ(back.fps_d, 1);
-  EXPECT_TRUE(read("application/x-event-camera,format=XYTP,width=1,height=1", &info));
-  EXPECT_EQ(info.fps_n, 0);
-  EXPECT_EQ(info.fps_d, 1);
-  EXPECT_FALSE(read("application/x-event-camera,format=EVT3,width=640,height=480", &info));
-  EXPECT_FALSE(read("application/x-event-camera,format=XYTP,width=640", &info));
-  EXPECT_FALSE(read("application/x-event-camera,format=XYTP,width=0,height=480", &info));
-  EXPECT_FALSE(read("application/x-event-camera,format=XYTP,width=1,height=32769", &info));
-  EXPECT_FALSE(read("video/x-raw,format=GRAY8,width=640,height=480", &info));
+  try {
+    const WritableBytes mapped(buffer.get());
+    EXPECT_EQ(mapped.events().size(), 2U);
+    EXPECT_FALSE(can_be_read());
+    throw std::bad_alloc();
+  } catch (const std::bad_alloc&) {
+    EXPECT_TRUE(can_be_read());
+  }
+}
+
+TEST(EventBuffers, AreAsLongAsTheirEvents) {
+  Harness h("eventsim-frame");
+  h.caps(large_video);
+  Rows rows(h);
+  EXPECT_FALSE(rows.change(0));
+  for (const gsize count : {1, 3, 1000, 2, 999, 1}) {
+    const auto buffer = rows.change(count);
+    ASSERT_TRUE(buffer);
+    const auto events = events_of(buffer.get());
+    ASSERT_EQ(events.size(), count * 1000);
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      ASSERT_EQ(events[i].x, i % 1000);
+      ASSERT_EQ(gst_event_camera_event_get_y(&events[i]), i / 1000);
+    }
+  }
+}
+
+TEST(EventBuffers, GiveBackTheMemoryOfOneExtremeFrame) {
+  Harness h("eventsim-frame");
+  h.caps(large_video);
+  Rows rows(h);
+  rows.change(0);
+  EXPECT_GE(room_of(rows.change(1000)), 8'000'000U);
+  EXPECT_GE(room_of(rows.change(1)), 8'000'000U);  // it may be needed again
+  gsize room = 0;
+  for (int i = 0; i < 300; ++i) room = room_of(rows.change(1));
+  EXPECT_LE(room, 300'000U);
+}
+
+TEST(EventBuffers, AreNotKeptWithoutBound) {
+  Harness h("eventsim-frame");
+  h.caps(large_video);
+  Rows rows(h);
+  rows.change(0);
+  const GQuark seen = g_quark_from_static_string("seen by the test");
+  std::vector<Buffer> held;
+  for (int i = 0; i < 30; ++i) {
+    held.push_back(rows.change(1000));
+    gst_mini_object_set_qdata(GST_MINI_OBJECT(held.back().get()), seen, &held, nullptr);
+  }
+  held.clear();
+  int kept = 0;
+  for (int i = 0; i < 30; ++i) {
+    held.push_back(rows.change(1000));
+    kept += gst_mini_object_get_qdata(GST_MINI_OBJECT(held.back().get()), seen) != nullptr;
+  }
+  EXPECT_GE(kept, 2);
+  EXPECT_LE(kept, 8);
 }
 
 }  // namespace

@@ -134,7 +134,6 @@ TEST(EventMerge, SortsAllEventsWhereverTheStreamsAreCut) {
   }
 }
 
-/// Loads events at these times of [start, end].
 void load(MergeInput& input, const std::vector<std::uint32_t>& times, Microseconds start,
           Microseconds end) {
   std::vector<Event> events;

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Writes ROS bags from the specifications of their formats, without this project's code:
-  bag_files.py DIRECTORY
-The events are in events.bin (int64 t, uint16 x, y, p), the frames in frames.bin (int64 t, uint8
-value of all pixels).
+  bag_files.py DIRECTORY [many]
+The events are in events.lines (t x y p), the frames in frames.lines (t and the value of all pixels).
+many.db3 has a message 200,000 times.
 
 mcap.dev/spec; wiki.ros.org/Bags/Format/2.0; github.com/ros2/rosbag2 (rosbag2_storage_sqlite3)."""
 import bz2
@@ -327,9 +327,10 @@ def write_bag(path, all_messages, topics, compression="none", index=True):
 
 # ROS 2 with SQLite
 
-def write_db3(path, all_messages, topics):
+def write_db3(path, all_messages, topics, page_size=4096):
     path.unlink(missing_ok=True)
     database = sqlite3.connect(path)
+    database.execute(f"PRAGMA page_size = {page_size}")
     database.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, "
                      "serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)")
     database.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, "
@@ -338,20 +339,16 @@ def write_db3(path, all_messages, topics):
     for number, (name, kind) in enumerate(topics.items()):
         database.execute("INSERT INTO topics VALUES (?, ?, ?, 'cdr', '')", (number + 1, name, kind.replace("/", "/msg/")))
     numbers = {name: number + 1 for number, name in enumerate(topics)}
-    for name, t, content in all_messages:
-        database.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", (numbers[name], t * 1000, content))
+    database.executemany("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)",
+                         ((numbers[name], t * 1000, content) for name, t, content in all_messages))
     database.commit()
     database.close()
 
 
 def main():
     folder = Path(sys.argv[1])
-    with open(folder / "events.bin", "wb") as file:
-        for event in EVENTS:
-            file.write(struct.pack("<qHHH", *event))
-    with open(folder / "frames.bin", "wb") as file:
-        for frame in FRAMES:
-            file.write(struct.pack("<qB", *frame))
+    for name, rows in ("events", EVENTS), ("frames", FRAMES):
+        (folder / f"{name}.lines").write_text("".join(" ".join(map(str, row)) + "\n" for row in rows))
     for name, kind, encoding, image in [("evt3", "packet", "evt3", "mono8"), ("mono", "packet", "mono", "rgb8"),
                                         ("libcaer", "packet", "libcaer", "mono8"),
                                         ("libcaer_cmp", "packet", "libcaer_cmp", "mono8"),
@@ -375,6 +372,11 @@ def main():
     write_bag(folder / "prophesee-bz2.bag", ros1, topics, "bz2")
     write_bag(folder / "prophesee-lz4.bag", ros1, topics, "lz4")
     write_bag(folder / "prophesee-no-index.bag", ros1, topics, "lz4", index=False)
+    if sys.argv[2:] == ["many"]:
+        fields = Cdr()
+        array_of(fields, EVENTS[:1])
+        message = ("/camera/events", START, fields.message())
+        write_db3(folder / "many.db3", [message] * 200_000, {"/camera/events": EVENT_TYPES["array"]})
 
 
 if __name__ == "__main__":

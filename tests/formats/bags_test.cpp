@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -20,59 +21,29 @@
 
 #include "src/core/byte_order.hpp"
 #include "src/formats/compression/compressed_frames.hpp"
-#include "src/formats/ros/bag_decoder.hpp"
 #include "src/formats/ros/mcap_encoder.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
-#include "tests/formats/rosbags.hpp"
 
 namespace {
 
 using namespace eventcamera;
 using recordings::Bytes;
+using recordings::decode;
 
-struct Picture {
-  Microseconds t;
-  std::uint8_t value;  ///< of the first and the last pixel
+/// Time of a frame, and the value of its first and its last pixel.
+using TimedValue = std::pair<Microseconds, std::uint8_t>;
 
-  friend bool operator==(const Picture&, const Picture&) = default;
-};
-
-/// Complete output of a decoder.
-struct Contents {
-  std::vector<AbsoluteEvent> events;
-  std::vector<Picture> frames;
-  std::vector<Trigger> triggers;
-};
-
-void take(Decoder& decoder, Contents& out) {
-  while (const auto item = decoder.next()) {
-    if (const auto* events = std::get_if<EventItem>(&*item)) {
-      out.events.insert(out.events.end(), events->events.begin(), events->events.end());
-    } else if (const auto* picture = std::get_if<FrameItem>(&*item)) {
-      const auto& frame = picture->frame;
-      const auto* const last = frame.pixels + (frame.height - 1) * frame.stride +
-                               (frame.width - 1) * bytes_per_pixel(frame.format);
-      const int red = frame.format == PixelFormat::bgr ? 2 : 0;
-      ASSERT_EQ(frame.pixels[red], last[red]);
-      out.frames.push_back({frame.t, last[red]});
-    } else if (const auto* triggers = std::get_if<TriggerItem>(&*item)) {
-      out.triggers.insert(out.triggers.end(), triggers->triggers.begin(), triggers->triggers.end());
-    }
+std::vector<TimedValue> values_of(const std::vector<recordings::Picture>& pictures) {
+  std::vector<TimedValue> values;
+  for (const auto& [frame, pixels] : pictures) {
+    const auto* const first = pixels.data() + (frame.format == PixelFormat::bgr ? 2 : 0);
+    const auto* const last = first + (frame.height - 1) * frame.stride +
+                             (frame.width - 1) * bytes_per_pixel(frame.format);
+    EXPECT_EQ(*first, *last);
+    values.emplace_back(frame.t, *last);
   }
-}
-
-/// Pushes a bag in pieces, which are invalid once they have been read.
-Contents decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
-                 std::size_t piece = SIZE_MAX) {
-  Contents contents;
-  for (const auto part : recordings::pieces_of(bytes, piece)) {
-    const Bytes copy(part.begin(), part.end());
-    decoder.push(copy);
-    take(decoder, contents);
-  }
-  decoder.drain();
-  take(decoder, contents);
-  return contents;
+  return values;
 }
 
 /// What the decoder says of a bag that it cannot read, which must take less than a second.
@@ -80,10 +51,10 @@ std::string refusal_of(const Bytes& bytes, const std::string& topics = "") {
   const auto start = std::chrono::steady_clock::now();
   std::string refusal;
   MemoryBytes source(bytes);
-  BagDecoder decoder(topics);
+  const auto decoder = make_bag_decoder(topics);
   try {
-    const bool reads_itself = decoder.open(source);
-    decoded(decoder, reads_itself ? std::span<const std::uint8_t>() : bytes);
+    const bool reads_itself = decoder->open(source);
+    decode(*decoder, reads_itself ? std::span<const std::uint8_t>() : bytes);
   } catch (const UnsupportedFormat& error) {
     refusal = error.what();
   }
@@ -96,49 +67,38 @@ Bytes bytes_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-template <class Number>
-Number take_number(std::span<const std::uint8_t>& bytes) {
-  const auto number = little_endian<Number>(bytes.data());
-  bytes = bytes.subspan(sizeof number);
-  return number;
-}
-
 /// The files of bag_files.py.
 class Bags : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder = std::filesystem::temp_directory_path() / ("bags-" + std::to_string(getpid()));
     std::filesystem::create_directory(folder);
-    const auto command = std::string("/usr/bin/python3 '" BAG_FILES "' '") + folder.string() + "'";
+    const auto command =
+        std::string("/usr/bin/python3 '" BAG_FILES "' '") + folder.string() + "' many";
     ASSERT_EQ(std::system(command.c_str()), 0);  // NOLINT(cert-env33-c)
-    const auto event_bytes = bytes_of(folder / "events.bin");
-    for (std::span<const std::uint8_t> rest = event_bytes; !rest.empty();) {
-      const auto t = take_number<std::int64_t>(rest);
-      const auto x = take_number<std::uint16_t>(rest);
-      const auto y = take_number<std::uint16_t>(rest);
-      const auto p = take_number<std::uint16_t>(rest);
-      expected.events.push_back(AbsoluteEvent::at(x, y, t, static_cast<Polarity>(p)));
-    }
-    const auto frame_bytes = bytes_of(folder / "frames.bin");
-    for (std::span<const std::uint8_t> rest = frame_bytes; !rest.empty();) {
-      const auto t = take_number<std::int64_t>(rest);
-      expected.frames.push_back({t, take_number<std::uint8_t>(rest)});
-    }
-    ASSERT_EQ(expected.events.size(), 6000U);
+    std::ifstream event_lines(folder / "events.lines");
+    Microseconds t = 0;
+    for (int x = 0, y = 0, p = 0; event_lines >> t >> x >> y >> p;)
+      events.push_back(AbsoluteEvent::at(x, y, t, static_cast<Polarity>(p)));
+    std::ifstream frame_lines(folder / "frames.lines");
+    for (int value = 0; frame_lines >> t >> value;)
+      frames.emplace_back(t, static_cast<std::uint8_t>(value));
+    ASSERT_EQ(events.size(), 6000U);
   }
 
   static void TearDownTestSuite() { std::filesystem::remove_all(folder); }
 
-  /// The names of all bags.
   static std::vector<std::string> names() {
     std::vector<std::string> found;
     for (const auto& file : std::filesystem::directory_iterator(folder))
-      if (file.path().extension() != ".bin") found.push_back(file.path().filename());
+      if (file.path().extension() != ".lines" && file.path().stem() != "many")
+        found.push_back(file.path().filename());
     return found;
   }
 
   static inline std::filesystem::path folder;
-  static inline Contents expected;
+  static inline recordings::Events events;
+  static inline std::vector<TimedValue> frames;
 };
 
 TEST_F(Bags, HaveTheirEventsAndFrames) {
@@ -148,17 +108,17 @@ TEST_F(Bags, HaveTheirEventsAndFrames) {
     const auto bytes = bytes_of(folder / name);
     for (const bool pulled : {false, true}) {
       MemoryBytes source(bytes);
-      BagDecoder decoder("");
-      if (pulled) decoder.open(source);
-      const auto contents = decoded(decoder, bytes, pulled ? bytes.size() : 77'777);
-      EXPECT_EQ(contents.events, expected.events);
-      EXPECT_EQ(contents.frames, expected.frames);
-      EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
-      ASSERT_EQ(decoder.streams().size(), 2U);
-      for (const auto& stream : decoder.streams())
+      const auto decoder = make_bag_decoder("");
+      if (pulled) decoder->open(source);
+      const auto contents = decode(*decoder, bytes, pulled ? bytes.size() : 77'777);
+      EXPECT_EQ(contents.events, events);
+      EXPECT_EQ(values_of(contents.pictures), frames);
+      EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
+      ASSERT_EQ(decoder->streams().size(), 2U);
+      for (const auto& stream : decoder->streams())
         EXPECT_EQ(stream.size, stream.kind == StreamKind::events ? (SensorSize{346, 260})
                                                                  : (SensorSize{86, 65}));
-      EXPECT_EQ(decoder.unread_streams().names, "topics /second/events");
+      EXPECT_EQ(decoder->unread_streams().names, "topics /second/events");
     }
   }
 }
@@ -168,27 +128,27 @@ TEST_F(Bags, SayInTheirIndexWhereTopicsBegin) {
     SCOPED_TRACE(name);
     const auto bytes = bytes_of(folder / name);
     MemoryBytes source(bytes);
-    BagDecoder decoder("");
-    const bool reads_itself = decoder.open(source);
+    const auto decoder = make_bag_decoder("");
+    const bool reads_itself = decoder->open(source);
     const bool has_index = name.find("-no-") == std::string::npos;
-    EXPECT_EQ(decoder.knows_all_streams(), has_index);
-    ASSERT_TRUE(!has_index || decoder.streams().size() == 2U);
-    for (std::size_t i = 0; i < decoder.streams().size(); ++i) {
-      const auto first = decoder.first_of(i);
+    EXPECT_EQ(decoder->knows_all_streams(), has_index);
+    ASSERT_TRUE(!has_index || decoder->streams().size() == 2U);
+    for (std::size_t i = 0; i < decoder->streams().size(); ++i) {
+      const auto first = decoder->first_of(i);
       ASSERT_EQ(first.has_value(), has_index);
       if (!first) continue;
-      decoder.restart(*first);
+      decoder->restart(*first);
       if (!reads_itself)
-        decoder.push(std::span(bytes).subspan(static_cast<std::size_t>(first->position)));
+        decoder->push(std::span(bytes).subspan(static_cast<std::size_t>(first->position)));
       std::optional<Microseconds> t;
-      while (const auto item = t ? std::nullopt : decoder.next()) {
-        const auto* const events = std::get_if<EventItem>(&*item);
-        const auto* const frame = std::get_if<FrameItem>(&*item);
-        if (events != nullptr && events->stream == i) t = events->events.front().t;
-        if (frame != nullptr && frame->stream == i) t = frame->frame.t;
+      while (const auto item = t ? std::nullopt : decoder->next()) {
+        const auto* const some = std::get_if<EventItem>(&*item);
+        const auto* const picture = std::get_if<FrameItem>(&*item);
+        if (some != nullptr && some->stream == i) t = some->events.front().t;
+        if (picture != nullptr && picture->stream == i) t = picture->frame.t;
       }
-      const bool of_events = decoder.streams()[i].kind == StreamKind::events;
-      EXPECT_EQ(t, of_events ? expected.events.front().t : expected.frames.front().t);
+      const bool of_events = decoder->streams()[i].kind == StreamKind::events;
+      EXPECT_EQ(t, of_events ? events.front().t : frames.front().first);
     }
   }
 }
@@ -197,11 +157,11 @@ TEST_F(Bags, HaveTheTopicsThatAreChosen) {
   const auto bytes = bytes_of(folder / "evt3-lz4.mcap");
   for (const auto& [topics, count] :
        {std::pair{"/second/events", 39U}, {"/camera/events, /second/events", 6039U}}) {
-    BagDecoder decoder(topics);
-    const auto contents = decoded(decoder, bytes);
+    const auto decoder = make_bag_decoder(topics);
+    const auto contents = decode(*decoder, bytes);
     EXPECT_EQ(contents.events.size(), count);
-    EXPECT_TRUE(contents.frames.empty());
-    EXPECT_EQ(decoder.streams().size(), count == 39U ? 1U : 2U);
+    EXPECT_TRUE(contents.pictures.empty());
+    EXPECT_EQ(decoder->streams().size(), count == 39U ? 1U : 2U);
   }
   const auto refusal = refusal_of(bytes, "/none");
   EXPECT_NE(refusal.find("/none"), std::string::npos);
@@ -231,12 +191,12 @@ TEST_F(Bags, EndWherePagesOfADatabaseRepeat) {
   auto bytes = bytes_of(folder / "evt3.db3");
   repeat_first_pages(bytes);
   MemoryBytes source(bytes);
-  BagDecoder decoder("");
-  decoder.open(source);
-  const auto contents = decoded(decoder, bytes);
+  const auto decoder = make_bag_decoder("");
+  decoder->open(source);
+  const auto contents = decode(*decoder, bytes);
   EXPECT_GT(contents.events.size(), 0U);
-  EXPECT_LT(contents.events.size(), expected.events.size() / 2);
-  EXPECT_EQ(decoder.corruption().places, 1U);
+  EXPECT_LT(contents.events.size(), events.size() / 2);
+  EXPECT_EQ(decoder->corruption().places, 1U);
 }
 
 TEST_F(Bags, StateNoLastTimeOfASourceThatIsStopped) {
@@ -244,11 +204,11 @@ TEST_F(Bags, StateNoLastTimeOfASourceThatIsStopped) {
     SCOPED_TRACE(name);
     const auto bytes = bytes_of(folder / name);
     recordings::BreakableBytes source(bytes);
-    BagDecoder decoder("");
-    decoder.open(source);
-    decoded(decoder, bytes);
+    const auto decoder = make_bag_decoder("");
+    decoder->open(source);
+    decode(*decoder, bytes);
     source.is_broken = true;
-    EXPECT_EQ(decoder.last_time(), std::nullopt);
+    EXPECT_EQ(decoder->last_time(), std::nullopt);
   }
 }
 
@@ -274,23 +234,23 @@ TEST_F(Bags, LoseOnlyWhatIsCutOffOrCorrupt) {
     cut.resize(cut.size() / 2);
     for (const bool pulled : {false, true}) {
       MemoryBytes source(cut);
-      BagDecoder decoder("");
-      if (pulled) decoder.open(source);
-      const auto contents = decoded(decoder, cut);
+      const auto decoder = make_bag_decoder("");
+      if (pulled) decoder->open(source);
+      const auto contents = decode(*decoder, cut);
       EXPECT_GT(contents.events.size(), 2000U);
-      EXPECT_TRUE(std::ranges::equal(contents.events,
-                                     std::span(expected.events).first(contents.events.size())));
-      EXPECT_EQ(decoder.corruption().places, 1U);
+      EXPECT_TRUE(
+          std::ranges::equal(contents.events, std::span(events).first(contents.events.size())));
+      EXPECT_EQ(decoder->corruption().places, 1U);
     }
     auto corrupt = bytes;
     std::ranges::fill(std::span(corrupt).subspan(corrupt.size() / 3, 500), 0xa5);
-    BagDecoder decoder("");
-    EXPECT_GT(common(expected.events, decoded(decoder, corrupt).events), 4000U);
+    const auto decoder = make_bag_decoder("");
+    EXPECT_GT(common(events, decode(*decoder, corrupt).events), 4000U);
     // Bags of ROS 1 have no checksums.
     const bool has_checksums =
         name.ends_with(".mcap") && name.find("-no-chunks") == std::string::npos;
-    EXPECT_GE(decoder.corruption().places, has_checksums ? 1U : 0U);
-    EXPECT_LE(decoder.corruption().places, 100U);
+    EXPECT_GE(decoder->corruption().places, has_checksums ? 1U : 0U);
+    EXPECT_LE(decoder->corruption().places, 100U);
   }
 }
 
@@ -304,11 +264,11 @@ TEST_F(Bags, OfDatabasesSurviveCorruptPages) {
                       static_cast<std::uint8_t>(i * 37));
     if (i % 4 == 0) corrupt.resize(bytes.size() - at);
     MemoryBytes source(corrupt);
-    BagDecoder decoder("");
+    const auto decoder = make_bag_decoder("");
     try {
-      decoder.open(source);
-      EXPECT_LE(decoded(decoder, {}).events.size(), expected.events.size());
-      noticed += decoder.corruption().places > 0 ? 1 : 0;
+      decoder->open(source);
+      EXPECT_LE(decode(*decoder, {}).events.size(), events.size());
+      noticed += decoder->corruption().places > 0 ? 1 : 0;
     } catch (const UnsupportedFormat&) {
       ++noticed;
     }
@@ -317,16 +277,12 @@ TEST_F(Bags, OfDatabasesSurviveCorruptPages) {
 }
 
 /// SQLite counts its steps from the first row of a query.
-TEST(Databases, OfManyMessagesAreReadWhole) {
-  constexpr SensorSize size{346, 260};
-  const auto events = recordings::random_events(size, 200'000, 3, 1'700'000'000'000'000, 1000);
-  const auto bytes = rosbags::db3_of_events(size, events, 1);
-  MemoryBytes source(bytes);
-  BagDecoder decoder("");
-  decoder.open(source);
-  EXPECT_EQ(decoded(decoder, {}).events, events);
-  EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
-  EXPECT_EQ(decoder.last_time(), events.back().t);
+TEST_F(Bags, OfManyMessagesAreReadWhole) {
+  MemoryBytes source(bytes_of(folder / "many.db3"));
+  const auto decoder = make_bag_decoder("");
+  decoder->open(source);
+  EXPECT_EQ(decode(*decoder, {}).events.size(), 200'000U);
+  EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
 }
 
 /// A database made by statements of SQL.
@@ -413,25 +369,30 @@ TEST_F(Bags, HaveTheSensorSizeOfTheirFirstPacket) {
   const auto found = std::search(bytes.begin(), bytes.end(), stated.begin(), stated.end());
   ASSERT_NE(found, bytes.end());
   std::fill_n(found, stated.size(), std::uint8_t{0});
-  BagDecoder decoder("/camera/events");
-  EXPECT_EQ(decoded(decoder, bytes).events, expected.events);
-  EXPECT_EQ(decoder.streams().front().size, SensorSize{});
+  const auto decoder = make_bag_decoder("/camera/events");
+  EXPECT_EQ(decode(*decoder, bytes).events, events);
+  EXPECT_EQ(decoder->streams().front().size, SensorSize{});
 }
 
 TEST_F(Bags, KeepNoOverlongNames) {
-  const rosbags::Text name(2000, 'a');
-  const auto mcap_record = [](char opcode, const rosbags::Text& content) {
-    return opcode + rosbags::binary(std::uint64_t{content.size()}) + content;
+  const std::string name(2000, 'a');
+  const auto number = [](std::uint64_t value, std::size_t size) {
+    std::string bytes(size, '\0');
+    std::memcpy(bytes.data(), &value, size);
+    return bytes;
   };
-  const auto number = rosbags::binary(std::uint16_t{999});
-  const auto records = mcap_record(3, number + rosbags::sized(name)) +
-                       mcap_record(4, number + number + rosbags::sized(name) +
-                                          rosbags::sized("cdr") + rosbags::sized(""));
+  const auto sized = [&](const std::string& text) { return number(text.size(), 4) + text; };
+  const auto mcap_record = [&](char opcode, const std::string& content) {
+    return opcode + number(content.size(), 8) + content;
+  };
+  const auto id = number(999, 2);
+  const auto records = mcap_record(3, id + sized(name)) +
+                       mcap_record(4, id + id + sized(name) + sized("cdr") + sized(""));
   auto bytes = bytes_of(folder / "evt3-no-chunks.mcap");
   bytes.insert(bytes.begin() + 8, records.begin(), records.end());
-  BagDecoder decoder("");
-  EXPECT_EQ(decoded(decoder, bytes).events, expected.events);
-  EXPECT_EQ(decoder.corruption().places, 2U);
+  const auto decoder = make_bag_decoder("");
+  EXPECT_EQ(decode(*decoder, bytes).events, events);
+  EXPECT_EQ(decoder->corruption().places, 2U);
   EXPECT_EQ(refusal_of(bytes, "/none").find(name), std::string::npos);
 }
 
@@ -479,10 +440,10 @@ TEST(Mcap, LosesAMessageOfAnUncompressedChunkByAFlippedBit) {
     for (const std::size_t bit : {0, 10, 20, 40, 63}) {
       auto corrupt = bytes;
       corrupt[at + 1 + bit / 8] ^= static_cast<std::uint8_t>(1U << bit % 8);
-      BagDecoder decoder("");
-      EXPECT_GE(decoded(decoder, corrupt).events.size(), events.size() * 8 / 10)
+      const auto decoder = make_bag_decoder("");
+      EXPECT_GE(decode(*decoder, corrupt).events.size(), events.size() * 8 / 10)
           << "bit " << bit << " at " << at;
-      EXPECT_GE(decoder.corruption().places, 1U);
+      EXPECT_GE(decoder->corruption().places, 1U);
       ++flipped;
     }
     at += 9 + size - 1;
@@ -501,12 +462,12 @@ TEST(Mcap, ReadsBackWhatItWrites) {
         const auto events = recordings::random_events(hd, 20'000, seed++, start, pause);
         const auto bytes = encoded({hd, format, compression}, events, 1 + seed * 37);
         MemoryBytes source(bytes);
-        BagDecoder decoder("");
-        decoder.open(source);
-        EXPECT_EQ(decoded(decoder, bytes).events, events);
-        EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
-        EXPECT_EQ(decoder.streams().front().size, hd);
-        EXPECT_EQ(decoder.last_time(), events.back().t);
+        const auto decoder = make_bag_decoder("");
+        decoder->open(source);
+        EXPECT_EQ(decode(*decoder, bytes).events, events);
+        EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
+        EXPECT_EQ(decoder->streams().front().size, hd);
+        EXPECT_EQ(decoder->last_time(), events.back().t);
       }
 }
 
@@ -523,8 +484,8 @@ TEST(Mcap, KeepsTriggersWithEvt3) {
   EXPECT_GT(encoder->pending(), 0U);
   encoder->finish(bytes);
   EXPECT_EQ(encoder->pending(), 0U);
-  BagDecoder decoder("");
-  const auto contents = decoded(decoder, bytes);
+  const auto decoder = make_bag_decoder("");
+  const auto contents = decode(*decoder, bytes);
   EXPECT_EQ(contents.events, events);
   EXPECT_EQ(contents.triggers, triggers);
   EXPECT_FALSE(make_mcap_encoder({hd, BagEvents::mono})->encode_trigger(triggers[0], bytes));

@@ -21,7 +21,6 @@ AbsoluteEvent at(Microseconds t, int x = 1, int y = 2, Polarity polarity = Polar
   return AbsoluteEvent::at(x, y, t, polarity);
 }
 
-/// An event each `step`.
 Events steady(Microseconds start, Microseconds stop, Microseconds step = 100) {
   Events events;
   for (auto t = start; t < stop; t += step) events.push_back(at(t));

@@ -12,13 +12,12 @@
 #include <fstream>
 #include <thread>
 
-#include "src/core/byte_order.hpp"
 #include "src/formats/byte_source.hpp"
+#include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_filters.hpp"
-#include "src/formats/hdf5/hdf5_reader.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
-#include "tests/fuzz/small_hdf5.hpp"
 
 namespace {
 
@@ -30,13 +29,9 @@ using Settings = Hdf5Writer::Settings;
 constexpr SensorSize vga{640, 480};
 constexpr Settings metavision = {Hdf5Format::metavision, Compression::none, vga};
 
-Bytes contents(const std::filesystem::path& file) {
+Bytes bytes_in(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-std::unique_ptr<ByteSource> in_memory(Bytes file) {
-  return std::make_unique<MemoryBytes>(std::move(file));
 }
 
 class Hdf5 : public testing::Test {
@@ -57,7 +52,7 @@ class Hdf5 : public testing::Test {
     for (; !events.empty(); events = events.subspan(std::min(at_once, events.size())))
       writer.append(events.first(std::min(at_once, events.size())));
     writer.close();
-    return contents(path());
+    return bytes_in(path());
   }
 
  private:
@@ -70,19 +65,28 @@ std::vector<Settings> all_settings() {
           metavision};
 }
 
-Events read_all(Hdf5Reader& reader, std::size_t at_once = 10'000) {
-  Events events;
-  while (reader.read(at_once, events) > 0) {
+struct Read {
+  explicit Read(Bytes file) : bytes(std::move(file)) {
+    decoder->open(bytes);
+    contents.take_all(*decoder);
   }
-  return events;
+
+  Contents from(Microseconds t) const {
+    Contents rest;
+    decoder->restart({.t = t});
+    rest.take_all(*decoder);
+    return rest;
+  }
+
+  MemoryBytes bytes;
+  std::unique_ptr<Decoder> decoder = make_hdf5_decoder();
+  Contents contents;
+};
+
+Events read_all(const Bytes& file) {
+  return Read(file).contents.events;
 }
 
-Events read_all(const Bytes& file, const Hdf5Selection& selection = {}) {
-  Hdf5Reader reader(in_memory(file), selection);
-  return read_all(reader);
-}
-
-/// All numbers of a dataset.
 std::vector<std::uint16_t> numbers_in(const std::filesystem::path& file, const char* dataset) {
   const hid_t opened = H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   const hid_t data = H5Dopen2(opened, dataset, H5P_DEFAULT);
@@ -118,78 +122,9 @@ TEST_F(Hdf5, LabelsAreDatasets) {
       writer.append(std::span(events).subspan(i, size));
     }
   }
-  EXPECT_TRUE(read_all(contents(path())) == events);
+  EXPECT_TRUE(read_all(bytes_in(path())) == events);
   EXPECT_TRUE(numbers_in(path(), "events/cause") == causes);
   EXPECT_TRUE(numbers_in(path(), "events/class") == classes);
-}
-
-/// Events with times of 32 bits as columns, or as the rows of v2e.
-fuzz::SmallHdf5 wrapping(const Events& events, bool of_v2e) {
-  std::vector<std::uint32_t> columns[4];
-  std::vector<std::uint32_t> rows;
-  for (const auto& event : events) {
-    const std::uint32_t numbers[] = {static_cast<std::uint32_t>(event.t), event.x,
-                                     static_cast<std::uint32_t>(event.y()),
-                                     event.polarity() == Polarity::on ? 1U : 0U};
-    for (std::size_t i = 0; i < 4; ++i) columns[i].push_back(numbers[i]);
-    rows.insert(rows.end(), std::begin(numbers), std::end(numbers));
-  }
-  fuzz::SmallHdf5 file("wrapping");
-  if (of_v2e) {
-    file.dataset("events", H5T_NATIVE_UINT32, {events.size(), 4}, rows.data());
-    return file;
-  }
-  file.group("events");
-  constexpr const char* names[] = {"events/t", "events/x", "events/y", "events/p"};
-  for (std::size_t i = 0; i < 4; ++i)
-    file.dataset(names[i], H5T_NATIVE_UINT32, {events.size()}, columns[i].data());
-  return file;
-}
-
-TEST_F(Hdf5, TimesOf32BitsWrapWithoutAnIndex) {
-  constexpr std::size_t count = 30'000;
-  constexpr Microseconds step = 500'000;  // four hours: three wraps
-  Events events;
-  for (std::size_t i = 0; i < count; ++i)
-    events.push_back(AbsoluteEvent::at(static_cast<int>(i % 300), static_cast<int>(i % 200),
-                                       static_cast<Microseconds>(i) * step,
-                                       i % 2 == 0 ? Polarity::off : Polarity::on));
-  for (const bool of_v2e : {false, true}) {
-    Hdf5Reader reader(in_memory(wrapping(events, of_v2e).bytes()));
-    ASSERT_TRUE(reader.time_range());
-    EXPECT_EQ(reader.time_range()->first, 0);
-    EXPECT_EQ(reader.time_range()->last, events.back().t);
-    EXPECT_TRUE(read_all(reader) == events);
-    for (const std::size_t first : {29'999U, 8'589U, 8'590U, 8'591U, 20'000U, 100U, 0U}) {
-      reader.seek(events[first].t);
-      const auto found = read_all(reader);
-      EXPECT_TRUE(std::ranges::equal(found, std::span(events).subspan(first))) << first;
-    }
-  }
-}
-
-TEST_F(Hdf5, KeepsDisorderAcrossAWrap) {
-  constexpr auto lap = Microseconds{1} << 32;
-  Events events;
-  for (const auto t :
-       {lap - 1, lap + 2, lap - 2, lap + 3, lap - 0x10000, lap - 0xffff, lap + 4, lap + 5, lap - 3})
-    events.push_back(AbsoluteEvent::at(1, 2, t, Polarity::on));
-  // The first event at or after each millisecond.
-  std::vector<std::uint32_t> index(lap / 1000 + 1);
-  index.push_back(static_cast<std::uint32_t>(events.size()));
-  std::vector<Bytes> files;
-  for (const bool of_v2e : {false, true}) files.push_back(wrapping(events, of_v2e).bytes());
-  auto indexed = wrapping(events, false);
-  indexed.dataset("ms_to_idx", H5T_NATIVE_UINT32, {index.size()}, index.data());
-  files.push_back(indexed.bytes());
-  for (const auto& file : files) {
-    Hdf5Reader reader(in_memory(file));
-    EXPECT_EQ(read_all(reader), events);
-    ASSERT_TRUE(reader.time_range());
-    EXPECT_EQ(reader.time_range()->last, lap - 3);
-    reader.seek(lap + 5);
-    EXPECT_EQ(read_all(reader), Events(events.end() - 2, events.end()));
-  }
 }
 
 TEST_F(Hdf5, TriggersComeBack) {
@@ -201,15 +136,9 @@ TEST_F(Hdf5, TriggersComeBack) {
     writer.append(std::span<const Trigger>(triggers).first(100));
     writer.append(std::span<const Trigger>(triggers).subspan(100));
   }
-  Hdf5Reader reader(in_memory(contents(path())));
-  std::vector<Trigger> found;
-  while (reader.read_triggers(777, found) > 0) {
-  }
-  EXPECT_TRUE(found == triggers);
-  reader.seek(1'000'050);
-  found.clear();
-  EXPECT_EQ(reader.read_triggers(1, found), 1U);
-  EXPECT_EQ(found.front().t, 1'000'100);
+  const Read read(bytes_in(path()));
+  EXPECT_TRUE(read.contents.triggers == triggers);
+  EXPECT_EQ(read.from(1'000'050).triggers.front().t, 1'000'100);
 }
 
 TEST_F(Hdf5, WhatALayoutCannotHoldIsRefused) {
@@ -272,9 +201,9 @@ TEST_F(Hdf5, MostEventsSurviveAFullDisk) {
             << error.what();
       }
       if (min_kept(written) == 0) continue;
-      Hdf5Reader reader(in_memory(contents(path())));
-      const auto left = read_all(reader);
-      EXPECT_EQ(reader.corruption().places, 0U);
+      const Read read(bytes_in(path()));
+      const auto& left = read.contents.events;
+      EXPECT_EQ(read.decoder->corruption().places, 0U);
       EXPECT_GE(left.size(), min_kept(written));
       EXPECT_TRUE(std::ranges::equal(left, std::span(events).first(left.size())));
     }
@@ -301,9 +230,9 @@ Events left_by_a_killed_process(const std::filesystem::path& file, const Setting
   int status = 0;
   waitpid(child, &status, 0);
   EXPECT_TRUE(WIFSIGNALED(status));
-  Hdf5Reader reader(in_memory(contents(file)));
-  EXPECT_EQ(reader.corruption().places, 0U);
-  return read_all(reader);
+  const Read read(bytes_in(file));
+  EXPECT_EQ(read.decoder->corruption().places, 0U);
+  return read.contents.events;
 }
 
 TEST_F(Hdf5, WhatWasCommittedAndMostOfTheRestSurvivesTheProcess) {
@@ -330,61 +259,6 @@ TEST_F(Hdf5, APauseOfADayHardlyTakesSpace) {
   }
 }
 
-/// Why a file is not read; empty if it is.
-std::string refusal_of(const Bytes& file, const Hdf5Selection& selection = {}) {
-  try {
-    Hdf5Reader reader(in_memory(file), selection);
-  } catch (const UnsupportedFormat& error) {
-    return error.what();
-  }
-  return {};
-}
-
-TEST_F(Hdf5, WhatIsCompressedTwiceIsRefused) {
-  fuzz::SmallHdf5 file("twice");
-  file.group("events");
-  constexpr hsize_t rows = 1 << 16;
-  const std::vector<std::uint64_t> zeros(rows);
-  for (const auto* const name : {"events/p", "events/x", "events/y"})
-    file.dataset(name, H5T_NATIVE_UINT64, {rows}, zeros.data());
-  file.stored_dataset("events/t", H5T_NATIVE_UINT64, {rows}, rows,
-                      {H5Z_FILTER_DEFLATE, H5Z_FILTER_DEFLATE}, {});
-  EXPECT_NE(refusal_of(file.bytes()).find("compressed more than once"), std::string::npos);
-}
-
-TEST_F(Hdf5, ChunksThatShareAnAddressAreRefused) {
-  fuzz::SmallHdf5 file("shared");
-  file.group("events");
-  constexpr hsize_t rows = 1 << 16;
-  constexpr hsize_t chunks = 30;
-  const std::vector<std::uint8_t> zeros(rows * chunks);
-  for (const auto* const name : {"events/p", "events/x", "events/y"})
-    file.dataset(name, H5T_NATIVE_UINT8, {rows * chunks}, zeros.data());
-  const Bytes large(400'000);
-  const Bytes small(1);
-  std::vector<std::span<const std::uint8_t>> stored(chunks, small);
-  stored[0] = large;
-  file.stored_dataset("events/t", H5T_NATIVE_UINT64, {rows * chunks}, rows, {H5Z_FILTER_DEFLATE},
-                      stored);
-  auto bytes = file.bytes();
-  EXPECT_EQ(refusal_of(bytes), "");
-  // Nodes of chunk indexes: a header of 24 bytes with the number of chunks, then for each chunk its
-  // size, filter mask and two offsets, and its address.
-  constexpr std::string_view node = "TREE\1";
-  constexpr std::size_t entry = 32;
-  for (auto at = bytes.begin();; ++at) {
-    at = std::search(at, bytes.end(), node.begin(), node.end());
-    if (at == bytes.end()) break;
-    auto* const first = &*at + 24;
-    if (little_endian<std::uint32_t>(first) != large.size()) continue;
-    for (std::size_t i = 1; i < at[6]; ++i) {
-      std::copy_n(first, 4, first + i * entry);
-      std::copy_n(first + 24, 8, first + i * entry + 24);
-    }
-  }
-  EXPECT_NE(refusal_of(bytes).find("chunks that overlap"), std::string::npos);
-}
-
 TEST_F(Hdf5, ComesBackWithAndWithoutCommits) {
   // Of some hours, whose microseconds need more than 32 bits.
   const auto events = random_events(vga, 200'000, 22, 1'000'000, 300'000'000);
@@ -400,17 +274,12 @@ TEST_F(Hdf5, ComesBackWithAndWithoutCommits) {
           rest = rest.subspan(part.size());
         }
       }
-      Hdf5Reader reader(in_memory(contents(path())));
-      EXPECT_EQ(reader.size(), vga);
-      ASSERT_TRUE(reader.time_range());
-      EXPECT_EQ(reader.time_range()->first, events.front().t);
-      EXPECT_EQ(reader.time_range()->last, events.back().t);
-      EXPECT_TRUE(read_all(reader) == events);
-      EXPECT_EQ(reader.corruption().places + reader.corruption().outside, 0U);
-      reader.seek(events[150'000].t);
-      Events found;
-      reader.read(1, found);
-      EXPECT_EQ(found.front().t, events[150'000].t);
+      const Read read(bytes_in(path()));
+      EXPECT_EQ(read.decoder->streams().front().size, vga);
+      EXPECT_EQ(read.decoder->last_time(), events.back().t);
+      EXPECT_TRUE(read.contents.events == events);
+      EXPECT_EQ(read.decoder->corruption().places + read.decoder->corruption().outside, 0U);
+      EXPECT_EQ(read.from(events[150'000].t).events.front().t, events[150'000].t);
     }
   }
 }
@@ -431,7 +300,7 @@ TEST_F(Hdf5, WithoutCommitsTheSameEventsMakeTheSameBytes) {
 
 TEST_F(Hdf5, WhatIsNoFileOfEventsIsRefused) {
   for (const auto* const text : {"t,x,y,p\n", "\x89HDF\r\n\x1a\n", ""})
-    EXPECT_NE(refusal_of(bytes_of(text)), "");
+    EXPECT_NE(refusal(*make_hdf5_decoder(), bytes_of(text)), "");
 }
 
 TEST_F(Hdf5, CorruptChunksAreLeftOutAndCounted) {
@@ -450,12 +319,12 @@ TEST_F(Hdf5, CorruptChunksAreLeftOutAndCounted) {
   ASSERT_NE(at, file.end());
   auto corrupt = file;
   corrupt[static_cast<std::size_t>(at - file.begin()) + 3] = 0xff;
-  Hdf5Reader reader(in_memory(corrupt));
+  const Read read(corrupt);
   auto expected = events;
   expected.erase(expected.begin() + 16384 * 2, expected.begin() + 16384 * 3);
-  EXPECT_TRUE(read_all(reader) == expected);
-  EXPECT_EQ(reader.corruption().places, 1U);
-  EXPECT_EQ(reader.corruption().first_at, static_cast<std::uint64_t>(at - file.begin()));
+  EXPECT_TRUE(read.contents.events == expected);
+  EXPECT_EQ(read.decoder->corruption().places, 1U);
+  EXPECT_EQ(read.decoder->corruption().first_at, static_cast<std::uint64_t>(at - file.begin()));
 }
 
 TEST_F(Hdf5, ASizeThatNoSensorHasIsNone) {
@@ -465,174 +334,7 @@ TEST_F(Hdf5, ASizeThatNoSensorHasIsNone) {
   const auto found = std::search(bytes.begin(), bytes.end(), size.begin(), size.end());
   ASSERT_NE(found, bytes.end());
   std::ranges::copy(none, found);
-  Hdf5Reader reader(in_memory(bytes));
-  EXPECT_EQ(reader.size(), SensorSize{});
-}
-
-/// Four events as several tools store them.
-struct FourEvents {
-  std::vector<std::int64_t> t = {100, 200, 1300, 1'000'400};
-  std::vector<std::int64_t> x = {10, 11, 12, 13};
-  std::vector<std::int64_t> y = {20, 21, 22, 23};
-  std::vector<std::int64_t> p = {1, 0, 1, 1};
-  Events events = {AbsoluteEvent::at(10, 20, 100, Polarity::on),
-                   AbsoluteEvent::at(11, 21, 200, Polarity::off),
-                   AbsoluteEvent::at(12, 22, 1300, Polarity::on),
-                   AbsoluteEvent::at(13, 23, 1'000'400, Polarity::on)};
-
-  static FourEvents of_nanoseconds() {
-    FourEvents four;
-    for (auto& t : four.t) t = t * 1000 + 7;
-    return four;
-  }
-
-  /// Adds columns with these names.
-  void add(fuzz::SmallHdf5& file, const std::vector<std::string>& names,
-           bool in_seconds = false) const {
-    std::vector<double> seconds;
-    for (const auto time : t) seconds.push_back(static_cast<double>(time) * 1e-6);
-    if (in_seconds)
-      file.dataset(names[0].c_str(), H5T_NATIVE_DOUBLE, {4}, seconds.data());
-    else
-      file.dataset(names[0].c_str(), H5T_NATIVE_INT64, {4}, t.data());
-    file.dataset(names[1].c_str(), H5T_NATIVE_INT64, {4}, x.data());
-    file.dataset(names[2].c_str(), H5T_NATIVE_INT64, {4}, y.data());
-    file.dataset(names[3].c_str(), H5T_NATIVE_INT64, {4}, p.data());
-  }
-
-  /// Adds rows of four columns.
-  void add_rows(fuzz::SmallHdf5& file, const char* name, std::string_view order) const {
-    std::vector<double> rows;
-    for (std::size_t i = 0; i < 4; ++i)
-      for (const char column : order)
-        rows.push_back(column == 's'   ? static_cast<double>(t[i]) * 1e-6
-                       : column == 't' ? static_cast<double>(t[i])
-                       : column == 'x' ? static_cast<double>(x[i])
-                       : column == 'y' ? static_cast<double>(y[i])
-                       : p[i] == 1     ? 1.0
-                                       : -1.0);
-    file.dataset(name, H5T_NATIVE_DOUBLE, {4, 4}, rows.data());
-  }
-};
-
-TEST_F(Hdf5, ColumnsAreFoundByTheirNames) {
-  const FourEvents four;
-  const std::vector<std::string> layouts[] = {
-      {"t", "x", "y", "p"},
-      {"events/ts", "events/xs", "events/ys", "events/ps"},
-      {"raw_events/t", "raw_events/x", "raw_events/y", "raw_events/p"},
-      {"events/timestamp", "events/x", "events/y", "events/polarity"},
-      {"prophesee/left/t", "prophesee/left/x", "prophesee/left/y", "prophesee/left/p"}};
-  for (const auto& names : layouts) {
-    for (const bool in_seconds : {false, true}) {
-      fuzz::SmallHdf5 file("columns");
-      for (const auto* const group :
-           {"events", "raw_events", "prophesee", "prophesee/left", "prophesee/right", "imu"})
-        file.group(group);
-      // Other numbers, and another camera.
-      file.dataset("imu/t", H5T_NATIVE_INT64, {4}, four.t.data());
-      file.dataset("imu/x", H5T_NATIVE_INT64, {4}, four.t.data());
-      if (names[0].starts_with("prophesee"))
-        four.add(file, {"prophesee/right/t", "prophesee/right/y", "prophesee/right/x",
-                        "prophesee/right/p"});
-      four.add(file, names, in_seconds);
-      Hdf5Reader reader(in_memory(file.bytes()));
-      EXPECT_EQ(read_all(reader), four.events) << names[0];
-      reader.seek(1300);
-      EXPECT_EQ(read_all(reader).size(), 2U);
-      ASSERT_TRUE(reader.time_range());
-      EXPECT_EQ(reader.time_range()->last, 1'000'400);
-    }
-  }
-  fuzz::SmallHdf5 file("nanoseconds");
-  FourEvents::of_nanoseconds().add(file, {"t_ns", "x", "y", "p"});
-  EXPECT_EQ(read_all(file.bytes()), four.events);
-}
-
-TEST_F(Hdf5, APathSelectsACamera) {
-  const FourEvents left;
-  auto right = left;
-  for (auto& t : right.t) t += 5;
-  fuzz::SmallHdf5 file("cameras");
-  for (const auto* const group : {"left", "right", "other"}) file.group(group);
-  left.add(file, {"left/t", "left/x", "left/y", "left/p"});
-  right.add(file, {"right/t", "right/x", "right/y", "right/p"});
-  const std::vector<std::int64_t> rows = {1, 10, 20, 1, 2, 11, 21, 0};
-  file.dataset("other/events", H5T_NATIVE_INT64, {2, 4}, rows.data());
-  file.dataset("other/event_numbers", H5T_NATIVE_INT64, {4}, left.t.data());
-  const auto times = [&](const std::string& path) {
-    Hdf5Reader reader(in_memory(file.bytes()), {.path = path});
-    EXPECT_EQ(reader.others(), path.empty() ? "/other/events, /right" : "");
-    const auto range = reader.time_range();
-    return range ? range->last : -1;
-  };
-  EXPECT_EQ(times(""), left.t.back());
-  EXPECT_EQ(times("left"), left.t.back());
-  EXPECT_EQ(times("/right/"), right.t.back());
-  EXPECT_EQ(times("other"), 2);
-  EXPECT_EQ(times("other/events"), 2);
-  EXPECT_NE(refusal_of(file.bytes(), {.path = "middle"}).find("/left, /other/events, /right"),
-            std::string::npos);
-}
-
-TEST_F(Hdf5, UnitAndColumnsMayBeSet) {
-  const auto four = FourEvents::of_nanoseconds();
-  const TableSettings settings{.columns = *columns_of("pyxt"), .unit = TimeUnit::nanoseconds};
-  fuzz::SmallHdf5 columns("columns");
-  four.add(columns, {"t", "x", "y", "p"});
-  EXPECT_NE(refusal_of(columns.bytes()).find("time-unit"), std::string::npos);
-  EXPECT_EQ(read_all(columns.bytes(), {.table = settings}), four.events);
-  fuzz::SmallHdf5 rows("rows");
-  four.add_rows(rows, "events", "pyxt");
-  EXPECT_EQ(read_all(rows.bytes(), {.table = settings}), four.events);
-}
-
-TEST_F(Hdf5, RowsAreRecordsOrNumbers) {
-  const FourEvents four;
-  struct Record {
-    std::uint16_t x, y;
-    std::int16_t p;
-    std::int64_t t;
-  };
-  std::vector<Record> records;
-  for (std::size_t i = 0; i < 4; ++i)
-    records.push_back({static_cast<std::uint16_t>(four.x[i]), static_cast<std::uint16_t>(four.y[i]),
-                       static_cast<std::int16_t>(four.p[i]), four.t[i]});
-  fuzz::SmallHdf5 compound("compound");
-  const Hdf5Handle type(H5Tcreate(H5T_COMPOUND, sizeof(Record)), H5Tclose);
-  H5Tinsert(type.get(), "x", offsetof(Record, x), H5T_NATIVE_UINT16);
-  H5Tinsert(type.get(), "y", offsetof(Record, y), H5T_NATIVE_UINT16);
-  H5Tinsert(type.get(), "polarity", offsetof(Record, p), H5T_NATIVE_INT16);
-  H5Tinsert(type.get(), "timestamp", offsetof(Record, t), H5T_NATIVE_INT64);
-  compound.dataset("events", type.get(), {4}, records.data());
-  EXPECT_EQ(read_all(compound.bytes()), four.events);
-
-  for (const auto& [path, order] :
-       {std::pair{"events", "sxyp"}, {"events", "xysp"}, {"davis/right/events", "xysp"}}) {
-    fuzz::SmallHdf5 file("rows");
-    file.group("davis");
-    file.group("davis/right");
-    four.add_rows(file, path, order);
-    Hdf5Reader reader(in_memory(file.bytes()));
-    EXPECT_EQ(read_all(reader), four.events) << path;
-    EXPECT_EQ(reader.size(),
-              std::string_view(path) == "events" ? SensorSize{} : (SensorSize{346, 260}));
-  }
-}
-
-TEST_F(Hdf5, TheSizeMayBeAnAttributeOfTwoNumbers) {
-  fuzz::SmallHdf5 file("size");
-  FourEvents().add(file, {"t", "x", "y", "p"});
-  const hsize_t two = 2;
-  const std::int64_t height_and_width[] = {180, 240};
-  {
-    const Hdf5Handle space(H5Screate_simple(1, &two, nullptr), H5Sclose);
-    const Hdf5Handle attribute(H5Acreate2(file.id(), "sensor_resolution", H5T_NATIVE_INT64,
-                                          space.get(), H5P_DEFAULT, H5P_DEFAULT),
-                               H5Aclose);
-    H5Awrite(attribute.get(), H5T_NATIVE_INT64, height_and_width);
-  }
-  EXPECT_EQ(Hdf5Reader(in_memory(file.bytes())).size(), (SensorSize{240, 180}));
+  EXPECT_EQ(Read(bytes).decoder->streams().front().size, SensorSize{});
 }
 
 TEST_F(Hdf5, FiltersAreUndone) {
@@ -672,11 +374,117 @@ TEST_F(Hdf5, FilesAreReadAndWrittenByThreads) {
         for (std::size_t j = 0; j < events.size(); j += 1000)
           writer.append(std::span(events).subspan(j, 1000));
       }
-      equal[i] = read_all(contents(file)) == events;
+      equal[i] = read_all(bytes_in(file)) == events;
     });
   }
   for (auto& thread : threads) thread.join();
   for (const bool same : equal) EXPECT_TRUE(same);
+}
+
+Bytes encoded_chunk(const Events& events) {
+  Bytes chunk;
+  encode_ecf(events, chunk);
+  EXPECT_LE(chunk.size(), ecf_max_bytes(events.size()));
+  return chunk;
+}
+
+void expect_comes_back(const Events& events) {
+  Events out = {AbsoluteEvent::at(1, 2, 3, Polarity::on)};
+  const auto before = out.front();
+  ASSERT_TRUE(decode_ecf(encoded_chunk(events), out));
+  EXPECT_EQ(out.front(), before);
+  out.erase(out.begin());
+  EXPECT_TRUE(out == events) << events.size();
+}
+
+TEST(Ecf, ChunkByteByByte) {
+  // Two events of one row, then one 1000 us later in another: runs of y, masks of x, runs of p.
+  const Events events = {AbsoluteEvent::at(5, 9, 100, Polarity::on),
+                         AbsoluteEvent::at(7, 9, 100, Polarity::on),
+                         AbsoluteEvent::at(3, 9, 1100, Polarity::off)};
+  using namespace std::string_view_literals;
+  const auto expected = bytes_of(
+      "\x0c\0\0\0"          // three events, nothing packed,
+      "\x64\0\0\0\0\0\0\0"  // from 100 us on
+      "\x02"                // no later, two events
+      "\xf8\xfe\xf3\x01"    // 0x3e8 us later, one event
+      "\x23\x01"            // three in row 9
+      "\xa8\0\x60\0"        // x = 5 and 5 + 2, x = 3
+      "\x82\x01"sv);        // two ON, one OFF
+  EXPECT_EQ(encoded_chunk(events), expected);
+  expect_comes_back(events);
+}
+
+TEST(Ecf, PackedChunksByteByByte) {
+  // Rows that differ: v = y << 12 | x << 1 | p of four events in three words.
+  Events events = {AbsoluteEvent::at(0x123, 0x456, 0, Polarity::on),
+                   AbsoluteEvent::at(0x321, 0x654, 0, Polarity::off),
+                   AbsoluteEvent::at(0x7ff, 0x7fe, 0, Polarity::on),
+                   AbsoluteEvent::at(0, 1, 0, Polarity::off)};
+  auto chunk = encoded_chunk(events);
+  ASSERT_EQ(chunk.size(), 12U + 1 + 12);
+  EXPECT_EQ(chunk[0], 4 << 2 | 2);
+  const std::uint32_t v[] = {0x456247, 0x654642, 0x7fefff, 0x1000};
+  std::uint32_t words[3];
+  std::memcpy(words, chunk.data() + 13, sizeof words);
+  EXPECT_EQ(words[0], v[0] << 8 | (v[1] & 0xff));
+  EXPECT_EQ(words[1], (v[1] >> 8) << 16 | (v[2] & 0xffff));
+  EXPECT_EQ(words[2], (v[2] >> 16) << 24 | v[3]);
+  expect_comes_back(events);
+
+  // One row with x that fall: v = x << 1 | p.
+  for (auto& event : events) event.y_p = static_cast<std::uint16_t>((event.y_p & 0x8000) | 5);
+  events[1].x = 0x100;
+  events[2].x = 0x0ff;
+  chunk = encoded_chunk(events);
+  ASSERT_EQ(chunk.size(), 12U + 1 + 2 + 6);
+  EXPECT_EQ(chunk[0], 4 << 2 | 1);
+  const unsigned u[] = {0x247, 0x200, 0x1ff, 0};
+  std::uint16_t halves[3];
+  std::memcpy(halves, chunk.data() + 15, sizeof halves);
+  EXPECT_EQ(halves[0], u[0] << 4 | (u[1] & 0xf));
+  EXPECT_EQ(halves[1], ((u[1] >> 4) << 8 | (u[2] & 0xff)) & 0xffff);
+  EXPECT_EQ(halves[2], ((u[2] >> 8) << 12 | u[3]) & 0xffff);
+  expect_comes_back(events);
+}
+
+TEST(Ecf, ComesBack) {
+  for (const SensorSize size : {SensorSize{1, 1}, {2, 3}, {640, 480}, {2048, 2048}})
+    for (unsigned seed = 0; seed < 60; ++seed)
+      expect_comes_back(random_events(size, seed < 40 ? seed : seed * seed * 10, seed));
+  expect_comes_back(random_events({2048, 2048}, ecf_max_events, 1, -5'000'000'000));
+  // Runs at and around the lengths at which the encoding changes.
+  for (const std::size_t count : {14, 15, 16, 30, 31, 32, 126, 127, 128, 65534, 65535})
+    expect_comes_back(Events(count, AbsoluteEvent::at(2047, 2047, 1LL << 62, Polarity::on)));
+}
+
+TEST(Ecf, OtherWritersGoOnBehindTheLastEvent) {
+  auto chunk = encoded_chunk({AbsoluteEvent::at(5, 9, 100, Polarity::on),
+                              AbsoluteEvent::at(7, 9, 100, Polarity::on),
+                              AbsoluteEvent::at(3, 9, 1100, Polarity::off)});
+  chunk[21] |= 31;  // the last mask
+  Events out;
+  ASSERT_TRUE(decode_ecf(chunk, out));
+  EXPECT_EQ(out.size(), 3U);
+  EXPECT_EQ(out[2].x, 3);
+}
+
+TEST(Ecf, CorruptChunksAreRefused) {
+  const auto events = random_events({640, 480}, 500, 3);
+  const auto chunk = encoded_chunk(events);
+  Events out;
+  for (std::size_t size = 0; size < chunk.size(); ++size) {
+    EXPECT_FALSE(decode_ecf(std::span(chunk).first(size), out)) << size;
+    EXPECT_TRUE(out.empty());
+  }
+  // More events than a chunk can have, a run longer than the chunk, a time of more than 64 bits.
+  EXPECT_FALSE(decode_ecf(Bytes{0, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3}, out));
+  Bytes run = {4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2};
+  run.resize(100);
+  EXPECT_FALSE(decode_ecf(run, out));
+  Bytes endless = {4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+  endless.resize(100, 0xff);
+  EXPECT_FALSE(decode_ecf(endless, out));
 }
 
 }  // namespace

@@ -10,13 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "src/core/event.hpp"
-
 namespace npz_file {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// File in an archive: name and content.
 using Member = std::pair<std::string, Bytes>;
 
 /// NumPy array of `type`, such as <u2, with this shape.
@@ -35,26 +32,6 @@ Bytes array(const std::string& type, const std::string& shape, const std::vector
 template <class Number>
 Bytes column(const std::string& type, const std::vector<Number>& numbers) {
   return array("'" + type + "'", "(" + std::to_string(numbers.size()) + ",)", numbers);
-}
-
-/// Arrays of these events, in different number types, and one of something else.
-inline std::vector<Member> columns_of_events(
-    const std::vector<eventcamera::AbsoluteEvent>& events) {
-  std::vector<std::int64_t> t;
-  std::vector<std::uint16_t> x;
-  std::vector<std::int32_t> y;
-  std::vector<std::uint8_t> p;
-  for (const auto& event : events) {
-    t.push_back(event.t);
-    x.push_back(event.x);
-    y.push_back(event.y());
-    p.push_back(event.polarity() == eventcamera::Polarity::on ? 1 : 0);
-  }
-  return {{"x.npy", column("<u2", x)},
-          {"frames.npy", column("<u2", x)},
-          {"y.npy", column("<i4", y)},
-          {"t.npy", column("<i8", t)},
-          {"p.npy", column("|b1", p)}};
 }
 
 inline Bytes archive(const std::vector<Member>& members, bool is_compressed) {

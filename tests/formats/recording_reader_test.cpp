@@ -12,15 +12,13 @@
 #include <tuple>
 
 #include "src/formats/aedat/aedat4.hpp"
-#include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
-#include "src/formats/aedat/aedat_decoder.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/es/es.hpp"
 #include "src/formats/evt/raw.hpp"
-#include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace eventcamera {
@@ -44,16 +42,11 @@ Events some_events() {
   return events;
 }
 
-/// File, and how to read it.
 struct File {
   std::string name;
   Bytes bytes;
   RecordingReader::MakeDecoder make_decoder;
 };
-
-std::unique_ptr<AedatDecoder> make_aedat_decoder() {
-  return std::make_unique<AedatDecoder>();
-}
 
 File raw_file() {
   const auto encoder = make_prophesee_raw_encoder(EvtFormat::evt3, sensor);
@@ -64,8 +57,7 @@ File raw_file() {
 /// Without a stated size, and readable only from the start.
 File npy_file() {
   NpyEncoder encoder;
-  return {"npy", recordings::encode(encoder, some_events()),
-          [] { return std::make_unique<NpyDecoder>(); }};
+  return {"npy", recordings::encode(encoder, some_events()), [] { return make_npy_decoder(); }};
 }
 
 /// Encodes a frame whose pixels contain its number.
@@ -97,26 +89,23 @@ File aedat_file(bool has_table) {
   encoder.finish(bytes);
   recordings::apply_patch(encoder, bytes);
   return {has_table ? "aedat_with_a_table" : "aedat_without_a_table", std::move(bytes),
-          make_aedat_decoder};
+          [] { return make_aedat_decoder(); }};
 }
 
 /// As an older DV writes them: the table has the positions of the packets, and zeros.
 File aedat_file_with_a_table_of_zeros() {
   auto file = aedat_file(true);
-  Aedat4Decoder decoder;
-  decoder.push(file.bytes);
-  while (decoder.next()) continue;
-  const auto table_at = static_cast<std::ptrdiff_t>(decoder.table_at().value());
-  auto table = read_aedat4_table(std::span(file.bytes).subspan(*decoder.table_at()),
-                                 decoder.compression(), decoder.packets_at());
+  const auto header = read_aedat4_header(file.bytes).value();
+  const auto table_at = static_cast<std::ptrdiff_t>(header.table_at.value());
+  auto table = read_aedat4_table(std::span(file.bytes).subspan(*header.table_at),
+                                 header.compression, header.packets_at);
   for (auto& entry : table.value()) entry.elements = entry.start = entry.end = 0;
   file.name = "aedat_with_a_table_of_zeros";
   file.bytes.erase(file.bytes.begin() + table_at, file.bytes.end());
-  make_aedat4_compressor(decoder.compression()).compress(aedat4_table_content(*table), file.bytes);
+  make_aedat4_compressor(header.compression).compress(aedat4_table_content(*table), file.bytes);
   return file;
 }
 
-/// Complete output.
 struct Outcome {
   using Chunk = std::tuple<std::size_t, Microseconds, Microseconds, std::vector<Event>>;
   using Picture = std::tuple<std::size_t, Microseconds, std::uint8_t>;
@@ -241,7 +230,7 @@ TEST(RecordingReader, ReadsStreamsThatAreWrittenOneAfterTheOther) {
   for (const bool frames_first : {false, true}) {
     const auto bytes = aedat_of_parts(frames_first);
     for (const std::size_t size : {std::size_t{1000}, bytes.size()}) {
-      RecordingReader reader(make_aedat_decoder, chunk_length);
+      RecordingReader reader([] { return make_aedat_decoder(); }, chunk_length);
       Outcome outcome;
       outcome.take_all(reader, bytes, size);
       EXPECT_EQ(outcome.events(reader.origin()), some_events());
@@ -257,7 +246,7 @@ TEST(RecordingReader, ReadsStreamsThatAreWrittenOneAfterTheOther) {
     }
 
     MemoryBytes source(bytes);
-    RecordingReader reader(make_aedat_decoder, chunk_length);
+    RecordingReader reader([] { return make_aedat_decoder(); }, chunk_length);
     reader.open(source);
     reader.seek(200'000, 400'000);
     Outcome part;
@@ -312,7 +301,7 @@ TEST(RecordingReader, DoesNotReadOnWhileAStreamIsSilent) {
     encoder.finish(bytes);
     recordings::apply_patch(encoder, bytes);
     WatchedBytes source(bytes);
-    RecordingReader reader(make_aedat_decoder, chunk_length);
+    RecordingReader reader([] { return make_aedat_decoder(); }, chunk_length);
     reader.open(source);
     reader.seek(0, stop);
     Outcome outcome;
@@ -359,41 +348,6 @@ TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
     EXPECT_GE(trigger.t, 3'700'000);
     EXPECT_LT(trigger.t, 3'900'000);
   }
-}
-
-/// Of a file that does not state its size. It has more rows than the decoder samples, whose events
-/// move out of the size that the first ones fit into.
-TEST(RecordingReader, GrowsAnAssumedSensorBeforeTheEventsThatNeedIt) {
-  Events growing;
-  for (int i = 0; i < 60'000; ++i)
-    growing.push_back(AbsoluteEvent::at(i / 60, i / 100, Microseconds{50} * i, Polarity::off));
-  NpyEncoder encoder;
-  const auto file = recordings::encode(encoder, growing);
-  RecordingReader reader(npy_file().make_decoder, chunk_length);
-  std::vector<SensorSize> sizes;
-  std::size_t events = 0;
-  for (const auto piece : recordings::pieces_of(file, 500)) {
-    reader.push(piece);
-    while (const auto output = reader.next()) {
-      const auto* const chunk = std::get_if<RecordingReader::Chunk>(&*output);
-      if (chunk == nullptr) continue;
-      const auto size = reader.streams().front().info.size;
-      if (sizes.empty() || sizes.back() != size) sizes.push_back(size);
-      for (const auto& event : chunk->events) {
-        EXPECT_LT(event.x, size.width);
-        EXPECT_LT(event.y(), size.height);
-      }
-      events += chunk->events.size();
-    }
-  }
-  reader.finish();
-  Outcome rest;
-  rest.take_all(reader);
-  EXPECT_EQ(events + rest.events(0).size(), 60'000U);
-  EXPECT_EQ(reader.counts().outside, 0U);
-  ASSERT_GE(sizes.size(), 3U);
-  EXPECT_EQ(sizes.front(), (SensorSize{128, 128}));
-  EXPECT_EQ(sizes.back(), (SensorSize{1280, 720}));
 }
 
 TEST(RecordingReader, GuessesTheSizeOfASensorFromMostEvents) {
@@ -496,29 +450,6 @@ TEST(RecordingReader, FindsTheFirstEventsAfterALongSilence) {
   }
 }
 
-/// Words of a stream have stream time, starting with their first event.
-TEST(RecordingReader, MovesWordsToTheTimeOfTheirStream) {
-  const Events events{AbsoluteEvent::at(1, 2, 12'000, Polarity::on),
-                      AbsoluteEvent::at(3, 4, 19'000, Polarity::off)};
-  const auto encoder = make_evt_encoder(EvtFormat::evt3, sensor);
-  const auto bytes = recordings::encode(*encoder, events);
-  RecordingReader reader([] { return make_evt_decoder(EvtFormat::evt3, sensor); }, chunk_length,
-                         RecordingReader::Clock::stream);
-  reader.advance_to(5'000'000);
-  EXPECT_FALSE(reader.has_events());
-  const Microseconds hours = Microseconds{5} * 3600 * 1'000'000;
-  reader.push(bytes, RecordingReader::Interval{hours, 10'000});
-  Outcome outcome;
-  outcome.take_all(reader);
-  EXPECT_TRUE(outcome.chunks.empty());
-  reader.advance_to(hours + 60'000'000);
-  EXPECT_TRUE(reader.has_events());
-  outcome.take_all(reader);
-  EXPECT_EQ(outcome.events(0).size(), 2U);
-  EXPECT_EQ(std::get<1>(outcome.chunks.front()), hours);
-  EXPECT_TRUE(std::get<3>(outcome.chunks.back()).empty());
-}
-
 /// EVT3 words, of which the last is incomplete.
 Bytes words_of(std::initializer_list<std::uint16_t> words) {
   Bytes bytes;
@@ -569,9 +500,7 @@ TEST(RecordingReader, SortsATableOrRefusesIt) {
     std::ranges::stable_sort(expected, {}, &AbsoluteEvent::t);
     const auto first = expected.front().t;
     for (const SensorSize size : {SensorSize{}, sensor}) {
-      const auto make = [size] {
-        return std::make_unique<NpyDecoder>(TableSettings{.size = size});
-      };
+      const auto make = [size] { return make_npy_decoder(TableSettings{.size = size}); };
       MemoryBytes bytes(file);
       RecordingReader pulled(make, chunk_length);
       pulled.open(bytes);
@@ -610,7 +539,7 @@ TEST(RecordingReader, DropsAWrongTimeOfALongTable) {
   events[100].t += Microseconds{1} << 30;
   NpyEncoder encoder;
   MemoryBytes table(recordings::encode(encoder, events));
-  RecordingReader pulled([] { return std::make_unique<NpyDecoder>(); }, chunk_length);
+  RecordingReader pulled([] { return make_npy_decoder(); }, chunk_length);
   pulled.open(table);
   Outcome outcome;
   outcome.take_all(pulled);

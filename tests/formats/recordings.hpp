@@ -121,14 +121,49 @@ inline std::vector<std::span<const std::uint8_t>> pieces_of(std::span<const std:
   return pieces;
 }
 
-/// Decodes everything, each piece in memory of its own.
-inline Decoded decode(EventDecoder& decoder, std::span<const std::uint8_t> bytes,
-                      std::size_t piece = SIZE_MAX) {
-  Decoded decoded;
-  for (const auto part : pieces_of(bytes, piece))
-    decoder.decode(Bytes(part.begin(), part.end()), decoded);
-  decoder.finish(decoded);
-  return decoded;
+struct Picture {
+  Frame frame;
+  Bytes pixels;
+};
+
+/// Complete output of a decoder.
+struct Contents {
+  Events events;
+  std::vector<Picture> pictures;
+  std::vector<Trigger> triggers;
+  std::vector<ImuSample> imu_samples;
+
+  void take_all(Decoder& decoder) {
+    const auto append = [](const auto& some, auto& all) {
+      all.insert(all.end(), some.begin(), some.end());
+    };
+    while (const auto item = decoder.next()) {
+      if (const auto* const some = std::get_if<EventItem>(&*item)) {
+        append(some->events, events);
+      } else if (const auto* const picture = std::get_if<FrameItem>(&*item)) {
+        const auto& frame = picture->frame;
+        pictures.push_back({frame, {frame.pixels, frame.pixels + frame.stride * frame.height}});
+      } else if (const auto* const edges = std::get_if<TriggerItem>(&*item)) {
+        append(edges->triggers, triggers);
+      } else {
+        append(std::get<ImuItem>(*item).samples, imu_samples);
+      }
+    }
+  }
+};
+
+/// Pushes everything, each piece in memory of its own.
+inline Contents decode(Decoder& decoder, std::span<const std::uint8_t> bytes,
+                       std::size_t piece = SIZE_MAX) {
+  Contents contents;
+  for (const auto part : pieces_of(bytes, piece)) {
+    const Bytes copy(part.begin(), part.end());
+    decoder.push(copy);
+    contents.take_all(decoder);
+  }
+  decoder.drain();
+  contents.take_all(decoder);
+  return contents;
 }
 
 /// Events of a decoder; throws if its output differs between splits of these bytes.
@@ -136,10 +171,10 @@ template <class Make>
 Events events_however_split(const Make& make, std::span<const std::uint8_t> bytes) {
   const auto outcome = [&](std::size_t piece) {
     const auto decoder = make();
-    const auto decoded = decode(*decoder, bytes, piece);
+    const auto contents = decode(*decoder, bytes, piece);
     const auto& corruption = decoder->corruption();
-    return std::tuple(decoded.events, decoded.triggers, decoder->size(), corruption.places,
-                      corruption.first_at, corruption.first, corruption.outside);
+    return std::tuple(contents.events, contents.triggers, decoder->streams().front().size,
+                      corruption.places, corruption.first_at, corruption.first, corruption.outside);
   };
   const auto whole = outcome(SIZE_MAX);
   for (const std::size_t piece : {1, 7, 4097, 0})
@@ -169,7 +204,7 @@ class BreakableBytes final : public ByteSource {
 };
 
 /// Error of a decoder for a file; empty if it succeeds.
-inline std::string refusal(EventDecoder& decoder, std::span<const std::uint8_t> bytes) {
+inline std::string refusal(Decoder& decoder, std::span<const std::uint8_t> bytes) {
   try {
     decode(decoder, bytes);
   } catch (const UnsupportedFormat& exception) {

@@ -12,7 +12,6 @@ namespace {
 
 using namespace fuzz;
 
-/// Event numbered in push order.
 AbsoluteEvent numbered(std::uint64_t number, std::uint64_t t) {
   return {static_cast<Microseconds>(t), static_cast<std::uint16_t>(number),
           static_cast<std::uint16_t>(number >> 16)};
@@ -22,7 +21,6 @@ std::uint32_t number_of(const Event& event) {
   return static_cast<std::uint32_t>(event.y_p) << 16 | event.x;
 }
 
-/// Takes all complete intervals and returns their number of events.
 std::uint64_t take(Chunker& chunker, std::optional<Microseconds>& end) {
   std::uint64_t count = 0;
   while (const auto interval = chunker.next()) {

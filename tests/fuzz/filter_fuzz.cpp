@@ -7,13 +7,10 @@
 
 #include "src/core/byte_order.hpp"
 #include "src/filter/camera_calibration.hpp"
-#include "src/filter/crop_filter.hpp"
 #include "src/filter/denoise_filter.hpp"
 #include "src/filter/event_merge.hpp"
 #include "src/filter/flicker_filter.hpp"
-#include "src/filter/flip_filter.hpp"
 #include "src/filter/hot_pixel_filter.hpp"
-#include "src/filter/pixel_mask.hpp"
 #include "src/filter/rate_filter.hpp"
 #include "src/filter/refractory_filter.hpp"
 #include "src/filter/scale_filter.hpp"
@@ -84,19 +81,7 @@ void check_moved(const std::vector<Buffer>& buffers, SensorSize out, const Filte
       require(event.x < out.width && event.y() < out.height, "events are inside the output");
 }
 
-void check_geometry(const std::vector<Buffer>& buffers) {
-  for (const bool transpose : {false, true})
-    for (const bool mirror : {false, true}) {
-      const Orientation orientation{
-          .transpose = transpose, .mirror_x = mirror, .mirror_y = !mirror};
-      check_moved(buffers, orientation.size(sensor), [&](LabelledEvents events, Microseconds) {
-        return FlipFilter(sensor, orientation).filter(events);
-      });
-    }
-  constexpr SensorSize region{13, 5};
-  check_moved(buffers, region, [&](LabelledEvents events, Microseconds start) {
-    return CropFilter(sensor, region).filter(events, start, {.left = 1, .top = 3});
-  });
+void check_scaled(const std::vector<Buffer>& buffers) {
   for (const SensorSize size : {SensorSize{5, 4}, SensorSize{40, 30}})
     for (const unsigned min_events : {1U, 3U}) {
       ScaleFilter scale(sensor, size);
@@ -122,24 +107,6 @@ void check_undistorted(const std::vector<Buffer>& buffers, std::span<const std::
     const UndistortFilter filter(sensor, calibration_of(lens, bytes));
     check_moved(buffers, sensor,
                 [&](LabelledEvents events, Microseconds) { return filter.filter(events); });
-  }
-}
-
-/// Masks the pixels whose byte is odd.
-void check_masked(const std::vector<Buffer>& buffers, std::span<const std::uint8_t> bytes) {
-  const auto is_masked = [&](int x, int y) {
-    const auto i = static_cast<std::size_t>(y * sensor.width + x);
-    return i < bytes.size() && bytes[i] % 2 != 0;
-  };
-  PixelMask mask(sensor);
-  for (int y = 0; y < sensor.height; ++y)
-    for (int x = 0; x < sensor.width; ++x)
-      if (!is_masked(x, y)) mask.keep(x, y);
-  for (auto [start, events] : buffers) {
-    auto expected = events;
-    std::erase_if(expected, [&](const Event& event) { return is_masked(event.x, event.y()); });
-    const auto kept = mask.filter({events, {}}).events;
-    require(std::ranges::equal(kept, expected), "the mask keeps what it does not cover");
   }
 }
 
@@ -192,9 +159,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
        {DenoiseMethod::baf, DenoiseMethod::stcf, DenoiseMethod::time_kernel, DenoiseMethod::dwf})
     for (const bool match_polarity : {false, true})
       check<DenoiseFilter>(buffers, {.method = method, .match_polarity = match_polarity});
-  check_geometry(buffers);
+  check_scaled(buffers);
   check_undistorted(buffers, {data, size});
-  check_masked(buffers, {data, size});
   check_merged(buffers);
   return 0;
 }

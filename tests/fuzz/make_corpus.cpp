@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Writes the seed corpora for fuzzing: make_corpus DIRECTORY
 #include <png.h>
+#include <zlib.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -10,19 +13,34 @@
 #include <string_view>
 #include <vector>
 
+#include "src/formats/aedat/aedat4_encoder.hpp"
+#include "src/formats/hdf5/ecf.hpp"
+#include "src/formats/numpy/npy_encoder.hpp"
+#include "src/formats/numpy/npz.hpp"
 #include "src/formats/ros/mcap_encoder.hpp"
+#include "tests/formats/aedat_files.hpp"
 #include "tests/formats/compressed.hpp"
+#include "tests/formats/decoders.hpp"
 #include "tests/formats/formats.hpp"
+#include "tests/formats/npz_file.hpp"
 #include "tests/formats/recordings.hpp"
-#include "tests/formats/rosbags.hpp"
-#include "tests/fuzz/aedat_seeds.hpp"
-#include "tests/fuzz/table_seeds.hpp"
 #include "tests/wire/datagrams.hpp"
 #include "tests/wire/rtp_packets.hpp"
 
 namespace {
 
-using namespace fuzz;
+using namespace eventcamera;
+using recordings::Bytes;
+using recordings::bytes_of;
+
+struct Seed {
+  std::string name;
+  std::vector<std::uint8_t> bytes;
+};
+
+recordings::Events few_events(unsigned seed, SensorSize size, std::size_t count) {
+  return recordings::random_events(size, count, seed, 0, 3'600'000'000);
+}
 
 void add(Seed& seed, std::initializer_list<int> bytes) {
   for (const int byte : bytes) seed.bytes.push_back(static_cast<std::uint8_t>(byte));
@@ -49,7 +67,159 @@ std::vector<Seed> seeds_of(const formats::Format& format) {
   return seeds;
 }
 
-/// For bag_fuzz: one topic, and small pages of a database.
+std::vector<Seed> aedat2_seeds() {
+  constexpr SensorSize davis{346, 260};
+  constexpr SensorSize dvs128{128, 128};
+  return {{"davis", aedat_files::aedat2_davis(few_events(1, davis, 40), davis, "Davis346blue")},
+          {"dvs128", aedat_files::aedat2_dvs128(few_events(2, dvs128, 40))},
+          {"v2e", aedat_files::aedat2_v2e(few_events(3, davis, 40), davis)},
+          {"matlab", aedat_files::aedat2_of_matlab(few_events(4, dvs128, 40))},
+          {"first", aedat_files::aedat1(few_events(5, dvs128, 40))},
+          {"empty", aedat_files::aedat2_header("")}};
+}
+
+std::vector<Seed> aedat3_seeds() {
+  auto mixed = aedat_files::aedat3_header("DVS128");
+  aedat_files::add_aedat3_packet_header(mixed, 0, 8, 1, 2);
+  for (const int type : {2, 3}) {
+    aedat_files::add_little(mixed, type << 1 | 1, 4);
+    aedat_files::add_little(mixed, 100 + type, 4);
+  }
+  aedat_files::add_aedat3_packet_header(mixed, 3, 36, 0, 1);
+  mixed.resize(mixed.size() + 36, 1);
+  return {{"davis", aedat_files::aedat3(few_events(1, {346, 260}, 30), "DAVIS346", 10)},
+          {"other", aedat_files::aedat3(few_events(2, {500, 400}, 30), "other", 10)},
+          {"mixed", mixed}};
+}
+
+std::vector<Seed> aedat4_seeds() {
+  constexpr SensorSize size{346, 260};
+  const auto events = few_events(1, size, 16);
+  const std::array<std::uint8_t, 48> pixels{1, 2, 3};
+  const std::array<Trigger, 2> edges{{{1000, 0, true}, {1001, 3, false}}};
+  const std::array<ImuSample, 2> samples{
+      {{1000, 40, {0, -1, 0}, {1, 2, 3}, {}}, {2000, 40, {0, -1, 0}, {3, 2, 1}, {}}}};
+  std::vector<Seed> seeds;
+  for (const auto compression :
+       {Aedat4Compression::none, Aedat4Compression::lz4, Aedat4Compression::zstd}) {
+    Aedat4Encoder encoder({size, "seed", compression, true, true, true, true});
+    std::vector<std::uint8_t> bytes;
+    encoder.encode(std::span<const Trigger>(edges), bytes);
+    encoder.encode(std::span<const ImuSample>(samples), bytes);
+    encoder.encode(std::span(events).first(10), bytes);
+    encoder.encode({1500, 0, 0, 0, 0, PixelFormat::bgr, 4, 4, 0, 0, pixels.data(), 12}, bytes);
+    encoder.encode(std::span(events).subspan(10), bytes);
+    encoder.finish(bytes);
+    const auto name = std::to_string(static_cast<int>(compression));
+    seeds.push_back({"unfinished-" + name, bytes});
+    const auto patch = encoder.patch().value();
+    std::copy(patch.bytes.begin(), patch.bytes.end(),
+              bytes.begin() + static_cast<std::ptrdiff_t>(patch.position));
+    seeds.push_back({"compression-" + name, bytes});
+  }
+  auto unlisted = aedat_files::aedat4_header("");
+  aedat_files::add_packet(unlisted, 0, aedat_files::events_content(events));
+  const std::array<aedat_files::TriggerSource, 2> triggers{{{1000, 1}, {1001, 2}}};
+  aedat_files::add_packet(unlisted, 1, aedat_files::triggers_content(triggers));
+  seeds.push_back({"unlisted", unlisted});
+  return seeds;
+}
+
+std::vector<Seed> csv_seeds() {
+  std::vector<Seed> seeds;
+  for (const auto& [name, description, format] : csv_formats()) {
+    const auto encoder = make_csv_encoder(format, {640, 480});
+    seeds.push_back(
+        {std::string(name), recordings::encode(*encoder, few_events(1, {640, 480}, 20))});
+  }
+  seeds.push_back({"index", bytes_of(",t_ns,x,y,p\n0,1500,3,4,1\n1,2500,5,6,0\n")});
+  seeds.push_back(
+      {"floats", bytes_of("1.0e+01 3.0e+00 4.0e+00 1.0e+00\n1.2e+01 5.0e+00 6.0e+00 0.0e+00\n")});
+  seeds.push_back(
+      {"other", bytes_of("# a comment\n\"X\"; Y ;Pol;time [s]\r\n1;2;true;1e-3\n3;4;-1;.5\n"
+                         "1.0e0;2.00;false;0.0010005\n\n7;8\n")});
+  return seeds;
+}
+
+std::vector<Seed> npy_seeds() {
+  NpyEncoder encoder;
+  const auto ours = recordings::encode(encoder, few_events(1, {640, 480}, 20));
+  auto other = bytes_of(std::string("\x93NUMPY\x02\x00\xa0\x00\x00\x00", 12) +
+                        "{'descr': [('p', '|b1'), ('', '|V3'), (('a', 't'), '>f8'), ('x', '<f2'), "
+                        "('y', '>i4', ), ('z', '<u2', (2, 3))], 'fortran_order': False, "
+                        "'shape': (3,), }");
+  other.resize(12 + 0xa0, ' ');
+  other.resize(other.size() + 3 * 30, 0x3c);
+  const std::vector<double> numbers = {0.5, 3, 4, 1, 0.75, 5, 6, 0};
+  return {{"ours", ours}, {"other", other}, {"rows", npz_file::array("'<f8'", "(2, 4)", numbers)}};
+}
+
+std::vector<Seed> npz_seeds() {
+  const SensorSize size = {640, 480};
+  std::vector<Seed> seeds = {
+      {"ours", recordings::encode(*make_npz_encoder(size), few_events(1, size, 20))}};
+  const auto rows = npy_seeds().back().bytes;
+  for (const bool is_compressed : {false, true}) {
+    const std::string how = is_compressed ? "-packed" : "-stored";
+    seeds.push_back({"columns" + how,
+                     npz_file::archive({{"t_ns.npy", npz_file::column<double>("<f8", {10, 20})},
+                                        {"x.npy", npz_file::column<std::uint16_t>("<u2", {1, 2})},
+                                        {"y.npy", npz_file::column<std::int32_t>("<i4", {3, 4})},
+                                        {"p.npy", npz_file::column<std::uint8_t>("|b1", {0, 1})}},
+                                       is_compressed)});
+    seeds.push_back({"rows" + how, npz_file::archive({{"arr_0.npy", rows}}, is_compressed)});
+  }
+  return seeds;
+}
+
+std::vector<Seed> ecf_seeds() {
+  std::vector<Seed> seeds;
+  for (const SensorSize size : {SensorSize{2, 3}, {128, 128}, {640, 480}, {2048, 2048}}) {
+    for (unsigned seed = 0; seed < 5; ++seed) {
+      Bytes chunk;
+      encode_ecf(few_events(seed, size, std::size_t{40} * seed), chunk);
+      seeds.push_back({std::to_string(size.width) + "-" + std::to_string(seed), chunk});
+    }
+  }
+  return seeds;
+}
+
+Bytes deflated(const Bytes& bytes) {
+  Bytes packed(compressBound(bytes.size()));
+  auto size = static_cast<uLongf>(packed.size());
+  compress(packed.data(), &size, bytes.data(), bytes.size());
+  packed.resize(size);
+  return packed;
+}
+
+/// For chunks of HDF5: layout, filters, and the bytes of a chunk.
+std::vector<Seed> hdf5_chunk_seeds() {
+  auto seeds = ecf_seeds();
+  for (auto& seed : seeds) seed.bytes.insert(seed.bytes.begin(), {2, 0, 200, 250, 0});
+  for (const std::uint8_t layout : {0, 1, 3}) {
+    for (const std::uint8_t filters : {0, 1, 2, 3}) {
+      Bytes bytes = {layout, filters, 16, 30, 0};
+      Bytes rows(std::size_t{16} * (layout == 0 ? 4 : 16), 1);
+      if ((filters & 1) != 0) rows = deflated(rows);
+      bytes.insert(bytes.end(), rows.begin(), rows.end());
+      seeds.push_back({"other-" + std::to_string(layout) + "-" + std::to_string(filters), bytes});
+    }
+  }
+  return seeds;
+}
+
+/// For the filters of HDF5: filters, those that are not applied, and 16 numbers of 4 bytes.
+std::vector<Seed> hdf5_filters_seeds() {
+  const Bytes numbers(64, 1);
+  Bytes shuffled = {1, 1, 1, 6, 3};
+  shuffled.insert(shuffled.end(), numbers.begin(), numbers.end());
+  Bytes packed = {1, 0, 2, 4, 3};
+  const auto bytes = deflated(numbers);
+  packed.insert(packed.end(), bytes.begin(), bytes.end());
+  return {{"empty", {1, 1, 1, 6, 3}}, {"shuffled", shuffled}, {"packed", packed}};
+}
+
+/// For bags; tests/fuzz/run adds those of other programs.
 std::vector<Seed> bag_seeds() {
   constexpr SensorSize size{346, 260};
   const auto events = few_events(1, size, 24);
@@ -58,8 +228,6 @@ std::vector<Seed> bag_seeds() {
     for (const auto compression : {BagCompression::none, BagCompression::lz4, BagCompression::zstd})
       seeds.push_back({"mcap-" + std::to_string(seeds.size()),
                        recordings::encode(*make_mcap_encoder({size, kind, compression}), events)});
-  seeds.push_back({"rosbag", rosbags::of_events(size, events, 12)});
-  seeds.push_back({"db3", rosbags::db3_of_events(size, events, 1, 512)});
   return seeds;
 }
 
@@ -147,7 +315,6 @@ std::vector<Seed> pixel_list_seeds() {
   return {seed_of("list", "# Hot pixels\n1 2\n\n 300, 16383\r\n")};
 }
 
-/// For rtp_fuzz: streams of both formats.
 std::vector<Seed> rtp_seeds() {
   constexpr SensorSize size{640, 480};
   std::vector<Seed> seeds;
@@ -219,7 +386,6 @@ std::vector<Seed> mask_seeds() {
   return seeds;
 }
 
-/// A file of text, compressed.
 std::vector<Seed> compressed_seeds() {
   const auto text = recordings::bytes_of("t,x,y,p\n100,10,20,1\n200,11,21,0\n1300,12,22,1\n");
   return {{"gzip", compressed::gzip(text)}, {"zstd", compressed::zstd(text)}};
@@ -235,8 +401,8 @@ int main(int argc, char** argv) {
   const std::filesystem::path corpus = argv[1];
   std::map<std::string, std::vector<Seed>> files = {
       {"aedat2", aedat2_seeds()}, {"aedat3", aedat3_seeds()}, {"aedat4", aedat4_seeds()},
-      {"csv", csv_seeds()},       {"hdf5", hdf5_seeds()},     {"npy", npy_seeds()},
-      {"npz", npz_seeds()},       {"bag", bag_seeds()}};
+      {"csv", csv_seeds()},       {"npy", npy_seeds()},       {"npz", npz_seeds()},
+      {"bag", bag_seeds()}};
   std::map<std::string, std::vector<Seed>> others = {{"atis", atis_seeds()},
                                                      {"calibration", calibration_seeds()},
                                                      {"camera_profile", camera_profile_seeds()},

@@ -9,8 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "src/core/rgb_luma.hpp"
 #include "src/gl/context.hpp"
-#include "src/gl/grey_frame.hpp"
+#include "src/gl/objects.hpp"
 
 namespace gl_test {
 
@@ -97,9 +98,13 @@ class Texture {
     return bytes;
   }
 
-  eventcamera::gl::TextureFrame frame(const int (&weights)[4], int alpha = -1,
-                                      int black = 0) const {
-    return {format_, name_, {weights[0], weights[1], weights[2], weights[3]}, alpha, black};
+  /// A frame whose luma is the first channel.
+  eventcamera::gl::TextureFrame frame() const {
+    return {format_, name_, {eventcamera::LumaWeights::one, 0, 0, 0}};
+  }
+  eventcamera::gl::TextureFrame show(const std::vector<std::uint8_t>& picture) {
+    upload(picture);
+    return frame();
   }
 
  private:

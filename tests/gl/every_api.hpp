@@ -12,14 +12,12 @@
 
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
-#include "src/gl/grey_frame.hpp"
 #include "src/gl/kernels.hpp"
+#include "src/gl/objects.hpp"
 #include "src/gl/simulator.hpp"
 #include "tests/gl/egl_context.hpp"
 
 namespace gl_test {
-
-constexpr int one = eventcamera::LumaWeights::one;
 
 inline std::vector<std::uint8_t> bytes_of(const eventcamera::Image<std::uint8_t>& picture) {
   std::vector<std::uint8_t> bytes;
@@ -28,15 +26,14 @@ inline std::vector<std::uint8_t> bytes_of(const eventcamera::Image<std::uint8_t>
   return bytes;
 }
 
-/// With OpenGL ES and OpenGL.
+/// With OpenGL ES and OpenGL. Instantiated once in each executable.
 class EveryApi : public testing::TestWithParam<bool> {
  protected:
   /// Writes a picture to a frame on the GPU.
   void upload(const eventcamera::Image<std::uint8_t>& picture,
               const eventcamera::gl::GreyFrame& frame) {
     Texture texture(picture.width(), picture.height(), 1);
-    texture.upload(bytes_of(picture));
-    luma_kernel.run(texture.frame({one, 0, 0, 0}), frame);
+    luma_kernel.run(texture.show(bytes_of(picture)), frame);
   }
 
   EglContext current{GetParam()};

@@ -6,21 +6,17 @@
 #include <bit>
 #include <cmath>
 #include <memory>
-#include <random>
 #include <span>
 #include <thread>
 #include <utility>
 #include <vector>
 
-#include "src/core/luma.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/gl/kernels.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/simulator.hpp"
 #include "src/render/accumulator.hpp"
-#include "src/simulate/diff_simulator.hpp"
-#include "src/simulate/frame_simulator.hpp"
-#include "src/simulate/sparse_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 #include "tests/gl/every_api.hpp"
 #include "tests/simulate/scene.hpp"
 
@@ -31,7 +27,6 @@ using gl_test::bytes_of;
 using gl_test::EglContext;
 using gl_test::EveryApi;
 using gl_test::matched;
-using gl_test::one;
 using gl_test::Texture;
 
 INSTANTIATE_TEST_SUITE_P(, EveryApi, testing::Bool(), gl_test::name_of_api);
@@ -43,8 +38,7 @@ void expect_same_events(gl::Simulator& ours, Simulator& reference, const Setting
   Nanoseconds time = 5;
   std::size_t events = 0;
   for (const auto& frame : frames) {
-    texture.upload(bytes_of(frame));
-    const auto* made = gl_test::events_until(ours, texture.frame({one, 0, 0, 0}), time, settings);
+    const auto* made = gl_test::events_until(ours, texture.show(bytes_of(frame)), time, settings);
     const auto* expected = reference.push(scene::luma(frame), time, settings);
     ASSERT_EQ(made == nullptr, expected == nullptr);
     if (made != nullptr) {
@@ -76,83 +70,16 @@ TEST_P(EveryApi, MakesTheEventsOfFrameDifferencesBitForBit) {
   }
 }
 
-TEST_P(EveryApi, ComputesTheLumaOfColoursBitForBit) {
-  constexpr int width = 61;
-  constexpr int height = 50;
-  const LumaFormat format{width, height, 8};
-  const auto weights = LumaWeights::of(0.2126, 0.0722);
-  const auto ours = gl::make_frame_simulator(context, format);
-  const auto reference = make_frame_simulator(format);
-  std::minstd_rand random(3);
-  Settings settings;
-  settings.positive_threshold = 0;
-  settings.negative_threshold = 0;
-  Texture texture(width, height, 4);
-  ThreadPool threads;
-  for (int i = 0; i < 5; ++i) {
-    std::vector<std::uint8_t> bgra(width * height * 4);
-    for (auto& byte : bgra) byte = static_cast<std::uint8_t>(random() >> 8);
-    Image<std::uint8_t> luma(width, height);
-    luma_of_rgb(RgbView{4,
-                        {bgra.data(), width * 4, 2},
-                        {bgra.data(), width * 4, 1},
-                        {bgra.data(), width * 4, 0}},
-                weights, threads, luma);
-    const bool is_narrow = i == 3;
-    const bool is_opaque = i < 2;
-    if (!is_opaque)
-      composite_on_black({format, luma.view().data, luma.stride(), is_narrow},
-                         {&bgra[3], width * 4, 4}, threads, luma);
-    texture.upload(bgra);
-    const auto* made =
-        gl_test::events_until(*ours,
-                              texture.frame({weights.blue, weights.green, weights.red, 0},
-                                            is_opaque ? -1 : 3, is_narrow ? 16 : 0),
-                              i * scene::frame_time, settings);
-    const auto* expected = reference->push(scene::luma(luma), i * scene::frame_time, settings);
-    if (i == 0) continue;
-    ASSERT_EQ(scene::copy(*made), scene::copy(*expected));
-  }
-}
-
-/// Pushes frames of a moving texture to both, and compares the events, which may differ where the
-/// last bits of tracks do.
-void expect_similar_events(gl::Simulator& ours, Simulator& reference) {
-  constexpr int width = 67;
-  constexpr int height = 45;
-  Texture texture(width, height, 1);
-  Settings settings;
-  settings.positive_threshold = 12;
-  settings.negative_threshold = 9;
-  std::size_t interpolated = 0;
-  for (int i = 0; i < 5; ++i) {
-    const auto frame = scene::texture<std::uint8_t>(width, height, 8, 1.7 * i, 0.6 * i);
-    texture.upload(bytes_of(frame));
-    settings.interpolated_frames = i == 3 ? 0 : 10;
-    const auto* made =
-        gl_test::events_until(ours, texture.frame({one, 0, 0, 0}), i * scene::frame_time, settings);
-    const auto* expected = reference.push(scene::luma(frame), i * scene::frame_time, settings);
-    if (i == 0) continue;
-    const auto events = scene::copy(*made);
-    const auto wanted = scene::copy(*expected);
-    EXPECT_TRUE(scene::sorted(events));
-    if (i == 3) {  // no tracks
-      ASSERT_EQ(events, wanted);
-      continue;
-    }
-    if (wanted.front().t != wanted.back().t) interpolated += wanted.size();
-    const auto step = static_cast<std::uint32_t>(scene::frame_time / 11 / 1000 + 1);
-    EXPECT_GE(matched(events, wanted, step), 0.995);
-    EXPECT_GE(matched(wanted, events, step), 0.995);
-    EXPECT_NEAR(static_cast<double>(events.size()), static_cast<double>(wanted.size()),
-                0.005 * static_cast<double>(wanted.size()));
-  }
-  EXPECT_GT(interpolated, 5'000U);
-}
-
-TEST_P(EveryApi, FollowsDifferencesAsTheCpuDoes) {
+TEST_P(EveryApi, MakesTheEventsOfTheCpuWhereNothingIsInterpolated) {
   const LumaFormat format{67, 45, 8};
-  expect_similar_events(*gl::make_diff_simulator(context, format), *make_diff_simulator(format));
+  const Settings settings{12, 9, 0};
+  std::vector<Image<std::uint8_t>> frames;
+  for (int i = 0; i < 3; ++i)
+    frames.push_back(scene::texture<std::uint8_t>(67, 45, 8, 1.7 * i, 0.6 * i));
+  expect_same_events(*gl::make_diff_simulator(context, format), *make_diff_simulator(format),
+                     settings, frames);
+  expect_same_events(*gl::make_sparse_simulator(context, format), *make_sparse_simulator(format),
+                     settings, frames);
 }
 
 /// A patch of a texture that moves over a flat background.
@@ -176,10 +103,9 @@ TEST_P(EveryApi, InterpolatesMoreStepsThanItProcessesAtOnce) {
                                 : gl::make_diff_simulator(context, format);
     const auto reference = is_sparse ? make_sparse_simulator(format) : make_diff_simulator(format);
     for (int i = is_sparse ? 1 : 0; i < 3; ++i) {  // diff interpolates from the third frame on
-      texture.upload(bytes_of(patch(side, i)));
       const auto time = i * scene::frame_time;
       const auto* made =
-          gl_test::events_until(*ours, texture.frame({one, 0, 0, 0}), time, settings);
+          gl_test::events_until(*ours, texture.show(bytes_of(patch(side, i))), time, settings);
       const auto* expected = reference->push(scene::luma(patch(side, i)), time, settings);
       if (i < 2) continue;
       const auto events = scene::copy(*made);
@@ -189,12 +115,6 @@ TEST_P(EveryApi, InterpolatesMoreStepsThanItProcessesAtOnce) {
       EXPECT_GE(matched(wanted, events, 0), 0.99) << is_sparse;
     }
   }
-}
-
-TEST_P(EveryApi, FollowsChangedPixelsAsTheCpuDoes) {
-  const LumaFormat format{67, 45, 8};
-  expect_similar_events(*gl::make_sparse_simulator(context, format),
-                        *make_sparse_simulator(format));
 }
 
 /// The picture that the CPU draws of these events.
@@ -229,8 +149,8 @@ TEST_P(EveryApi, DrawsItsEventsAsTheCpuDoes) {
       settings.positive_threshold = 3;
       settings.negative_threshold = 4;
       for (int i = 0; i < 4; ++i) {
-        texture.upload(bytes_of(scene::texture<std::uint8_t>(width, height, 8, 1.7 * i, 0.6 * i)));
-        const auto frame = texture.frame({one, 0, 0, 0});
+        const auto frame = texture.show(
+            bytes_of(scene::texture<std::uint8_t>(width, height, 8, 1.7 * i, 0.6 * i)));
         const Nanoseconds time = i * scene::frame_time;
         drawing->draw(frame, time, settings,
                       {picture.name(), pixels_by_kind(colours, {.bytes = 4})});
@@ -297,15 +217,20 @@ TEST_P(EveryApi, TracksPointsAsTheCpuDoes) {
   }
 }
 
+/// What work() throws; empty for nothing.
+std::string error_of(const auto& work) {
+  try {
+    work();
+  } catch (const gl::Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
 TEST(Context, NamesWhatIsMissing) {
   const EglContext current(true);
-  const auto message = [](const gl::Context::Load& load) -> std::string {
-    try {
-      const gl::Context context(load);
-    } catch (const gl::Error& error) {
-      return error.what();
-    }
-    return "";
+  const auto message = [](const gl::Context::Load& load) {
+    return error_of([&] { const gl::Context context(load); });
   };
   EXPECT_EQ(message(gl_test::load), "");
   EXPECT_EQ(message([](const char* name) -> void* {
@@ -326,27 +251,10 @@ Function driver(const char* name) {
   return reinterpret_cast<Function>(gl_test::load(name));
 }
 
-/// Calls that wait for the GPU, or would copy what it has not yet written.
-int waits = 0;
 int releases = 0;
-bool is_gpu_busy = false;
 
-void* load_counting_waits(const char* name) {
-  const std::string_view function = name;
-  if (function == "eglClientWaitSyncKHR")
-    return reinterpret_cast<void*>(
-        +[](EGLDisplay display, EGLSyncKHR sync, EGLint flags, EGLTimeKHR timeout) -> EGLint {
-          waits += timeout > 0;
-          if (timeout == 0 && is_gpu_busy) return EGL_TIMEOUT_EXPIRED_KHR;
-          return eglClientWaitSync(display, sync, flags, timeout);
-        });
-  if (function == "glMapBufferRange")
-    return reinterpret_cast<void*>(+[](GLenum target, GLintptr offset, GLsizeiptr length,
-                                       GLbitfield access) -> void* {
-      ++waits;
-      return driver<PFNGLMAPBUFFERRANGEPROC>("glMapBufferRange")(target, offset, length, access);
-    });
-  if (function == "eglReleaseThread")
+void* load_counting_releases(const char* name) {
+  if (std::string_view(name) == "eglReleaseThread")
     return reinterpret_cast<void*>(+[]() -> EGLBoolean {
       ++releases;
       return eglReleaseThread();
@@ -356,74 +264,16 @@ void* load_counting_waits(const char* name) {
 
 TEST(Simulator, LeavesNoDataOfEglInAThreadThatWaits) {
   const EglContext current(false);
-  const gl::Context context(load_counting_waits);
+  const gl::Context context(load_counting_releases);
   const auto simulator = gl::make_frame_simulator(context, {64, 48, 8});
   Texture texture(64, 48, 1);
-  texture.upload(bytes_of(scene::noise<std::uint8_t>(64, 48, 8, 1)));
-  simulator->queue(texture.frame({one, 0, 0, 0}), 0, {});
+  simulator->queue(texture.show(bytes_of(scene::noise<std::uint8_t>(64, 48, 8, 1))), 0, {});
   releases = 0;
   simulator->wait();  // this thread keeps its context
   EXPECT_EQ(releases, 0);
   std::thread([&] { simulator->wait(); }).join();
   EXPECT_EQ(releases, 1);
   EXPECT_EQ(simulator->read(), nullptr);
-}
-
-TEST(Simulator, ReadsEventsBackWhileTheGpuWorksOnTheNextFrame) {
-  const EglContext current(false);
-  const gl::Context context(load_counting_waits);
-  const LumaFormat format{130, 61, 8};
-  Texture texture(format.width, format.height, 1);
-  const auto frame_of = [&](unsigned i) {
-    texture.upload(bytes_of(scene::noise<std::uint8_t>(format.width, format.height, 8, i)));
-    return texture.frame({one, 0, 0, 0});
-  };
-  using Make = std::unique_ptr<gl::Simulator> (*)(const gl::Context&, const LumaFormat&);
-  const Make make_dense = [](const gl::Context& gl, const LumaFormat& of) {
-    return std::unique_ptr<gl::Simulator>(gl::make_dense_simulator(gl, of));
-  };
-  std::size_t max_events = 0;
-  for (const auto& [make, threshold] : {std::pair<Make, double>{gl::make_frame_simulator, 20},
-                                        {make_dense, 20},
-                                        {gl::make_sparse_simulator, 200},
-                                        {gl::make_diff_simulator, 200}}) {
-    const Settings settings{threshold, threshold};
-    const auto waiting = make(context, format);
-    std::vector<std::vector<Event>> expected;
-    for (int i = 0; i < 4; ++i)
-      if (const auto* events =
-              gl_test::events_until(*waiting, frame_of(i), i * scene::frame_time, settings))
-        expected.push_back(scene::copy(*events));
-
-    const auto simulator = make(context, format);
-    std::vector<std::vector<Event>> made;
-    for (int i = 0; i < 4; ++i) {
-      waits = 0;
-      is_gpu_busy = true;
-      simulator->queue(frame_of(i), i * scene::frame_time, settings);
-      EXPECT_EQ(waits, 0);
-      is_gpu_busy = false;
-      if (i == 0) continue;
-      const auto* events = simulator->read();
-      EXPECT_EQ(events == nullptr, i == 1);
-      if (events != nullptr) made.push_back(scene::copy(*events));
-    }
-    waits = 0;
-    made.push_back(scene::copy(*simulator->read()));
-    EXPECT_GT(waits, 0);
-    EXPECT_EQ(made, expected);
-    max_events = std::max(max_events, made.back().size());
-
-    simulator->queue(frame_of(2), 7 * scene::frame_time, settings);
-    simulator->queue(frame_of(3), 8 * scene::frame_time, settings);
-    simulator->drop();
-    simulator->reset();
-    simulator->queue(frame_of(0), 9 * scene::frame_time, settings);
-    simulator->queue(frame_of(1), 10 * scene::frame_time, settings);
-    EXPECT_EQ(simulator->read(), nullptr);
-    EXPECT_EQ(scene::copy(*simulator->read()), expected.front());
-  }
-  EXPECT_GT(max_events, 4096U);  // so that lists grow
 }
 
 /// What a lost context does, as drivers differ.
@@ -487,14 +337,6 @@ TEST_P(EveryFence, ReportsALostContext) {
   Texture texture(33, 21, 1);
   Texture picture(33, 21, 4);
   picture.upload(std::vector<std::uint8_t>(33 * 21 * 4));
-  const auto message = [](const auto& work) -> std::string {
-    try {
-      work();
-    } catch (const gl::Error& error) {
-      return error.what();
-    }
-    return "none";
-  };
   for (const auto make :
        {gl::make_frame_simulator, gl::make_sparse_simulator, gl::make_diff_simulator}) {
     for (const auto& [what, expected] : losses) {
@@ -503,8 +345,7 @@ TEST_P(EveryFence, ReportsALostContext) {
         const auto simulator = make(context, format);
         int i = 0;
         const auto push = [&] {
-          texture.upload(bytes_of(scene::noise<std::uint8_t>(33, 21, 8, ++i)));
-          const auto frame = texture.frame({one, 0, 0, 0});
+          const auto frame = texture.show(bytes_of(scene::noise<std::uint8_t>(33, 21, 8, ++i)));
           if (draws) {
             simulator->draw(frame, i * scene::frame_time, {}, {picture.name(), {}});
             simulator->drop();
@@ -515,32 +356,29 @@ TEST_P(EveryFence, ReportsALostContext) {
         push();
         push();
         loss = what;
-        EXPECT_EQ(message(push), expected);
+        EXPECT_EQ(error_of(push), expected);
         loss = Loss::none;
         while (context.GetError() != GL_NO_ERROR) continue;  // a buffer was not mapped
       }
     }
   }
   loss = Loss::reset;
-  EXPECT_EQ(message([&] { const gl::Kernel kernel(context, "wrong", "wrong"); }), lost);
+  EXPECT_EQ(error_of([&] { const gl::Kernel kernel(context, "wrong", "wrong"); }), lost);
   loss = Loss::error;
-  EXPECT_EQ(message([&] { context.forget_errors(); }), lost);
+  EXPECT_EQ(error_of([&] { context.forget_errors(); }), lost);
   loss = Loss::none;
 }
 
 TEST(Kernel, ReportsWhatTheCompilerSays) {
   const EglContext current(true);
   const gl::Context context(gl_test::load);
-  try {
+  const auto text = error_of([&] {
     const gl::Kernel kernel(context, "wrong",
                             "layout(local_size_x = 1) in; void main() { x = 1; }");
-    FAIL();
-  } catch (const gl::Error& error) {
-    const std::string text = error.what();
-    EXPECT_TRUE(text.starts_with("the driver cannot compile the compute shader 'wrong': "));
-    EXPECT_TRUE(text.find("undeclared") != text.npos || text.find("undefined") != text.npos)
-        << text;  // the words of Mesa and of NVIDIA
-  }
+  });
+  EXPECT_TRUE(text.starts_with("the driver cannot compile the compute shader 'wrong': "));
+  EXPECT_TRUE(text.find("undeclared") != text.npos || text.find("undefined") != text.npos)
+      << text;  // the words of Mesa and of NVIDIA
 }
 
 }  // namespace

@@ -72,8 +72,8 @@ class Tracks : public EveryApi {
     Texture texture(frames[0].width(), frames[0].height(), 1);
     std::vector<Event> events;
     for (int i = 0; i < frame_count; ++i) {
-      texture.upload(gl_test::bytes_of(frames[static_cast<std::size_t>(i)]));
-      const auto* made = gl_test::events_until(simulator, texture.frame({gl_test::one, 0, 0, 0}),
+      const auto& frame = frames[static_cast<std::size_t>(i)];
+      const auto* made = gl_test::events_until(simulator, texture.show(gl_test::bytes_of(frame)),
                                                i * scene::frame_time, settings);
       if (made != nullptr) events = scene::copy(*made);
     }

@@ -28,29 +28,18 @@ import numpy as np
 
 np.save("numbers.npy", np.zeros((5, 4)))
 np.savez("numbers.npz", x=np.zeros(5))
-with h5py.File("numbers.h5", "w") as file:
-    file.create_dataset("weights", data=np.zeros(5))
-with h5py.File("particles.h5", "w") as file:  # events of another kind
-    group = file.create_group("events")
-    for name in ("pt", "eta", "phi"):
-        group.create_dataset(name, data=np.zeros(5))
-with h5py.File("rows.hdf5", "w") as file:
-    file.create_dataset("events", data=np.zeros((5, 4)))
-with h5py.File("dsec.h5", "w") as file:
-    file.create_dataset("ms_to_idx", data=np.zeros(5, int))
-    group = file.create_group("events")
-    for name in ("p", "t", "x", "y"):
-        group.create_dataset(name, data=np.zeros(5, int), compression="gzip")
-with h5py.File("columns.h5", "w") as file:
-    group = file.create_group("events")
-    for name in ("t", "x", "y", "p"):
-        group.create_dataset(name, data=np.zeros(5, int))
-with h5py.File("e2vid.h5", "w") as file:
-    group = file.create_group("events")
-    for name in ("xs", "ys", "ts", "ps"):
-        group.create_dataset(name, data=np.zeros(5, int))
-with h5py.File("v2e.h5", "w") as file:
-    file.create_dataset("events", shape=(0, 4), maxshape=(None, 4), dtype="uint32", compression="gzip")
+events = dict.fromkeys(["events/" + name for name in "txyp"], np.zeros(5, int))
+for path, sets, options in (
+        ("numbers.h5", {"weights": np.zeros(5)}, {}),
+        ("particles.h5", dict.fromkeys(["events/pt", "events/eta", "events/phi"], np.zeros(5)), {}),  # of another kind
+        ("rows.hdf5", {"events": np.zeros((5, 4))}, {}),
+        ("dsec.h5", events | {"ms_to_idx": np.zeros(5, int)}, {"compression": "gzip"}),
+        ("columns.h5", events, {}),
+        ("e2vid.h5", {name + "s": times for name, times in events.items()}, {}),
+        ("v2e.h5", {"events": np.zeros((0, 4), np.uint32)}, {"maxshape": (None, 4), "compression": "gzip"})):
+    with h5py.File(path, "w") as file:
+        for name, data in sets.items():
+            file.create_dataset(name, data=data, **options)
 PYTHON
 /usr/bin/python3 "$SOURCE/tests/formats/bag_files.py" .
 mv evt3.bag bag.bag

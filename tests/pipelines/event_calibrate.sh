@@ -74,7 +74,7 @@ import numpy as np
 class Search:
     video = recorded = span = None
     windows = list(range(8))
-    progress = calibrate.Progress()
+    progress = calibrate.Progress(60)
     def __init__(self, gain_of):
         self.gain_of = gain_of
     def fit(self, setting, precision=None):

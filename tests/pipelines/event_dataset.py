@@ -12,14 +12,12 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 import unittest.mock
 
-if not os.path.exists(os.path.join(os.environ["GI_TYPELIB_PATH"], "GstEventCamera-1.0.typelib")):
-    print("built without introspection: no Python")
-    sys.exit(77)
+from scratch import launch, path_of, read, write  # first
+
 sys.path.insert(0, os.path.join(os.environ["BUILD"], "pipelines"))
 
 import gst_eventcamera as ec
@@ -28,7 +26,6 @@ from PIL import Image
 from dataset_video import hash_of, record_of
 from gst_eventcamera.recipe import OUTPUTS, Distribution, uniform_number
 
-FOLDER = tempfile.TemporaryDirectory()
 PROGRAM = os.path.join(os.environ["BUILD"], "pipelines", "event-dataset")
 RECIPE = """
 seed: 7
@@ -43,16 +40,6 @@ split: {train: 0.6, test: 0.4}
 """
 
 
-def path_of(name):
-    path = os.path.join(FOLDER.name, name)
-    os.makedirs(os.path.dirname(path), exist_ok=True)
-    return path
-
-
-def launch(line):
-    subprocess.run(f"{os.environ['GST_LAUNCH']} -q {line}", shell=True, check=True)
-
-
 def make_video(name, frames=8, more=""):
     path = path_of(name)
     launch(f"videotestsrc pattern=ball num-buffers={frames} ! video/x-raw,format=I420,width=64,height=48,framerate=25/1"
@@ -61,10 +48,7 @@ def make_video(name, frames=8, more=""):
 
 
 def recipe_of(folder, text=RECIPE):
-    path = path_of(f"{folder}/recipe.yaml")
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(text)
-    return path
+    return write(f"{folder}/recipe.yaml", text)
 
 
 def event_dataset(*words, status=0):
@@ -85,13 +69,18 @@ def stop_once_there_is(pattern, *words):
     return program
 
 
+def program(path, script):
+    """Puts a shell script first in PATH."""
+    os.chmod(write(path, f"#!/bin/sh\n{script}\n"), 0o755)
+    return unittest.mock.patch.dict(os.environ, PATH=os.path.dirname(path_of(path)) + ":" + os.environ["PATH"])
+
+
 def record_in(folder, video):
     return record_of(video, folder, folder)
 
 
 def load(folder, name):
-    with open(path_of(f"{folder}/recipe/{name}"), encoding="utf-8") as file:
-        return json.load(file)
+    return json.loads(read(f"{folder}/recipe/{name}"))
 
 
 def hashes(folder):
@@ -134,9 +123,8 @@ class DataSets(unittest.TestCase):
         manifest = load(folder, "manifest.json")
         manifest["videos"][0]["written"]["npz"]["sha256"] = "0" * 64
         manifest["videos"][1]["input"]["sha256"] = "0" * 64
-        with open(path_of(f"{folder}/other.json"), "w", encoding="utf-8") as file:
-            json.dump(manifest, file)
-        printed = event_dataset("verify", recipe, "--manifest", path_of(f"{folder}/other.json"), status=1)
+        other = write(f"{folder}/other.json", json.dumps(manifest))
+        printed = event_dataset("verify", recipe, "--manifest", other, status=1)
         self.assertIn("run/four: other events, by the same versions", printed)
         self.assertIn("run/three's: the input has changed since the manifest", printed)
         self.check_damage(folder, recipe)
@@ -157,17 +145,13 @@ class DataSets(unittest.TestCase):
             self.assertTrue(path.endswith(".csv"), path)
 
     def check_reports(self, folder, made):
-        parts = {}
-        for part in ("train", "test"):
-            with open(path_of(f"{folder}/recipe/{part}.txt"), encoding="utf-8") as file:
-                parts[part] = file.read().splitlines()
-        self.assertEqual(sorted(parts["train"] + parts["test"]),
+        lines = [line for part in ("train", "test") for line in read(f"{folder}/recipe/{part}.txt").splitlines()]
+        self.assertEqual(sorted(lines),
                          sorted(f"data/{name}.npz\t{os.path.dirname(name)}" for name in made))
         statistics = load(folder, "statistics.json")
         self.assertEqual(statistics["all"]["videos"], 3)
         self.assertEqual(statistics["all"]["frames"], 24)
-        with open(path_of(f"{folder}/recipe/preview.html"), encoding="utf-8") as file:
-            page = file.read()
+        page = read(f"{folder}/recipe/preview.html")
         self.assertEqual(page.count("<img"), 3)
         self.assertNotIn("//", page)  # no address of another machine
         self.assertIn('<a href="previews/walk/two%20words.png"><img', page)
@@ -195,13 +179,9 @@ class DataSets(unittest.TestCase):
         make_video("bad/videos/good.mkv")
         make_video("bad/videos/short.mkv", frames=1)
         make_video("bad/videos/uneven.mkv", more="! identity drop-probability=0.4")
-        with open(make_video("bad/videos/whole.mkv", frames=100), "rb") as file:
-            whole = file.read()
-        os.remove(path_of("bad/videos/whole.mkv"))
-        with open(path_of("bad/videos/cut.mkv"), "wb") as file:
-            file.write(whole[:len(whole) // 3])
-        with open(path_of("bad/videos/noise.mkv"), "wb") as file:
-            file.write(bytes(range(256)) * 40)
+        cut = make_video("bad/videos/cut.mkv", frames=100)
+        os.truncate(cut, os.path.getsize(cut) // 3)
+        write("bad/videos/noise.mkv", "no video" * 999)
         printed = event_dataset(recipe_of("bad"), status=1)
         self.assertIn("refused: short: too short: 1 frames of at least 2", printed)
         self.assertRegex(printed, "refused: cut: corrupt: its frames end 2.* s before the 4.0 s of the file")
@@ -223,8 +203,7 @@ class DataSets(unittest.TestCase):
         launch("videotestsrc pattern=ball num-buffers=6 ! video/x-raw,width=64,height=48"
                f" ! pngenc ! multifilesink {shlex.quote(f'location={folder}%d.png')}")
         for number in (1, 2, 4):
-            with open(f"{folder}{number}.png", "wb") as file:
-                file.write(b"no picture")
+            write(f"broken/films/first/{number}.png", "no picture")
         recipe = recipe_of("broken", text + "videos: films/*")
         printed = event_dataset(recipe, status=1)
         for video in ec.Dataset(recipe):
@@ -241,12 +220,10 @@ class DataSets(unittest.TestCase):
         record, = glob.glob(path_of("odd/recipe/records/*"))
         event_dataset(recipe, "--video", "one", "--file", video, "--output", path_of("odd/alone"))
         self.assertEqual(os.listdir(path_of("odd/alone/data")), ["one.npz"])
-        with open(record, "w", encoding="utf-8") as file:
-            file.write('{"written": {}}')
+        write(record, '{"written": {}}')
         self.assertIn("1 videos: 1 made", event_dataset(recipe))
-        with open(path_of("odd/manifest.json"), "w", encoding="utf-8") as file:
-            file.write('{"videos": [{"name": "a"}]}')
-        self.assertIn("no manifest", event_dataset("verify", recipe, "--manifest", path_of("odd/manifest.json"), status=1))
+        manifest = write("odd/manifest.json", '{"videos": [{"name": "a"}]}')
+        self.assertIn("no manifest", event_dataset("verify", recipe, "--manifest", manifest, status=1))
 
     def test_go_on_after_a_kill(self):
         for number in range(4):
@@ -299,18 +276,12 @@ class DataSets(unittest.TestCase):
         """Before any job, with Slurm's own words."""
         make_video("refused/videos/0.mkv")
         recipe = recipe_of("refused")
-        os.makedirs(path_of("refused/profile"))
-        with open(path_of("refused/profile/config.yaml"), "w", encoding="utf-8") as file:
-            file.write("cluster: sbatch --partition=none --cpus-per-task={threads}\njobs: 1\n")
-        with open(path_of("refused/sbatch"), "w", encoding="utf-8") as file:
-            file.write('#!/bin/sh\necho "$@" >>"$0.words"\necho "sbatch: error: invalid partition" >&2\nexit 1\n')
-        os.chmod(path_of("refused/sbatch"), 0o755)
-        with unittest.mock.patch.dict(os.environ, PATH=path_of("refused") + ":" + os.environ["PATH"]):
+        write("refused/profile/config.yaml", "cluster: sbatch --partition=none --cpus-per-task={threads}\njobs: 1\n")
+        with program("refused/sbatch", 'echo "$@" >>"$0.words"\necho "sbatch: error: invalid partition" >&2\nexit 1'):
             for profile in ("slurm", path_of("refused/profile")):
                 self.assertIn("error: Slurm takes no jobs: sbatch: error: invalid partition\n",
                               event_dataset(recipe, "--profile", profile, status=1))
-        with open(path_of("refused/sbatch.words"), encoding="utf-8") as file:
-            asked = file.read().splitlines()
+        asked = read("refused/sbatch.words").splitlines()
         self.assertEqual(len(asked), 2)
         self.assertEqual(asked[1], "--partition=none --test-only --wrap=true")
 
@@ -330,8 +301,8 @@ class DataSets(unittest.TestCase):
         self.assertIn("0: kept; its input cannot be read", printed)
         self.assertIn("0 made, 4 unchanged", printed)
         for part in ("one", "two"):
-            with open(path_of(f"parts/recipe/{part}.txt"), encoding="utf-8") as file:
-                self.assertEqual(file.read().splitlines(), [f"data/{video.name}.npz" for video in ec.Dataset(recipe, part)])
+            self.assertEqual(read(f"parts/recipe/{part}.txt").splitlines(),
+                             [f"data/{video.name}.npz" for video in ec.Dataset(recipe, part)])
         printed = event_dataset(recipe_of("parts", RECIPE + "min-frames: 4"), status=1)
         self.assertIn("1: the recipe has changed; making it again", printed)
         self.assertIn("0 made, 0 unchanged, 3 refused, 1 failed", printed)
@@ -357,10 +328,7 @@ class DataSets(unittest.TestCase):
         event_dataset(recipe)
         event_dataset("verify", recipe)
         make_video("locked/videos/0.mkv", frames=9)
-        with unittest.mock.patch.dict(os.environ, PATH=path_of("locked") + ":" + os.environ["PATH"]):
-            with open(path_of("locked/snakemake"), "w", encoding="utf-8") as file:
-                file.write("#!/bin/sh\nexit 3\n")
-            os.chmod(path_of("locked/snakemake"), 0o755)
+        with program("locked/snakemake", "exit 3"):
             for words in ((recipe,), ("verify", recipe)):
                 self.assertIn("Snakemake ended with status 3", event_dataset(*words, status=1))
 

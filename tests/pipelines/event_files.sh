@@ -100,15 +100,12 @@ END
   [ "$(wc -l <killed.csv)" -gt 1000 ] || fail "eventhdf5dec does not read what was killed"
 done
 
-# Players and discoverer.
+# The discoverer of players.
 for ending in "${written[@]}"; do
   timeout 600 gst-discoverer-1.0 -v "ball.$ending" >discovered || fail "gst-discoverer-1.0 ball.$ending"
   for found in application/x-event-camera "Duration: 0:00:01.9" "Seekable: yes"; do
     grep -q "$found" discovered || fail "gst-discoverer-1.0 ball.$ending: $found"
   done
-  echo "gst-play-1.0 ball.$ending"
-  timeout 600 gst-play-1.0 -q --no-interactive --videosink=fakesink "ball.$ending" >played 2>&1 || fail "gst-play-1.0: $(cat played)"
-  if grep ERROR played; then fail "gst-play-1.0 ball.$ending"; fi
 done
 
 printf 'A text of words.\nAnd 1 2 3 0 in it.\n%.0s' $(seq 40) >words.txt
@@ -365,6 +362,8 @@ grep -q "Corrupt data at byte " warnings || fail "no warning about a truncated f
 refused "needs IN and OUT.*--join" ball.raw ball.dat out.raw
 refused "exclude each other" --join --reverse ball.raw ball.dat out.raw
 refused "no picture matches" 'none/*.png' out.raw
+printf '0 pictures/a 0.png\n1 nowhere.png\n' >missing.txt
+refused "No such file or directory: .*nowhere.png" missing.txt out.raw
 refused "with --framerate" 'pictures/*.png' out.raw
 refused "no frames to draw over" --over-frames ball.raw out.mp4
 refused "apply only to .mp4" --scale 2 ball.raw out.dat

@@ -54,9 +54,6 @@ done
 "$SOURCE/pipelines/examples/train_on_events.py" "$work/first.raw" "$work/second.raw" | tee "$work/training"
 awk '$1 == "epoch" { if (NR > 1 && ($6 + 0 >= last || $3 < 60)) exit 1; last = $6 } END { exit NR != 3 }' "$work/training"
 
-# The C API in JavaScript.
-gjs -m "$SOURCE/tests/pipelines/bindings.js"
-
 # The same example in three languages.
 "$BUILD/pipelines/on_and_off" | tee "$work/expected"
 grep -qx "Events of a 320x240 sensor" "$work/expected"

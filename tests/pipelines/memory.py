@@ -9,13 +9,12 @@ of events.
 
 import os
 import pathlib
-import random
-import struct
 import subprocess
 import sys
 import tempfile
 
-import h5py
+import scratch  # noqa: F401  first
+import gst_eventcamera as ec
 import numpy
 
 LAUNCH = os.environ["GST_LAUNCH"]
@@ -33,65 +32,43 @@ CHAINS = {
 }
 
 
+def columns(t, x, y):
+    """The fields of events of both polarities by turns."""
+    return {"t": numpy.array(t, numpy.int64), "x": numpy.array(x, numpy.uint16), "y": numpy.array(y, numpy.uint16),
+            "p": numpy.arange(len(t), dtype=numpy.uint8) % 2}
+
+
+def table(fields):
+    """A structured array of fields."""
+    return numpy.rec.fromarrays(list(fields.values()), names=list(fields))
+
+
 def scattered(side, count):
-    random.seed(1)
-    return [(100 * i, random.randrange(side), random.randrange(side), i % 2) for i in range(count)]
+    random = numpy.random.default_rng(1)
+    return columns(100 * numpy.arange(count), *random.integers(0, side, (2, count)))
 
 
-def columns(events):
-    t, x, y, p = zip(*events)
-    return {"t": numpy.array(t, numpy.int64), "x": numpy.array(x, numpy.uint16),
-            "y": numpy.array(y, numpy.uint16), "p": numpy.array(p, numpy.uint8)}
-
-
-def table(events):
-    """A structured array with the fields of columns()."""
-    fields = columns(events)
-    out = numpy.zeros(len(events), [(name, field.dtype) for name, field in fields.items()])
-    for name, field in fields.items():
-        out[name] = field
-    return out
-
-
-def write_csv(path, events):
-    with open(path, "w") as file:
-        file.write("t,x,y,p\n")
-        file.writelines(f"{t},{x},{y},{p}\n" for t, x, y, p in events)
-
-
-def write_dat(path, events, side):
-    with open(path, "wb") as file:
-        file.write(f"% Version 2\n% Width {side}\n% Height {side}\n".encode() + b"\x0c\x08")
-        for t, x, y, p in events:
-            file.write(struct.pack("<II", t, x | y << 14 | p << 28))
-
-
-def write_hdf5(path, events, side):
-    """The layout of DSEC."""
-    with h5py.File(path, "w") as file:
-        file.attrs["width"] = file.attrs["height"] = side
-        for name, column in columns(events).items():
-            file.create_dataset(f"events/{name}", data=column, compression="gzip")
+def write_csv(path, fields):
+    numpy.savetxt(path, numpy.transpose(list(fields.values())), "%d", ",", header="t,x,y,p", comments="")
 
 
 def make_files():
     """Writes the files to the current folder."""
-    few = [(1, 10, 10, 1), (2, 16000, 16000, 1), (3, 5, 5, 1)]
+    few = columns([1, 2, 3], [10, 16000, 5], [10, 16000, 5])
     max_guessed = scattered(4096, 2000)
     wide = scattered(MAX_SIDE, 2000)
-    at_once = [(0, 5, 5, 1)] * 10_000_000
+    at_once = columns(*numpy.full((3, 10_000_000), [[0], [5], [5]]))
     write_csv("few.csv", few)
-    write_csv("beyond.csv", [(1, 10, 10, 1), (2, 20000, 20000, 1), (3, 5, 5, 1)])
+    write_csv("beyond.csv", columns([1, 2, 3], [10, 20000, 5], [10, 20000, 5]))
     write_csv("guessed.csv", max_guessed)
     numpy.save("few.npy", table(few))
     numpy.save("guessed.npy", table(max_guessed))
-    numpy.savez("few.npz", **columns(few))
-    numpy.savez("guessed.npz", **columns(max_guessed))
-    numpy.savez("stated.npz", width=MAX_SIDE, height=MAX_SIDE, **columns(wide))
-    numpy.savez_compressed("at-once.npz", **columns(at_once))
-    write_dat("stated.dat", wide, MAX_SIDE)
-    write_hdf5("stated.h5", wide, MAX_SIDE)
-    write_hdf5("at-once.h5", at_once, 640)
+    numpy.savez("few.npz", **few)
+    numpy.savez("guessed.npz", **max_guessed)
+    numpy.savez("stated.npz", width=MAX_SIDE, height=MAX_SIDE, **wide)
+    numpy.savez_compressed("at-once.npz", **at_once)
+    for path, fields, side in (("stated.dat", wide, MAX_SIDE), ("stated.h5", wide, MAX_SIDE), ("at-once.h5", at_once, 640)):
+        ec.write(path, table(fields), side, side)
 
 
 def peak_of(command):

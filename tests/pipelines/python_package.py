@@ -11,31 +11,23 @@ import signal
 import struct
 import subprocess
 import sys
-import tempfile
 import threading
 import tracemalloc
 import unittest
 import unittest.mock
 import warnings
 
-if not os.path.exists(os.path.join(os.environ["GI_TYPELIB_PATH"], "GstEventCamera-1.0.typelib")):
-    print("built without introspection: no Python")
-    sys.exit(77)
+from scratch import FOLDER, launch, path_of, write  # first
 
 import gst_eventcamera as ec
 import numpy as np
 from PIL import Image
 from gst_eventcamera import pipeline as internals
 from gst_eventcamera import recordings
-from gst_eventcamera.pipeline import Gst, GstEventCamera
+from gst_eventcamera.pipeline import Gst
 from gst_eventcamera.sources import SINK
 
-FOLDER = tempfile.TemporaryDirectory()
 WIDTH, HEIGHT = 346, 260
-
-
-def path_of(name):
-    return os.path.join(FOLDER.name, name)
 
 
 def random_events(count, microseconds, seed=1, pixels=(WIDTH, HEIGHT)):
@@ -54,10 +46,6 @@ def random_events(count, microseconds, seed=1, pixels=(WIDTH, HEIGHT)):
 
 def same(a, b):
     return len(a) == len(b) and all(np.array_equal(a[name], b[name]) for name in "txyp")
-
-
-def launch(line):
-    subprocess.run(f"{os.environ['GST_LAUNCH']} -q {line}", shell=True, check=True)
 
 
 class VideoFrames(unittest.TestCase):
@@ -425,9 +413,7 @@ class Simulators(unittest.TestCase):
 
 class Recipes(unittest.TestCase):
     def parameter(self, value, name="positive-threshold"):
-        recipe = path_of("number.yaml")
-        with open(recipe, "w", encoding="utf-8") as file:
-            file.write(f"{{videos: x, simulator: eventsim-dvs, parameters: {{{name}: {value}}}}}")
+        recipe = write("number.yaml", f"{{videos: x, simulator: eventsim-dvs, parameters: {{{name}: {value}}}}}")
         return ec.Recipe.load(recipe).drawn("x")[name]
 
     def test_numbers_have_exponents_and_limits(self):
@@ -442,26 +428,14 @@ class Recipes(unittest.TestCase):
 
 
 class Videos(unittest.TestCase):
-    def make(self, name, frames, framerate, more=""):
-        subprocess.run([os.environ["GST_LAUNCH"], "-q", "matroskamux", "name=mux", "!",
-                        "filesink", f"location={path_of(name)}", *(
-                            f"videotestsrc pattern=ball num-buffers={frames}"
-                            f" ! video/x-raw,format=GRAY8,width=64,height=48,framerate={framerate}"
-                            f" ! mux. {more}").split()], check=True)
-
-    def played(self, name):
-        recipe = path_of("recipe.yaml")
-        with open(recipe, "w", encoding="utf-8") as file:
-            file.write(f"{{videos: {name}, simulator: eventsim-dvs, output: npz}}")
-        return sum(chunk.end - chunk.start for chunk in ec.Dataset(recipe)[0])
-
     def test_may_be_shorter_than_their_file(self):
-        audio = "audiotestsrc samplesperbuffer=4410 num-buffers={} ! mux."
-        self.make("slow.mkv", 3, "1/2")
-        self.make("sound.mkv", 75, "25/1", audio.format(50))
-        self.assertAlmostEqual(self.played("slow.mkv"), 4)
-        self.assertAlmostEqual(self.played("sound.mkv"), 2.96, places=2)
-
+        for frames, framerate, audio, expected in (
+                (3, "1/2", "", 4), (75, "25/1", "audiotestsrc samplesperbuffer=4410 num-buffers=50 ! mux.", 2.96)):
+            launch(f"matroskamux name=mux ! filesink location={shlex.quote(path_of('short.mkv'))}"
+                   f" videotestsrc pattern=ball num-buffers={frames}"
+                   f" ! video/x-raw,format=GRAY8,width=64,height=48,framerate={framerate} ! mux. {audio}")
+            recipe = write("recipe.yaml", "{videos: short.mkv, simulator: eventsim-dvs, output: npz}")
+            self.assertAlmostEqual(sum(chunk.end - chunk.start for chunk in ec.Dataset(recipe)[0]), expected, places=2)
 
 
 class Tensors(unittest.TestCase):

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """rtsp-events as its clients see it."""
+import itertools
 import os
 import socket
 import ssl
@@ -10,17 +11,14 @@ import time
 import warnings
 from urllib.parse import urlsplit
 
-import gi
+import scratch  # noqa: F401  first
 import numpy as np
+from gi.repository import Gio
+from gst_eventcamera.pipeline import Gst, Pipeline, PipelineError, events_of
 
 from servers import SECONDS, ServerProcess
 
-gi.require_version("Gst", "1.0")
-gi.require_version("GstApp", "1.0")
-from gi.repository import Gio, GLib, Gst, GstApp  # noqa: E402, F401
-
 PROGRAM = os.path.join(os.environ["SOURCE"], "pipelines", "rtsp_events.py")
-XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
 
 
 class Server(ServerProcess):
@@ -35,40 +33,24 @@ class Server(ServerProcess):
         self.interrupt()
 
 
-class Client:
+class Client(Pipeline):
     """Plays a URL into appsinks."""
 
     def __init__(self, url, rest, **properties):
-        self._pipeline = Gst.parse_launch(f"rtspsrc name=source latency=200 {rest}")
-        source = self._pipeline.get_by_name("source")
+        super().__init__(f"rtspsrc name=source latency=200 {rest}")
         for name, value in {"location": url, **properties}.items():
-            source.set_property(name.replace("_", "-"), value)
+            self.element("source").set_property(name.replace("_", "-"), value)
 
     def __enter__(self):
-        self._pipeline.set_state(Gst.State.PLAYING)
+        super().__enter__()
+        self.set_state(Gst.State.PLAYING)
         return self
 
-    def __exit__(self, *_):
-        self._pipeline.set_state(Gst.State.NULL)
-
-    def pause(self):
-        self._pipeline.set_state(Gst.State.PAUSED)
-
-    def samples(self, count, sink="out"):
-        appsink = self._pipeline.get_by_name(sink)
-        samples = []
-        deadline = time.monotonic() + SECONDS
-        while len(samples) < count:
-            if sample := appsink.try_pull_sample(Gst.SECOND // 10):
-                samples.append(sample)
-            elif message := self._pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR):
-                error, cause = message.parse_error()
-                raise RuntimeError(f"{error.message} {cause}")
-            assert time.monotonic() < deadline, f"{len(samples)} of {count} buffers within {SECONDS} s"
-        return samples
+    def first(self, count, sink="out"):
+        return list(itertools.islice(self.samples(sink), count))
 
 
-def events_of(url, **properties):
+def client_of(url, **properties):
     return Client(url + "/events", "! rtpeventdepay ! appsink name=out sync=false", **properties)
 
 
@@ -80,7 +62,7 @@ def video_of(url, **properties):
 def check_events(samples):
     caps = samples[0].get_caps().get_structure(0)
     assert caps.get_value("width") == 320 and caps.get_value("height") == 240, caps.to_string()
-    events = sum(sample.get_buffer().get_size() // 8 for sample in samples)
+    events = sum(map(len, map(events_of, samples)))
     assert events > 100 * len(samples), f"only {events} events in {len(samples)} buffers"
 
 
@@ -93,8 +75,8 @@ def check_video(samples):
 def refused(words, client):
     try:
         with client:
-            client.samples(1)
-    except RuntimeError as cause:
+            client.first(1)
+    except PipelineError as cause:
         assert words in str(cause), f"refused with: {cause}"
     else:
         raise AssertionError("not refused")
@@ -113,20 +95,20 @@ def bytes_by_time(samples):
 
 def clients_come_and_leave():
     with Server() as server:
-        with events_of(server.base) as first, video_of(server.base) as watching:
-            check_events(first.samples(5))
-            check_video(watching.samples(5))
+        with client_of(server.base) as first, video_of(server.base) as watching:
+            check_events(first.first(5))
+            check_video(watching.first(5))
         time.sleep(5)
         idle = server.descriptors()  # with those that the first clients left open for the next
-        with events_of(server.base) as first:
-            check_events(first.samples(20))
-            with events_of(server.base, protocols=4) as second, video_of(server.base) as watching:
-                check_video(watching.samples(20))
-                ours, theirs = bytes_by_time(first.samples(60)), bytes_by_time(second.samples(60))
+        with client_of(server.base) as first:
+            check_events(first.first(20))
+            with client_of(server.base, protocols=4) as second, video_of(server.base) as watching:
+                check_video(watching.first(20))
+                ours, theirs = bytes_by_time(first.first(60)), bytes_by_time(second.first(60))
                 both = ours.keys() & theirs.keys()
                 assert len(both) > 20, f"only {len(both)} intervals in common"
                 assert all(ours[pts] == theirs[pts] for pts in both), "two clients get different events"
-            check_events(first.samples(20))
+            check_events(first.first(20))
         deadline = time.monotonic() + SECONDS
         while server.descriptors() > idle:
             assert time.monotonic() < deadline, f"{server.descriptors()} descriptors, {idle} before the clients"
@@ -136,9 +118,9 @@ def clients_come_and_leave():
 
 def pauses():
     """While a client pauses, frames are dropped, not kept: 3.5 MB a second."""
-    with Server() as server, events_of(server.base) as client:
-        client.samples(5)
-        client.pause()
+    with Server() as server, client_of(server.base) as client:
+        client.first(5)
+        client.set_state(Gst.State.PAUSED)
         time.sleep(1)
         before = server.memory()
         time.sleep(4)
@@ -148,10 +130,10 @@ def pauses():
 
 def passwords():
     with Server("--user", "ada", "--password", "secret") as server:
-        refused("Unauthorized", events_of(server.base))
+        refused("Unauthorized", client_of(server.base))
         refused("Unauthorized", video_of(server.base, user_id="ada", user_pw="wrong"))
-        with events_of(server.base, user_id="ada", user_pw="secret") as client:
-            check_events(client.samples(5))
+        with client_of(server.base, user_id="ada", user_pw="secret") as client:
+            check_events(client.first(5))
 
 
 def takes_tls(base, version):
@@ -185,14 +167,14 @@ def encryption():
             taken = [version.name for version in ssl.TLSVersion if version > ssl.TLSVersion.SSLv3
                      and takes_tls(server.base, version)]
             assert taken == ["TLSv1_2", "TLSv1_3"], f"versions of TLS: {taken}"
-            refused("Failed to connect", events_of(server.base, user_id="ada", user_pw="secret"))
-            refused("Unauthorized", events_of(server.base, tls_database=trusted))
-            with events_of(server.base, tls_database=trusted, user_id="ada", user_pw="secret") as client:
-                check_events(client.samples(5))
+            refused("Failed to connect", client_of(server.base, user_id="ada", user_pw="secret"))
+            refused("Unauthorized", client_of(server.base, tls_database=trusted))
+            with client_of(server.base, tls_database=trusted, user_id="ada", user_pw="secret") as client:
+                check_events(client.first(5))
         with Server("--certificate", pair) as server:
-            refused("Could not receive message", events_of(server.base.replace("rtsps", "rtsp")))
+            refused("Could not receive message", client_of(server.base.replace("rtsps", "rtsp")))
             with video_of(server.base, tls_database=trusted) as client:
-                check_video(client.samples(5))
+                check_video(client.first(5))
 
 
 def running_time(sample):
@@ -208,10 +190,9 @@ def ball_in_video(sample):
 
 
 def ball_in_events(sample):
-    buffer = sample.get_buffer()
-    events = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), XYTP)
-    assert len(events) > 50, f"only {len(events)} events in {buffer.duration} ns"
-    return running_time(sample) + events["t"].mean() / 1e6, events["x"].mean(), (events["y_p"] & 0x7FFF).mean()
+    events = events_of(sample)
+    assert len(events) > 50, f"only {len(events)} events until {events.end} s"
+    return running_time(sample) + events["t"].mean() / 1e6 - events.start, events["x"].mean(), events["y"].mean()
 
 
 def since_times_went_back(samples):
@@ -253,9 +234,9 @@ def in_sync():
         deadline = time.monotonic() + SECONDS
         while abs(lag) > 0.01 or distance > 1:  # until RTCP has synchronized them
             assert time.monotonic() < deadline, f"events are {1000 * lag:.0f} ms late, {distance:.1f} pixels apart"
-            video += map(ball_in_video, client.samples(30, "video"))
+            video += map(ball_in_video, client.first(30, "video"))
             while not events or events[-1][0] < video[-1][0]:
-                events += map(ball_in_events, client.samples(1, "events"))
+                events += map(ball_in_events, client.first(1, "events"))
             lag, distance = offset_between(since_times_went_back(video), since_times_went_back(events))
         print(f"events are {1000 * lag:.0f} ms later than the video, {distance:.2f} pixels apart")
 
@@ -271,13 +252,13 @@ def pictures():
                 assert ("/video" in server.address) == (not arguments), server.address
                 with Client(server.base + "/picture", "! rtph264depay ! avdec_h264 ! videoconvert"
                             " ! video/x-raw,format=RGB ! appsink name=out sync=false") as client:
-                    for sample in client.samples(75)[15:]:  # longer than the recording
+                    for sample in client.first(75)[15:]:  # longer than the recording
                         pixels = np.frombuffer(sample.get_buffer().extract_dup(0, 320 * 240 * 3), np.uint8)
                         drawn = np.count_nonzero(pixels.reshape(-1, 3).max(1) > 150)
                         times = sample.get_buffer().pts
                         assert 50 < drawn < 10000, f"{drawn} pixels of events at {times} ns"
-                with events_of(server.base) as client:
-                    check_events(client.samples(20))
+                with client_of(server.base) as client:
+                    check_events(client.first(20))
 
 
 def errors():
@@ -286,7 +267,6 @@ def errors():
     fails("no element \"nosuch\"", "--simulator", "nosuch", "--port", "0")
 
 
-Gst.init(None)
 for test in (clients_come_and_leave, pictures, in_sync, pauses, passwords, encryption, errors):
     start = time.monotonic()
     test()

@@ -1,23 +1,19 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """tshark follows a client of rtsp-events from the session description to the packets, without complaint."""
+import contextlib
+import itertools
 import os
 import shutil
-import socket
-import struct
+import signal
 import subprocess
 import sys
 import tempfile
-import threading
-import time
 
-import gi
+import scratch  # noqa: F401  first
+from gst_eventcamera.pipeline import Pipeline
 
-from servers import SECONDS, ServerProcess
-
-gi.require_version("Gst", "1.0")
-gi.require_version("GstApp", "1.0")
-from gi.repository import Gst, GstApp  # noqa: E402, F401
+from servers import ServerProcess
 
 PROGRAM = os.path.join(os.environ["SOURCE"], "pipelines", "rtsp_events.py")
 BUFFERS = 100
@@ -40,54 +36,26 @@ def enter_namespace():
               {**os.environ, "IN_NAMESPACE": "1"})
 
 
-class Capture:
-    """Writes the frames of the loopback device to a pcap file."""
-
-    def __init__(self, path):
-        self._path = path
-        self._frames = []
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-
-    def __enter__(self):
-        self._socket = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(0x0003))
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 24)
-        self._socket.settimeout(0.1)
-        self._socket.bind(("lo", 0))
-        self._thread.start()
-
-    def __exit__(self, *_):
-        self._ended.set()
-        self._thread.join()
-        ethernet = 1
-        with open(self._path, "wb") as file:
-            file.write(struct.pack("=IHHIIII", 0xA1B2C3D4, 2, 4, 0, 0, 1 << 16, ethernet))
-            for moment, frame in self._frames:
-                file.write(struct.pack("=IIII", int(moment), int(moment % 1 * 1e6), len(frame), len(frame)) + frame)
-
-    def _run(self):
-        while not self._ended.is_set():
-            try:
-                frame, (_, _, kind, *_) = self._socket.recvfrom(1 << 16)
-            except TimeoutError:
-                continue
-            if kind != socket.PACKET_OUTGOING:  # each arrives, too
-                self._frames.append((time.time(), frame))
+@contextlib.contextmanager
+def captured(path):
+    """Writes the packets of the loopback device to a file."""
+    capture = subprocess.Popen(["tshark", "-i", "lo", "-w", path], stdout=subprocess.DEVNULL,
+                               stderr=subprocess.PIPE, text=True)
+    for line in capture.stderr:
+        if "Capture started" in line:
+            break
+    try:
+        yield
+    finally:
+        capture.send_signal(signal.SIGINT)
+        capture.communicate()
 
 
 def play(buffers):
-    Gst.init(None)
-    pipeline = Gst.parse_launch(
-        "rtspsrc location=rtsp://127.0.0.1:8554/both protocols=udp nat-method=none name=source"
-        "  source. ! rtpvp8depay ! fakesink"
-        "  source. ! rtpeventdepay ! appsink name=out sync=false")
-    pipeline.set_state(Gst.State.PLAYING)
-    appsink = pipeline.get_by_name("out")
-    deadline = time.monotonic() + SECONDS
-    while buffers > 0:
-        assert time.monotonic() < deadline, f"{buffers} buffers are missing"
-        buffers -= appsink.try_pull_sample(Gst.SECOND // 10) is not None
-    pipeline.set_state(Gst.State.NULL)
+    with Pipeline("rtspsrc location=rtsp://127.0.0.1:8554/both protocols=udp nat-method=none name=source"
+                  "  source. ! rtpvp8depay ! fakesink"
+                  "  source. ! rtpeventdepay ! appsink name=out sync=false") as pipeline:
+        assert sum(1 for _ in itertools.islice(pipeline.samples(), buffers)) == buffers
 
 
 def dissected(path, which, *fields):
@@ -103,7 +71,7 @@ def rtsp_session():
         path = os.path.join(folder, "session.pcap")
         server = ServerProcess(PROGRAM, "--address", "127.0.0.1")
         try:
-            with Capture(path):
+            with captured(path):
                 play(BUFFERS)
         finally:
             server.interrupt()

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The scenarios of gst-validate-1.0, which Debian does not package, on every reader and player:
 // scrub, pause, fast forward, stop at a position, and change states intensively.
-#include <atomic>
+#include <utility>
 
 #include "tests/elements/recording_files.hpp"
 
@@ -49,50 +49,21 @@ const Line lines[] = {
     {"playbin3", [](const File& file) { return player("playbin3", file); }},
 };
 
-/// Number of buffers that arrived at a sink since the start or the last flush.
-class BufferCount {
- public:
-  explicit BufferCount(GstElement* sink) : pad_(gst_element_get_static_pad(sink, "sink")) {
-    gst_pad_add_probe(
-        pad_,
-        static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_FLUSH),
-        [](GstPad*, GstPadProbeInfo* info, gpointer self) {
-          auto& count = static_cast<BufferCount*>(self)->count_;
-          if (GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER)
-            ++count;
-          else
-            count = 0;
-          return GST_PAD_PROBE_OK;
-        },
-        this, nullptr);
-  }
-  ~BufferCount() { gst_object_unref(pad_); }
-  BufferCount(const BufferCount&) = delete;
-  BufferCount& operator=(const BufferCount&) = delete;
-
-  operator int() const { return count_; }
-
- private:
-  GstPad* pad_;
-  std::atomic<int> count_ = 0;
-};
-
 /// A file being played; errors and warnings fail the test.
 class Playback {
  public:
-  explicit Playback(const std::string& line)
-      : pipeline_(GST_ELEMENT(gst_object_ref_sink(gst_parse_launch(line.c_str(), nullptr)))),
-        bus_(gst_element_get_bus(pipeline_.get())),
-        sink_(find_sink()),
-        buffers_(sink_.get()) {
-    const Owned<GstElement> source(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "it"));
-    is_player_ = source == nullptr;
-    if (!is_player_) harness::link_late_pads(source.get(), sink_.get());
+  explicit Playback(const std::string& line) : pipeline_(line) {
+    sink_.reset(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "sink"));
+    is_player_ = sink_ == nullptr;
+    if (is_player_) {  // its sink is a property until it starts
+      GstElement* sink = nullptr;
+      g_object_get(pipeline_.get(), "video-sink", &sink, nullptr);
+      sink_.reset(sink);
+    } else {
+      harness::link_late_pads(pipeline_["it"], sink_.get());
+    }
   }
-  ~Playback() {
-    check_messages();
-    gst_element_set_state(pipeline_.get(), GST_STATE_NULL);
-  }
+  ~Playback() { check_messages(); }
   Playback(const Playback&) = delete;
   Playback& operator=(const Playback&) = delete;
 
@@ -100,14 +71,13 @@ class Playback {
   /// type of a file, and at times never starts on a busy machine (GStreamer 1.22): then it has to
   /// start again.
   void set(GstState state) {
-    old_buffers_ = buffers_;
+    old_buffers_ = buffers();
     const auto change = [&] {
-      EXPECT_NE(gst_element_set_state(pipeline_.get(), state), GST_STATE_CHANGE_FAILURE);
+      pipeline_.set(state);
       return !is_player_ || gst_element_get_state(pipeline_.get(), nullptr, nullptr,
                                                   20 * GST_SECOND) != GST_STATE_CHANGE_ASYNC;
     };
-    for (int restarts = 5; !change() && restarts > 0; --restarts)
-      gst_element_set_state(pipeline_.get(), GST_STATE_NULL);
+    for (int restarts = 5; !change() && restarts > 0; --restarts) pipeline_.set(GST_STATE_NULL);
   }
 
   void reach(GstState state) {
@@ -117,22 +87,22 @@ class Playback {
 
   void seek(GstClockTime to, GstSeekFlags flags = accurate, gdouble rate = 1,
             GstClockTime stop = GST_CLOCK_TIME_NONE) {
-    old_buffers_ = 0;  // the flush resets their number
     last_seek_ = g_get_monotonic_time();
     EXPECT_TRUE(gst_element_seek(pipeline_.get(), rate, GST_FORMAT_TIME, flags, GST_SEEK_TYPE_SET,
                                  static_cast<gint64>(to), GST_SEEK_TYPE_SET,
                                  static_cast<gint64>(stop)))
         << "to " << to / ms << " ms";
     wait_for_state();
+    old_buffers_ = buffers();
   }
 
-  GstClockTime position() {
-    gint64 position = -1;
-    EXPECT_TRUE(gst_element_query_position(pipeline_.get(), GST_FORMAT_TIME, &position));
-    return static_cast<GstClockTime>(position);
+  GstClockTime position() const {
+    const auto position = pipeline_.position();
+    EXPECT_TRUE(GST_CLOCK_TIME_IS_VALID(position));
+    return position;
   }
 
-  void expect_position(GstClockTime from, GstClockTime to) {
+  void expect_position(GstClockTime from, GstClockTime to) const {
     const auto at = position();
     EXPECT_TRUE(at + tolerance >= from && at <= to + tolerance)
         << at / ms << " ms, not " << from / ms << " to " << to / ms << " ms";
@@ -140,32 +110,20 @@ class Playback {
 
   /// Waits for buffers, and checks that the position is no later than the time since the last seek
   /// allows.
-  void expect_progress(GstClockTime from, gdouble rate = 1) {
-    for (int i = 0; i < 6000 && buffers_ < old_buffers_ + 3; ++i) g_usleep(10'000);
-    EXPECT_GE(buffers_, old_buffers_ + 3) << "nothing is shown";
+  void expect_progress(GstClockTime from, gdouble rate = 1) const {
+    for (int i = 0; i < 6000 && buffers() < old_buffers_ + 3; ++i) g_usleep(10'000);
+    EXPECT_GE(buffers(), old_buffers_ + 3) << "nothing is shown";
     const auto elapsed = static_cast<gdouble>(g_get_monotonic_time() - last_seek_) * GST_USECOND;
     expect_position(from, from + static_cast<GstClockTime>(rate * elapsed));
   }
 
   void play_to_end() {
     set(GST_STATE_PLAYING);
-    const Owned<GstMessage> message(gst_bus_timed_pop_filtered(
-        bus_.get(), 60 * GST_SECOND,
-        static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING)));
-    ASSERT_TRUE(message) << "neither EOS nor error";
-    EXPECT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_EOS);
+    EXPECT_TRUE(pipeline_.wait()) << pipeline_.error;
+    check_messages();
   }
 
  private:
-  /// In a player it is a property until the pipeline starts.
-  Owned<GstElement> find_sink() const {
-    if (auto* const found = gst_bin_get_by_name(GST_BIN(pipeline_.get()), "sink"))
-      return Owned<GstElement>(found);
-    GstElement* video_sink = nullptr;
-    g_object_get(pipeline_.get(), "video-sink", &video_sink, nullptr);
-    return Owned<GstElement>(video_sink);
-  }
-
   void wait_for_state() {
     EXPECT_EQ(gst_element_get_state(pipeline_.get(), nullptr, nullptr, 60 * GST_SECOND),
               GST_STATE_CHANGE_SUCCESS);
@@ -174,18 +132,21 @@ class Playback {
 
   /// Drops all messages.
   void check_messages() {
+    for (const auto& warning : std::exchange(pipeline_.warnings, {})) ADD_FAILURE() << warning;
+    const Owned<GstBus> bus(gst_element_get_bus(pipeline_.get()));
     while (const Owned<GstMessage> message{gst_bus_pop_filtered(
-        bus_.get(), static_cast<GstMessageType>(GST_MESSAGE_ERROR | GST_MESSAGE_WARNING))})
+        bus.get(), static_cast<GstMessageType>(GST_MESSAGE_ERROR | GST_MESSAGE_WARNING))})
       ADD_FAILURE() << harness::text_of(message.get());
   }
 
-  Owned<GstElement> pipeline_;
-  Owned<GstBus> bus_;
+  /// Number of buffers that the sink has rendered.
+  guint64 buffers() const { return harness::stat_of(sink_.get(), "rendered"); }
+
+  Pipeline pipeline_;
   Owned<GstElement> sink_;
-  BufferCount buffers_;
-  bool is_player_ = false;
-  int old_buffers_ = 0;   ///< buffers before the last state change
-  gint64 last_seek_ = 0;  ///< monotonic time, microseconds
+  bool is_player_;
+  guint64 old_buffers_ = 0;  ///< at the last state change or seek
+  gint64 last_seek_ = 0;     ///< monotonic time, microseconds
 };
 
 /* scenarios */

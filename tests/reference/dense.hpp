@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "src/simulate/dense_simulator.hpp"
-#include "src/simulate/motion.hpp"
+#include "src/simulate/simulators.hpp"
 #include "tests/reference/differences.hpp"
 
 namespace eventcamera::reference {

@@ -9,8 +9,8 @@
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
-#include "src/simulate/motion.hpp"
 #include "src/simulate/simulator.hpp"
+#include "src/simulate/warp.hpp"
 
 /// Reference equations of the simulators, implemented literally: one frame after another, in plain
 /// loops and double precision, which represents all their numbers exactly. Tests compare the

@@ -193,52 +193,8 @@ struct TimedEvent {
   int y;
   Polarity polarity;
   Cause cause = Cause::unknown;
-};
 
-/// ESIM's rule (Rebecq et al., CoRL 2018): L = ln(eps + I/255) changes linearly from a at t0 to b
-/// at t1. Each level r = ref + C, ref + 2C ... between them, in the direction of b, is crossed at
-/// t0 + (r - a)(t1 - t0)/(b - a), and the last of them becomes ref. With a single threshold all
-/// levels are (first L) + n C; n is counted, so that rounding does not add up.
-class Esim {
- public:
-  Esim(int width, int height, double log_eps, double threshold)
-      : log_eps_(log_eps),
-        threshold_(threshold),
-        first_(width, height),
-        last_(width, height),
-        levels_(width, height) {}
-
-  std::vector<TimedEvent> push(const Image<std::uint8_t>& frame, double time) {
-    std::vector<TimedEvent> events;
-    for (int y = 0; y < frame.height(); ++y) {
-      for (int x = 0; x < frame.width(); ++x) {
-        const double b = std::log(log_eps_ + frame.at(x, y) / 255.0);
-        if (is_first_) first_.at(x, y) = last_.at(x, y) = b;
-        const double a = last_.at(x, y);
-        const int step = b > a ? 1 : -1;
-        const auto level = [&](int n) { return first_.at(x, y) + n * threshold_; };
-        for (int n = levels_.at(x, y) + step; b > a ? level(n) <= b : b < a && level(n) >= b;
-             n += step) {
-          const double t = last_time_ + (level(n) - a) * (time - last_time_) / (b - a);
-          events.push_back({t, x, y, b > a ? Polarity::on : Polarity::off});
-          levels_.at(x, y) = n;
-        }
-        last_.at(x, y) = b;
-      }
-    }
-    is_first_ = false;
-    last_time_ = time;
-    return events;
-  }
-
- private:
-  double log_eps_;
-  double threshold_;
-  bool is_first_ = true;
-  double last_time_ = 0;
-  Image<double> first_;
-  Image<double> last_;
-  Image<int> levels_;
+  friend bool operator==(const TimedEvent&, const TimedEvent&) = default;
 };
 
 /// One pixel, with the simulator's random numbers, evaluated every microsecond.

@@ -5,14 +5,14 @@
 #include <atomic>
 #include <cerrno>
 #include <cstddef>
+#include <functional>
+#include <memory>
+#include <utility>
 
 #include "src/dvs/dvs_simulator.hpp"
 #include "src/render/accumulator.hpp"
-#include "src/simulate/dense_simulator.hpp"
-#include "src/simulate/diff_simulator.hpp"
-#include "src/simulate/frame_simulator.hpp"
 #include "src/simulate/interpolation.hpp"
-#include "src/simulate/sparse_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 #include "tests/simulate/scene.hpp"
 
 /// In place of src/core/thread_pool.cpp: deals the rounds of every loop out to the threads in turn,
@@ -100,9 +100,11 @@ std::vector<Image<Pixel>> frames_of_a_drift(int bits) {
   return frames;
 }
 
-/// Allocations per frame of the simulator that `make` creates.
+using Make = std::function<std::unique_ptr<Simulator>(const LumaFormat&)>;
+
+/// Allocations of a simulator in steady state.
 template <class Pixel>
-int allocations_of(std::unique_ptr<Simulator> (*make)(const LumaFormat&), int bits) {
+int allocations_of(const Make& make, int bits) {
   const auto frames = frames_of_a_drift<Pixel>(bits);
   const auto simulator = make({width, height, bits});
   const Settings settings{.positive_threshold = 5, .negative_threshold = 5, .threads = threads};
@@ -117,76 +119,33 @@ int allocations_of(std::unique_ptr<Simulator> (*make)(const LumaFormat&), int bi
   return counted;
 }
 
-TEST(Allocations, AreNotMadeByTheDifferenceFrame) {
-  EXPECT_EQ(allocations_of<std::uint8_t>(make_frame_simulator, 8), 0);
-  EXPECT_EQ(allocations_of<std::uint16_t>(make_frame_simulator, 12), 0);
-}
-
-TEST(Allocations, AreNotMadeByMethodsThatTrackPixels) {
-  EXPECT_EQ(allocations_of<std::uint8_t>(make_sparse_simulator, 8), 0);
-  EXPECT_EQ(allocations_of<std::uint16_t>(make_sparse_simulator, 12), 0);
-  EXPECT_EQ(allocations_of<std::uint8_t>(make_diff_simulator, 8), 0);
-  EXPECT_EQ(allocations_of<std::uint16_t>(make_diff_simulator, 12), 0);
-}
-
-TEST(Allocations, AreNotMadeByDenseInterpolationWithOurOwnFlow) {
-  const auto with_farneback = [](const LumaFormat& format) -> std::unique_ptr<Simulator> {
+/// With our own flow; OpenCV's allocates.
+Make dense(Interpolation interpolation) {
+  return [interpolation](const LumaFormat& format) {
     auto simulator = make_dense_simulator(format);
     simulator->set_flow(FlowMethod::farneback);
+    simulator->set_interpolation(interpolation);
     return simulator;
   };
-  EXPECT_EQ(allocations_of<std::uint8_t>(with_farneback, 8), 0);
-  EXPECT_EQ(allocations_of<std::uint16_t>(with_farneback, 12), 0);
 }
 
-TEST(Allocations, AreNotMadeByPhysicalPixels) {
-  const auto ideal = [](const LumaFormat& format) -> std::unique_ptr<Simulator> {
-    return make_dvs_simulator(format);
-  };
-  EXPECT_EQ(allocations_of<std::uint8_t>(ideal, 8), 0);
-  const auto limited = [](const LumaFormat& format) -> std::unique_ptr<Simulator> {
-    auto simulator = make_dvs_simulator(format);
-    // The limit of the readout is constant.
-    simulator->set({.cutoff_frequency = 100, .refractory_period = 100'000, .max_rate = 2e5});
-    return simulator;
-  };
-  EXPECT_EQ(allocations_of<std::uint16_t>(limited, 12), 0);
-}
-
-/// Interpolation along a rotating flow, so that tiles differ from frame to frame.
-template <class Pixel>
-int allocations_of_interpolation(int bits, Interpolation interpolation) {
-  const auto frames = frames_of_a_drift<Pixel>(bits);
-  std::vector<Image<Flow>> flows;
-  for (int i = 0; i < frames_a_round; ++i) {
-    flows.emplace_back(width, height);
-    for (int y = 0; y < height; ++y)
-      for (int x = 0; x < width; ++x)
-        flows.back().at(x, y) = {0.1F * static_cast<float>(x * i % 30),
-                                 0.02F * static_cast<float>(y)};
-  }
-  ThreadPool pool;
-  pool.set_threads(threads);
-  InterpolationKernel kernel;
-  StepBuckets events;
-  return allocations_in_steady_state([&](int i) {
-    const auto& last = frames[static_cast<std::size_t>(i)];
-    const auto& now = frames[static_cast<std::size_t>((i + 1) % frames_a_round)];
-    const StepTimes steps(scene::frame_time, 11);
-    kernel.fire(InterpolatedInterval<Pixel>{{last.view(), now.view(), steps.count()},
-                                            flows[static_cast<std::size_t>(i)].view(),
-                                            interpolation,
-                                            steps,
-                                            {3 << (bits - 8), 3 << (bits - 8)}},
-                pool, events);
-    EXPECT_GT(events.size(), 1000U);
-  });
-}
-
-TEST(Allocations, AreNotMadeByDenseInterpolationOnceTheFlowIsFound) {
-  for (const auto interpolation : {Interpolation::forward, Interpolation::blend}) {
-    EXPECT_EQ(allocations_of_interpolation<std::uint8_t>(8, interpolation), 0);
-    EXPECT_EQ(allocations_of_interpolation<std::uint16_t>(12, interpolation), 0);
+TEST(Allocations, AreNotMadeBySimulators) {
+  const std::pair<const char*, Make> simulators[] = {
+      {"frame", make_frame_simulator},
+      {"sparse", make_sparse_simulator},
+      {"diff", make_diff_simulator},
+      {"dense", dense(Interpolation::forward)},
+      {"dense, blended", dense(Interpolation::blend)},
+      {"dvs", make_dvs_simulator},
+      {"dvs of limited bandwidth and rate", [](const LumaFormat& format) {
+         auto simulator = make_dvs_simulator(format);
+         // The limit of the readout is constant.
+         simulator->set({.cutoff_frequency = 100, .refractory_period = 100'000, .max_rate = 2e5});
+         return simulator;
+       }}};
+  for (const auto& [name, make] : simulators) {
+    EXPECT_EQ(allocations_of<std::uint8_t>(make, 8), 0) << name;
+    EXPECT_EQ(allocations_of<std::uint16_t>(make, 12), 0) << name;
   }
 }
 

@@ -8,10 +8,7 @@
 
 #include "src/core/luma.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
-#include "src/simulate/dense_simulator.hpp"
-#include "src/simulate/diff_simulator.hpp"
-#include "src/simulate/frame_simulator.hpp"
-#include "src/simulate/sparse_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/reference/dense.hpp"
 #include "tests/reference/diff.hpp"

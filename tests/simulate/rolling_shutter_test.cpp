@@ -15,10 +15,7 @@
 #include <vector>
 
 #include "src/dvs/dvs_simulator.hpp"
-#include "src/simulate/dense_simulator.hpp"
-#include "src/simulate/diff_simulator.hpp"
-#include "src/simulate/frame_simulator.hpp"
-#include "src/simulate/sparse_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 #include "tests/dvs/playback.hpp"
 #include "tests/simulate/scene.hpp"
 

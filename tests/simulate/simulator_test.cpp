@@ -7,10 +7,7 @@
 #include <functional>
 #include <map>
 
-#include "src/simulate/dense_simulator.hpp"
-#include "src/simulate/diff_simulator.hpp"
-#include "src/simulate/frame_simulator.hpp"
-#include "src/simulate/sparse_simulator.hpp"
+#include "src/simulate/simulators.hpp"
 #include "tests/simulate/scene.hpp"
 
 namespace {

@@ -39,7 +39,6 @@ inline std::vector<Variant> all(int width = 640, int height = 480) {
   return variants;
 }
 
-/// A datagram with its own memory.
 struct Packet {
   Bytes bytes;
   std::size_t events;
@@ -47,7 +46,6 @@ struct Packet {
   Microseconds last;
 };
 
-/// All datagrams of a stream.
 inline std::vector<Packet> packets_of(DatagramPacker& packer,
                                       std::span<const AbsoluteEvent> events) {
   std::vector<Packet> packets;

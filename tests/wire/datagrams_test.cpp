@@ -9,7 +9,6 @@
 #include <stdexcept>
 
 #include "src/core/byte_order.hpp"
-#include "tests/formats/recordings.hpp"
 
 namespace eventcamera {
 namespace {
@@ -24,7 +23,6 @@ void operator+=(Bytes& bytes, const Bytes& more) {
   bytes.insert(bytes.end(), more.begin(), more.end());
 }
 
-/// A receiver, and what it got.
 struct Receiver {
   explicit Receiver(const DatagramSettings& settings)
       : unpacker(make_datagram_unpacker(settings)) {}
@@ -158,27 +156,6 @@ std::string name_of(const testing::TestParamInfo<datagrams::Variant>& tested) {
 
 class EveryFormat : public testing::TestWithParam<datagrams::Variant> {};
 INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(datagrams::all()), name_of);
-
-TEST_P(EveryFormat, BringsEveryEvent) {
-  const auto& settings = GetParam().settings;
-  for (unsigned seed = 0; seed < 4; ++seed) {
-    // Pauses of up to half an hour, and many events of the same time.
-    auto sent = recordings::random_events({640, 480}, 20'000, seed, 1'000'000, 1'800'000'000);
-    Receiver receiver(settings);
-    std::size_t count = 0;
-    for (const auto& packet : datagrams::packets_of(settings, sent)) {
-      const auto reception = receiver.take(packet.bytes, packet.last);
-      ASSERT_EQ(reception.fault, nullptr);
-      ASSERT_FALSE(reception.late || reception.restarted);
-      ASSERT_EQ(reception.lost, 0);
-      ASSERT_EQ(receiver.events.size(), packet.events);
-      for (std::size_t i = 0; settings.format == spif && i < packet.events; ++i)
-        sent[count + i].t = packet.last;  // all arrive at once
-      count += packet.events;
-    }
-    EXPECT_TRUE(receiver.all == sent);
-  }
-}
 
 TEST_P(EveryFormat, KeepsToItsSizes) {
   const auto& settings = GetParam().settings;
@@ -319,7 +296,6 @@ TEST(Datagrams, WithImpossibleTimesAreRejected) {
   EXPECT_NE(t32.take(leaps).fault, nullptr);
 }
 
-/// A datagram of jAER with an event at `t`.
 Bytes jaer_packet(std::uint32_t number, std::uint32_t t) {
   Bytes bytes(12);
   store(number, bytes.data(), std::endian::big);

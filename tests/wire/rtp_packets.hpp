@@ -13,7 +13,6 @@
 
 namespace eventcamera::rtp_packets {
 
-/// An interval with its events, relative to its start.
 struct Interval {
   Nanoseconds start;
   Nanoseconds duration;

@@ -62,13 +62,13 @@ bool is_part(const std::vector<AbsoluteEvent>& some, const std::vector<AbsoluteE
   return true;
 }
 
-class EveryFormat : public testing::TestWithParam<RtpEventFormat> {};
-INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::Values(RtpEventFormat::evt3, RtpEventFormat::xytp),
+class EveryPayload : public testing::TestWithParam<RtpEventFormat> {};
+INSTANTIATE_TEST_SUITE_P(, EveryPayload, testing::Values(RtpEventFormat::evt3, RtpEventFormat::xytp),
                          [](const auto& param) {
                            return param.param == RtpEventFormat::evt3 ? "Evt3" : "Xytp";
                          });
 
-TEST_P(EveryFormat, GivesBackEveryIntervalOfAnySensorInPacketsOfAnySize) {
+TEST_P(EveryPayload, GivesBackEveryIntervalOfAnySensorInPacketsOfAnySize) {
   unsigned seed = 0;
   for (const SensorSize size :
        {SensorSize{1, 1}, {7, 3}, {31, 2}, {33, 1}, davis, {1280, 720}, {2048, 2048}}) {
@@ -89,7 +89,7 @@ TEST_P(EveryFormat, GivesBackEveryIntervalOfAnySensorInPacketsOfAnySize) {
   }
 }
 
-TEST_P(EveryFormat, CountsWhatIsLostReorderedOrDuplicated) {
+TEST_P(EveryPayload, CountsWhatIsLostReorderedOrDuplicated) {
   for (unsigned seed = 0; seed < 40; ++seed) {
     std::mt19937 random(seed);
     const auto happens = [&](int percent) { return static_cast<int>(random() % 100) < percent; };
@@ -121,7 +121,7 @@ TEST_P(EveryFormat, CountsWhatIsLostReorderedOrDuplicated) {
   }
 }
 
-TEST_P(EveryFormat, FollowsASenderThatRestarts) {
+TEST_P(EveryPayload, FollowsASenderThatRestarts) {
   const auto intervals = random_intervals(davis, 60, 6);
   for (const std::uint32_t ssrc : {1U, 2U}) {
     RtpPacker first(davis, GetParam());
@@ -166,7 +166,7 @@ class TwoSenders {
   Receiver receiver_;
 };
 
-TEST_P(EveryFormat, KeepsTheFirstOfTwoSenders) {
+TEST_P(EveryPayload, KeepsTheFirstOfTwoSenders) {
   TwoSenders senders(GetParam());
   for (std::size_t i = 0; i < 50; ++i)
     for (const std::uint32_t sender : {0, 1}) senders.send(sender, i);
@@ -177,7 +177,7 @@ TEST_P(EveryFormat, KeepsTheFirstOfTwoSenders) {
   EXPECT_EQ(senders.statistics().lost_packets + senders.statistics().lost_events, 0U);
 }
 
-TEST_P(EveryFormat, FollowsTheSecondSenderWhenTheFirstIsSilent) {
+TEST_P(EveryPayload, FollowsTheSecondSenderWhenTheFirstIsSilent) {
   TwoSenders senders(GetParam());
   senders.send(0, 0);
   senders.send(1, 0);
@@ -191,7 +191,7 @@ TEST_P(EveryFormat, FollowsTheSecondSenderWhenTheFirstIsSilent) {
   EXPECT_EQ(senders.statistics().packets, 31U);
 }
 
-TEST_P(EveryFormat, FollowsARestartedSenderDespiteALatePacket) {
+TEST_P(EveryPayload, FollowsARestartedSenderDespiteALatePacket) {
   TwoSenders senders(GetParam());
   senders.send(0, 0);
   senders.send(0, 2);
@@ -201,7 +201,7 @@ TEST_P(EveryFormat, FollowsARestartedSenderDespiteALatePacket) {
   EXPECT_EQ(senders.statistics().rejected_packets, 0U);
 }
 
-TEST_P(EveryFormat, AFloodOfRandomPacketsDisturbsNothing) {
+TEST_P(EveryPayload, AFloodOfRandomPacketsDisturbsNothing) {
   const auto intervals = random_intervals(davis, 20, 8);
   RtpPacker packer(davis, GetParam());
   Receiver receiver(davis, GetParam());
@@ -225,7 +225,7 @@ TEST_P(EveryFormat, AFloodOfRandomPacketsDisturbsNothing) {
   EXPECT_EQ(statistics.lost_events, 0U);
 }
 
-TEST_P(EveryFormat, RejectsTruncatedPacketsUnlessTheyAreWhole) {
+TEST_P(EveryPayload, RejectsTruncatedPacketsUnlessTheyAreWhole) {
   const auto intervals = random_intervals(davis, 4, 9);
   RtpPacker packer(davis, GetParam());
   for (const auto& packet : packets_of(intervals, packer, 536, 7)) {
@@ -247,7 +247,7 @@ TEST_P(EveryFormat, RejectsTruncatedPacketsUnlessTheyAreWhole) {
   }
 }
 
-TEST_P(EveryFormat, RejectsEventsOutsideItsSensorOrInterval) {
+TEST_P(EveryPayload, RejectsEventsOutsideItsSensorOrInterval) {
   const std::vector<Event> events = {Event::at(5, 6, 10, Polarity::on)};
   const auto rejected = [&](SensorSize receiver, std::size_t byte, std::uint8_t value) {
     RtpPacker packer(davis, GetParam());

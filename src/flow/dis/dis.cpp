@@ -11,23 +11,23 @@
 namespace eventcamera {
 namespace {
 
-/// The flow of a coarser level at a pixel of a finer one.
-Flow flow_at(const VariationalRefinement& coarser, float x, float y) {
+/// Flow of a level at a position, interpolated bilinearly.
+Flow flow_at(const VariationalRefinement& level, float x, float y) {
   const auto place = [](float position, int size) {
     return std::clamp(position, 0.0F, static_cast<float>(size - 1));
   };
-  const float from_x = place(x, coarser.width());
-  const float from_y = place(y, coarser.height());
+  const float from_x = place(x, level.width());
+  const float from_y = place(y, level.height());
   const int left = static_cast<int>(from_x);
   const int top = static_cast<int>(from_y);
-  const int right = std::min(left + 1, coarser.width() - 1);
-  const int bottom = std::min(top + 1, coarser.height() - 1);
+  const int right = std::min(left + 1, level.width() - 1);
+  const int bottom = std::min(top + 1, level.height() - 1);
   const auto between = [](const Flow& a, const Flow& b, float weight) -> Flow {
     return {a.x + weight * (b.x - a.x), a.y + weight * (b.y - a.y)};
   };
   const float along = from_x - static_cast<float>(left);
-  return between(between(coarser.at(left, top), coarser.at(right, top), along),
-                 between(coarser.at(left, bottom), coarser.at(right, bottom), along),
+  return between(between(level.at(left, top), level.at(right, top), along),
+                 between(level.at(left, bottom), level.at(right, bottom), along),
                  from_y - static_cast<float>(top));
 }
 
@@ -87,7 +87,7 @@ ImageView<std::uint8_t> DisFlow::padded(const ImageView<std::uint8_t>& image) {
 /// Runs body(rows, scratch) for the bands of an image of this height.
 template <class Body>
 void DisFlow::for_each_band(int height, ThreadPool& threads, const Body& body) {
-  scratch_.resize(static_cast<std::size_t>(threads.threads()));
+  scratch_.resize(threads.threads());
   threads.for_each(band_count(height),
                    [&](int band, int thread) { body(BandRows(band, height), scratch_[thread]); });
 }
@@ -120,14 +120,13 @@ ImageView<Flow> DisFlow::flow(ThreadPool& threads) {
     for (int round = 0; round < quality_.propagations; ++round) {
       std::swap(level.flows, level.found);
       threads.for_each(level.grid.rows, [&](int row, int) {
-        propagate_row(level.grid, last, level.gradients, next, row, quality_.iterations,
-                      level.found, level.flows.row(row));
+        search_row(level.grid, last, level.gradients, next, row, quality_.iterations, &level.found,
+                   level.flows.row(row));
       });
     }
     for_each_band(last.height(), threads, [&](const BandRows& rows, Scratch& scratch) {
-      auto& field = level.refinement.start();
       spread_patches(level.grid, last, next, level.flows, rows.first, rows.last, scratch.sums,
-                     field.x, field.y);
+                     level.refinement.start());
     });
     level.refinement.run(last, next, threads);
     coarser = &level;
@@ -161,10 +160,9 @@ void DisFlow::search(const Level* coarser, Level& level, int row) const {
     }
   }
   search_row(grid, level.last.grey(), level.gradients, level.next.grey(), row, quality_.iterations,
-             flows);
+             nullptr, flows);
 }
 
-/// Computes rows [first, last) of the flow from the finest level.
 void DisFlow::upsample(int first, int last, Scratch& scratch) {
   const auto& finest = levels_.front().refinement;
   std::array<int, 2> known = {-1, -1};

@@ -12,8 +12,8 @@
 
 namespace eventcamera {
 
-/// Dense inverse search (Kroeger et al., ECCV 2016), coarse to fine: patches are searched, spread
-/// over the pixels that they cover, and refined with a variational method.
+/// Dense inverse search (Kroeger et al., ECCV 2016), coarse to fine: searches for patches, averages
+/// their flows in the pixels that they cover, and refines the result with a variational method.
 class DisFlow final : public DenseFlow {
  public:
   struct Quality {
@@ -22,11 +22,11 @@ class DisFlow final : public DenseFlow {
     int iterations;
     int scales;        ///< minimum number of pyramid levels
     int max_finest;    ///< limit of finest_scale()
-    int propagations;  ///< rounds in which patches take over flows of their neighbours
+    int propagations;  ///< rounds of spatial propagation
 
-    /// Number of times an image is halved for the coarsest level. There, the largest displacement
-    /// to be found, a quarter of the longer side, is about one patch, and the shorter side at least
-    /// one patch.
+    /// Number of times an image is halved for the coarsest level. The largest displacement to be
+    /// found, a quarter of the longer side, shrinks to about one patch there; the shorter side
+    /// stays at least one patch.
     int coarsest_scale(int width, int height) const;
     /// Number of times an image is halved for the finest level.
     int finest_scale(int width, int height) const;
@@ -35,7 +35,7 @@ class DisFlow final : public DenseFlow {
   static constexpr Quality medium = {4, 3, 8, 4, 3, 2};
   static constexpr Quality high = {8, 4, 32, 1, 1, 0};
 
-  /// Smaller images are padded, by replicating their border, to this width and height.
+  /// Smaller images are padded to this width and height by replicating their border.
   static constexpr int min_side = 64;
 
   explicit DisFlow(const Quality& quality) : quality_(quality) {}
@@ -57,7 +57,7 @@ class DisFlow final : public DenseFlow {
     VariationalRefinement refinement;
   };
 
-  /// Scratch memory of one thread.
+  /// Memory of one thread.
   struct Scratch {
     std::vector<float> sums;
     std::vector<std::int16_t> slopes;

@@ -7,7 +7,6 @@
 
 #include "src/flow/scratch.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/dis/pyramid.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -39,8 +38,8 @@ void add_row(const std::uint8_t* row, float weight, int width, float* out) {
   const auto factor = hn::Set(floats, weight);
   for_each_vector(BytesFor<Floats>(), width, [&](int x, const auto& load) {
     const auto pixels = hn::PromoteTo(hn::RebindToSigned<Floats>(), load(row + x));
-    const auto product = hn::Mul(factor, hn::ConvertTo(floats, pixels));
-    hn::StoreU(hn::Add(hn::LoadU(floats, out + x), product), floats, out + x);
+    const auto product = factor * hn::ConvertTo(floats, pixels);
+    hn::StoreU(hn::LoadU(floats, out + x) + product, floats, out + x);
   });
 }
 
@@ -57,9 +56,9 @@ void halve_rows(const std::uint8_t* upper, const std::uint8_t* lower, int width,
       hn::Vec<decltype(bytes)> even;
       hn::Vec<decltype(bytes)> odd;
       hn::LoadInterleaved2(bytes, row + std::ptrdiff_t{2} * x, even, odd);
-      return hn::Add(hn::PromoteTo(words, even), hn::PromoteTo(words, odd));
+      return hn::PromoteTo(words, even) + hn::PromoteTo(words, odd);
     };
-    const auto sum = hn::Add(hn::Add(pairs(upper), pairs(lower)), hn::Set(words, std::uint16_t{2}));
+    const auto sum = pairs(upper) + pairs(lower) + hn::Set(words, std::uint16_t{2});
     const auto mean = hn::BitCast(signed_words, hn::ShiftRight<2>(sum));
     hn::StoreU(hn::DemoteTo(bytes, mean), bytes, out + x);
   }
@@ -81,8 +80,8 @@ void slope_columns(const std::uint8_t* above, const std::uint8_t* middle, const 
     };
     const auto a = load(above);
     const auto b = load(below);
-    hn::StoreU(hn::Add(hn::Add(a, b), hn::ShiftLeft<1>(load(middle))), slopes, sums + x);
-    hn::StoreU(hn::Sub(b, a), slopes, differences + x);
+    hn::StoreU(a + b + hn::ShiftLeft<1>(load(middle)), slopes, sums + x);
+    hn::StoreU(b - a, slopes, differences + x);
   }
 }
 
@@ -92,9 +91,8 @@ void slope_row(const std::int16_t* sums, const std::int16_t* differences, int wi
   const int lanes = static_cast<int>(hn::Lanes(slopes));
   for (int x = 0; x < width; x += lanes) {
     const auto at = [&](const std::int16_t* row, int k) { return hn::LoadU(slopes, row + x + k); };
-    hn::StoreU(hn::Sub(at(sums, 1), at(sums, -1)), slopes, slope_x + x);
-    hn::StoreU(hn::Add(hn::Add(at(differences, -1), at(differences, 1)),
-                       hn::ShiftLeft<1>(at(differences, 0))),
+    hn::StoreU(at(sums, 1) - at(sums, -1), slopes, slope_x + x);
+    hn::StoreU(at(differences, -1) + at(differences, 1) + hn::ShiftLeft<1>(at(differences, 0)),
                slopes, slope_y + x);
   }
 }

@@ -45,7 +45,6 @@ class PyramidImage {
   PyramidImage(int width, int height) : grey_(width, height, margin) {}
 
   const Image<std::uint8_t>& grey() const { return grey_; }
-  /// Computes row y.
   void shrink_row(const AreaShrink& shrink, const ImageView<std::uint8_t>& image, int y,
                   std::vector<float>& sums);
   /// Fills the rows above and below, once all rows are computed.

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <utility>
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/dis/variational_refinement.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -33,7 +32,7 @@ constexpr float min_residual = 0.001F * 0.001F;
 constexpr float over_relaxation = 1.6F;
 constexpr int half_sweeps = 2 * 5;      ///< per evaluation of the penalties
 constexpr int reach = half_sweeps - 1;  ///< distance to the farthest row that affects a row
-/// Positions in the later image are rounded to a fraction of a pixel.
+/// Positions in the later image are rounded to 1/fractions of a pixel.
 constexpr float fractions = 32;
 
 HWY_INLINE Vector load(const float* values) {
@@ -46,7 +45,7 @@ HWY_INLINE Vector set(float value) {
   return hn::Set(Floats(), value);
 }
 HWY_INLINE Vector square(Vector value) {
-  return hn::Mul(value, value);
+  return value * value;
 }
 
 /// 1 / sqrt(value) with a relative error below 1e-6: an estimate from the bits of the exponent, and
@@ -55,16 +54,15 @@ HWY_INLINE Vector square(Vector value) {
 HWY_INLINE Vector inverse_sqrt(Vector value) {
   const Ints ints;
   const auto bits = hn::ShiftRight<1>(hn::BitCast(ints, value));
-  auto root = hn::BitCast(Floats(), hn::Sub(hn::Set(ints, 0x5F1FFFF9), bits));
-  root = hn::Mul(hn::Mul(root, set(0.703952253F)),
-                 hn::Sub(set(2.38924456F), hn::Mul(hn::Mul(value, root), root)));
-  const auto half = hn::Mul(value, set(0.5F));
-  return hn::Mul(root, hn::Sub(set(1.5F), hn::Mul(hn::Mul(half, root), root)));
+  auto root = hn::BitCast(Floats(), hn::Set(ints, 0x5F1FFFF9) - bits);
+  root = root * set(0.703952253F) * (set(2.38924456F) - value * root * root);
+  const auto half = value * set(0.5F);
+  return root * (set(1.5F) - half * root * root);
 }
 
-/// The columns to the left of a parity's columns; the columns to the right come next.
+/// Left neighbours of the columns of a parity; their right neighbours are one element further.
 template <class Plane>
-HWY_INLINE auto* beside(Plane& plane, int parity, int y) {
+HWY_INLINE auto* left_of(Plane& plane, int parity, int y) {
   return parity == 0 ? plane.row(1, y) - 1 : plane.row(0, y);
 }
 
@@ -72,15 +70,15 @@ HWY_INLINE auto* beside(Plane& plane, int parity, int y) {
 struct Neighbours {
   Neighbours(const SplitPlane& plane, int parity, int y, int y_above, int y_below)
       : here(plane.row(parity, y)),
-        side(beside(plane, parity, y)),
+        side(left_of(plane, parity, y)),
         above(plane.row(parity, y_above)),
         below(plane.row(parity, y_below)) {}
 
   HWY_INLINE Vector left(int k) const { return load(side + k); }
   HWY_INLINE Vector right(int k) const { return load(side + k + 1); }
   /// Differences between the neighbours of a pixel.
-  HWY_INLINE Vector across(int k) const { return hn::Sub(right(k), left(k)); }
-  HWY_INLINE Vector along(int k) const { return hn::Sub(load(below + k), load(above + k)); }
+  HWY_INLINE Vector across(int k) const { return right(k) - left(k); }
+  HWY_INLINE Vector along(int k) const { return load(below + k) - load(above + k); }
 
   const float* here;
   const float* side;
@@ -92,18 +90,19 @@ int ring(int y) {
   return y & (Scratch::rows - 1);
 }
 
-/// Computes the derivatives of the images at the positions to which a flow leads.
-class Linearisation {
- public:
-  Linearisation(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, const Field& flow,
-                Scratch& scratch, Derivatives& out)
-      : from_(from), to_(to), flow_(flow), scratch_(scratch), out_(out), end_(from.height() - 1) {}
+/// Computes the derivatives of the earlier image and the later one, warped back along a flow.
+struct Linearisation {
+  const Image<std::uint8_t>& from;
+  const Image<std::uint8_t>& to;
+  const Field& flow;
+  Scratch& scratch;
+  Derivatives& out;
+  int end = from.height() - 1;  ///< last row
 
-  /// Rows [first, last).
   void run(int first, int last) {
     int warped = std::max(0, first - 1);
     for (int y = first; y < last; ++y) {
-      for (; warped <= std::min(y + 1, end_); ++warped) warp(warped);
+      for (; warped <= std::min(y + 1, end); ++warped) warp(warped);
       derive(y);
     }
   }
@@ -111,13 +110,11 @@ class Linearisation {
  private:
   /// Rounds and clamps positions in the later image.
   static HWY_INLINE Vector place(Vector exact, int size) {
-    const auto rounded = hn::Mul(hn::Round(hn::Mul(exact, set(fractions))), set(1 / fractions));
+    const auto rounded = hn::Round(exact * set(fractions)) * set(1 / fractions);
     return hn::Min(hn::Max(rounded, set(0.0F)), set(static_cast<float>(size - 1)));
   }
-  static HWY_INLINE Vector between(Vector a, Vector b, Vector weight) {
-    return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
-  }
-  /// The mean of the pixels at offsets and their right neighbours: the two lowest bytes of words.
+  /// Interpolates between the pixels at offsets and their right neighbours, the two lowest bytes of
+  /// words.
   static HWY_INLINE Vector along(const std::uint8_t* pixels, hn::Vec<Ints> offsets, Vector weight) {
     const Ints ints;
     const auto words =
@@ -125,81 +122,74 @@ class Linearisation {
     const auto pixel = [&](auto lowest) HWY_ATTR {
       return hn::ConvertTo(Floats(), hn::And(lowest, hn::Set(ints, 0xFF)));
     };
-    return between(pixel(words), pixel(hn::ShiftRight<8>(words)), weight);
+    return lerp(pixel(words), pixel(hn::ShiftRight<8>(words)), weight);
   }
 
-  /// Computes the mean and the difference of the earlier image and the later one, moved back.
+  /// Computes the mean and the difference of the earlier image and the warped later one.
   void warp(int y) {
     for (int parity = 0; parity < 2; ++parity) warp(y, parity);
-    scratch_.mean.replicate_ends(ring(y));
+    scratch.mean.replicate_ends(ring(y));
   }
   void warp(int y, int parity) {
     const Floats floats;
     const Ints ints;
     const hn::Rebind<std::uint8_t, Floats> bytes;
     const int lanes = static_cast<int>(hn::Lanes(floats));
-    const auto every_second = hn::Mul(iota(floats, 0), set(2.0F));
-    const std::uint8_t* here = from_.row(y);
-    const auto stride = static_cast<std::int32_t>(to_.stride());
-    const std::uint8_t* data = to_.row(0);
-    const float* flow_x = flow_.x.row(parity, y);
-    const float* flow_y = flow_.y.row(parity, y);
-    float* mean = scratch_.mean.row(parity, ring(y));
-    float* change = scratch_.change.row(parity, ring(y));
-    for (int k = 0; k < flow_.x.count(parity); k += lanes) {
-      const auto start = hn::Add(every_second, set(static_cast<float>(2 * k + parity)));
-      const auto to_x = place(hn::Add(start, load(flow_x + k)), to_.width());
-      const auto to_y = place(hn::Add(set(static_cast<float>(y)), load(flow_y + k)), to_.height());
+    const auto every_second = iota(floats, 0) * set(2.0F);
+    const std::uint8_t* here = from.row(y);
+    const auto stride = static_cast<std::int32_t>(to.stride());
+    const std::uint8_t* data = to.row(0);
+    const float* flow_x = flow.x.row(parity, y);
+    const float* flow_y = flow.y.row(parity, y);
+    float* mean = scratch.mean.row(parity, ring(y));
+    float* change = scratch.change.row(parity, ring(y));
+    for (int k = 0; k < flow.x.count(parity); k += lanes) {
+      const auto start = every_second + set(static_cast<float>(2 * k + parity));
+      const auto to_x = place(start + load(flow_x + k), to.width());
+      const auto to_y = place(set(static_cast<float>(y)) + load(flow_y + k), to.height());
       const auto cell_x = hn::Floor(to_x);
       const auto cell_y = hn::Floor(to_y);
-      const auto offsets = hn::Add(hn::Mul(hn::ConvertTo(ints, cell_y), hn::Set(ints, stride)),
-                                   hn::ConvertTo(ints, cell_x));
-      const auto right = hn::Sub(to_x, cell_x);
-      const auto there = between(along(data, offsets, right), along(data + stride, offsets, right),
-                                 hn::Sub(to_y, cell_y));
+      const auto offsets =
+          hn::ConvertTo(ints, cell_y) * hn::Set(ints, stride) + hn::ConvertTo(ints, cell_x);
+      const auto right = to_x - cell_x;
+      const auto there =
+          lerp(along(data, offsets, right), along(data + stride, offsets, right), to_y - cell_y);
       hn::Vec<decltype(bytes)> columns[2];
       hn::LoadInterleaved2(bytes, here + std::ptrdiff_t{2} * k, columns[0], columns[1]);
       const auto grey = hn::ConvertTo(floats, hn::PromoteTo(ints, columns[parity]));
-      store(hn::Mul(hn::Add(grey, there), set(0.5F)), mean + k);
-      store(hn::Sub(there, grey), change + k);
+      store((grey + there) * set(0.5F), mean + k);
+      store(there - grey, change + k);
     }
   }
 
   void derive(int y) {
     const int here = ring(y);
     const int above = ring(std::max(y - 1, 0));
-    const int below = ring(std::min(y + 1, end_));
+    const int below = ring(std::min(y + 1, end));
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     for (int parity = 0; parity < 2; ++parity) {
-      const Neighbours mean(scratch_.mean, parity, here, above, below);
-      float* x = out_.x.row(parity, y);
-      float* y_ = out_.y.row(parity, y);
-      for (int k = 0; k < flow_.x.count(parity); k += lanes) {
+      const Neighbours mean(scratch.mean, parity, here, above, below);
+      float* x = out.x.row(parity, y);
+      float* y_ = out.y.row(parity, y);
+      for (int k = 0; k < flow.x.count(parity); k += lanes) {
         store(mean.across(k), x + k);
         store(mean.along(k), y_ + k);
       }
     }
-    out_.x.replicate_ends(y);
-    out_.t.copy_row(y, scratch_.change, here);
-    out_.t.replicate_ends(y);
+    out.x.replicate_ends(y);
+    out.t.copy_row(y, scratch.change, here);
+    out.t.replicate_ends(y);
   }
-
-  const Image<std::uint8_t>& from_;
-  const Image<std::uint8_t>& to_;
-  const Field& flow_;
-  Scratch& scratch_;
-  Derivatives& out_;
-  int end_;
 };
 
 void linearise_rows(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
                     const Field& flow, int first, int last, Scratch& scratch, Derivatives& out) {
-  Linearisation(from, to, flow, scratch, out).run(first, last);
+  Linearisation{from, to, flow, scratch, out}.run(first, last);
 }
 
 /// factor / sqrt(squares)
 HWY_INLINE Vector weight(float factor, Vector squares) {
-  return hn::Mul(set(factor), inverse_sqrt(squares));
+  return set(factor) * inverse_sqrt(squares);
 }
 
 /// Computes the equations of every other pixel of a row.
@@ -213,13 +203,13 @@ class Assembly {
         start_y_(start.y.row(parity, y)),
         x_(scratch.flow.x.row(parity, ring(y))),
         y_(scratch.flow.y.row(parity, ring(y))),
-        left_(beside(scratch.weight, parity, ring(y))),
+        left_(left_of(scratch.weight, parity, ring(y))),
         right_(scratch.right.row(parity, y & 1)),
         above_(scratch.weight.row(parity, ring(y - 1))),
         below_(scratch.weight.row(parity, ring(y + 1 < start.x.height() ? y : y + 1))),
         out_(scratch.equations.row(parity, ring(y))) {}
 
-  /// Processes two vectors at a time, because the operations on one depend on each other.
+  /// Processes two vectors at a time, because the operations on each depend on one another.
   void run(int count) const {
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     for (int k = 0; k < count; k += 2 * lanes) {
@@ -235,13 +225,9 @@ class Assembly {
  private:
   /// a x + b y + c = 0 for a step (x, y) from the start.
   struct Constraint {
-    HWY_INLINE Vector residual(Vector x, Vector y) const {
-      return hn::Add(hn::Add(c, hn::Mul(a, x)), hn::Mul(b, y));
-    }
+    HWY_INLINE Vector residual(Vector x, Vector y) const { return c + a * x + b * y; }
     /// Square of the gradient.
-    HWY_INLINE Vector norm() const {
-      return hn::Add(hn::Add(square(a), square(b)), set(min_gradient));
-    }
+    HWY_INLINE Vector norm() const { return square(a) + square(b) + set(min_gradient); }
     Vector a;
     Vector b;
     Vector c;
@@ -252,13 +238,13 @@ class Assembly {
     // Not in the declarations: GCC 12 compiles these without the target's instructions.
     HWY_INLINE Equations() : xx(set(min_gradient)), xy(set(0.0F)), yy(xx), x(xy), y(xy) {}
     HWY_INLINE void add(const Constraint& constraint, Vector weight) {
-      const auto a = hn::Mul(weight, constraint.a);
-      const auto b = hn::Mul(weight, constraint.b);
-      xx = hn::Add(xx, hn::Mul(a, constraint.a));
-      xy = hn::Add(xy, hn::Mul(a, constraint.b));
-      yy = hn::Add(yy, hn::Mul(b, constraint.b));
-      x = hn::Sub(x, hn::Mul(a, constraint.c));
-      y = hn::Sub(y, hn::Mul(b, constraint.c));
+      const auto a = weight * constraint.a;
+      const auto b = weight * constraint.b;
+      xx = xx + a * constraint.a;
+      xy = xy + a * constraint.b;
+      yy = yy + b * constraint.b;
+      x = x - a * constraint.c;
+      y = y - b * constraint.c;
     }
     Vector xx;
     Vector xy;
@@ -285,8 +271,8 @@ class Assembly {
   }
 
   HWY_INLINE Terms terms_at(int k) const {
-    const auto x = hn::Sub(load(x_ + k), load(start_x_ + k));
-    const auto y = hn::Sub(load(y_ + k), load(start_y_ + k));
+    const auto x = load(x_ + k) - load(start_x_ + k);
+    const auto y = load(y_ + k) - load(start_y_ + k);
     const auto xy = dx_.along(k);
     const Constraint bright = {load(dx_.here + k), load(dy_.here + k), load(dt_.here + k)};
     const Constraint gradient_x = {dx_.across(k), xy, dt_.across(k)};
@@ -294,28 +280,26 @@ class Assembly {
     const auto norm = bright.norm();
     const auto norm_x = gradient_x.norm();
     const auto norm_y = gradient_y.norm();
-    const auto norms = hn::Mul(norm_x, norm_y);
-    const auto bright_squares =
-        hn::Add(square(bright.residual(x, y)), hn::Mul(norm, set(min_residual)));
-    const auto gradient_squares =
-        hn::Add(hn::Add(hn::Mul(square(gradient_x.residual(x, y)), norm_y),
-                        hn::Mul(square(gradient_y.residual(x, y)), norm_x)),
-                hn::Mul(norms, set(min_residual)));
+    const auto norms = norm_x * norm_y;
+    const auto bright_squares = square(bright.residual(x, y)) + norm * set(min_residual);
+    const auto gradient_squares = square(gradient_x.residual(x, y)) * norm_y +
+                                  square(gradient_y.residual(x, y)) * norm_x +
+                                  norms * set(min_residual);
     return {bright,
             gradient_x,
             gradient_y,
             norm_x,
             norm_y,
-            hn::Mul(norm, bright_squares),
-            hn::Mul(norms, gradient_squares)};
+            norm * bright_squares,
+            norms * gradient_squares};
   }
 
   static HWY_INLINE Equations weighted(const Terms& terms) {
     Equations equations;
     equations.add(terms.bright, weight(brightness, terms.bright_squares));
     const auto both = weight(gradient, terms.gradient_squares);
-    equations.add(terms.gradient_x, hn::Mul(both, terms.norm_y));
-    equations.add(terms.gradient_y, hn::Mul(both, terms.norm_x));
+    equations.add(terms.gradient_x, both * terms.norm_y);
+    equations.add(terms.gradient_y, both * terms.norm_x);
     return equations;
   }
 
@@ -323,19 +307,16 @@ class Assembly {
   HWY_INLINE void solve(const Equations& equations, int k) const {
     const auto start_x = load(start_x_ + k);
     const auto start_y = load(start_y_ + k);
-    const auto all = hn::Add(hn::Add(load(left_ + k), load(right_ + k)),
-                             hn::Add(load(above_ + k), load(below_ + k)));
-    const auto xx = hn::Add(equations.xx, all);
-    const auto yy = hn::Add(equations.yy, all);
-    const auto inverse = hn::Div(set(over_relaxation), hn::Mul(xx, yy));
-    const auto constant_x = hn::Add(
-        equations.x, hn::Add(hn::Mul(equations.xx, start_x), hn::Mul(equations.xy, start_y)));
-    const auto constant_y = hn::Add(
-        equations.y, hn::Add(hn::Mul(equations.xy, start_x), hn::Mul(equations.yy, start_y)));
+    const auto all = load(left_ + k) + load(right_ + k) + (load(above_ + k) + load(below_ + k));
+    const auto xx = equations.xx + all;
+    const auto yy = equations.yy + all;
+    const auto inverse = set(over_relaxation) / (xx * yy);
+    const auto constant_x = equations.x + (equations.xx * start_x + equations.xy * start_y);
+    const auto constant_y = equations.y + (equations.xy * start_x + equations.yy * start_y);
     float* to = out_ + EquationRows::offset_of(k);
     store(equations.xy, to + VariationalRefinement::cross * EquationRows::block);
-    store(hn::Mul(yy, inverse), to + VariationalRefinement::inverse_x * EquationRows::block);
-    store(hn::Mul(xx, inverse), to + VariationalRefinement::inverse_y * EquationRows::block);
+    store(yy * inverse, to + VariationalRefinement::inverse_x * EquationRows::block);
+    store(xx * inverse, to + VariationalRefinement::inverse_y * EquationRows::block);
     store(constant_x, to + VariationalRefinement::constant_x * EquationRows::block);
     store(constant_y, to + VariationalRefinement::constant_y * EquationRows::block);
   }
@@ -355,36 +336,33 @@ class Assembly {
   float* out_;
 };
 
-/// Evaluates the penalties at a flow, and improves the flow.
-class Relaxation {
- public:
-  Relaxation(const Derivatives& derivatives, const Field& start, const Field& flow, int first,
-             int last, Scratch& scratch, Field& out)
-      : derivatives_(derivatives),
-        start_(start),
-        flow_(flow),
-        first_(first),
-        last_(last),
-        scratch_(scratch),
-        out_(out),
-        width_(flow.x.width()),
-        height_(flow.x.height()) {}
+/// Evaluates the penalties at a flow, and relaxes the equations that they give.
+struct Relaxation {
+  const Derivatives& derivatives;
+  const Field& start;
+  const Field& flow;
+  int first;
+  int last;
+  Scratch& scratch;
+  Field& out;
+  int width = flow.x.width();
+  int height = flow.x.height();
 
   /// A half sweep of a row needs only the previous half sweep of the next row, so all of them are
   /// done in one pass over rows that stay in the cache.
   void run() {
-    const int begin = std::max(0, first_ - reach);
-    const int end = std::min(height_, last_ + reach);
+    const int begin = std::max(0, first - reach);
+    const int end = std::min(height, last + reach);
     load_row(begin - 1);
     load_row(begin);
-    for (int y = begin; y < last_ + reach; ++y) {
+    for (int y = begin; y < last + reach; ++y) {
       if (y < end) {
         load_row(y + 1);
         for (int parity = 0; parity < 2; ++parity)
-          Assembly(derivatives_, start_, scratch_, y, parity).run(flow_.x.count(parity));
+          Assembly(derivatives, start, scratch, y, parity).run(flow.x.count(parity));
       }
       relax(y);
-      if (y - reach >= first_) store_row(y - reach);
+      if (y - reach >= first) store_row(y - reach);
     }
   }
 
@@ -394,54 +372,52 @@ class Relaxation {
   /// are 0.
   void load_row(int y) {
     const int to = ring(y);
-    if (y < 0 || y >= height_) {
-      for (auto* plane : {&scratch_.flow.x, &scratch_.flow.y, &scratch_.weight})
-        plane->clear_row(to);
+    if (y < 0 || y >= height) {
+      for (auto* plane : {&scratch.flow.x, &scratch.flow.y, &scratch.weight}) plane->clear_row(to);
       return;
     }
-    const int below = std::min(y + 1, height_ - 1);
+    const int below = std::min(y + 1, height - 1);
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     for (int parity = 0; parity < 2; ++parity) {
-      const Neighbours x(flow_.x, parity, y, y, below);
-      const Neighbours y_(flow_.y, parity, y, y, below);
-      float* x_row = scratch_.flow.x.row(parity, to);
-      float* y_row = scratch_.flow.y.row(parity, to);
-      float* weights = scratch_.weight.row(parity, to);
-      float* right = scratch_.right.row(parity, y & 1);
-      for (int k = 0; k < flow_.x.count(parity); k += lanes) {
-        const auto squared = hn::Add(squares(x, k), squares(y_, k));
-        const auto by = weight(smoothness, hn::Add(squared, set(min_residual)));
+      const Neighbours x(flow.x, parity, y, y, below);
+      const Neighbours y_(flow.y, parity, y, y, below);
+      float* x_row = scratch.flow.x.row(parity, to);
+      float* y_row = scratch.flow.y.row(parity, to);
+      float* weights = scratch.weight.row(parity, to);
+      float* right = scratch.right.row(parity, y & 1);
+      for (int k = 0; k < flow.x.count(parity); k += lanes) {
+        const auto squared = squares(x, k) + squares(y_, k);
+        const auto by = weight(smoothness, squared + set(min_residual));
         store(load(x.here + k), x_row + k);
         store(load(y_.here + k), y_row + k);
         store(by, weights + k);
         store(by, right + k);
       }
     }
-    scratch_.right.at(width_ - 1, y & 1) = 0;
-    clear_past_end(to, width_ & 1);
+    scratch.right.at(width - 1, y & 1) = 0;
+    clear_past_end(to, width & 1);
   }
 
   /// Sets the flow past the end of a row to 0.
   void clear_past_end(int row, int parity) {
-    const int count = flow_.x.count(parity);
-    scratch_.flow.x.row(parity, row)[count] = scratch_.flow.y.row(parity, row)[count] = 0;
+    const int count = flow.x.count(parity);
+    scratch.flow.x.row(parity, row)[count] = scratch.flow.y.row(parity, row)[count] = 0;
   }
 
   /// Squares of the differences from the neighbours to the right and below.
-  static HWY_INLINE Vector squares(const Neighbours& flow, int k) {
-    const auto value = load(flow.here + k);
-    return hn::Add(square(hn::Sub(flow.right(k), value)),
-                   square(hn::Sub(load(flow.below + k), value)));
+  static HWY_INLINE Vector squares(const Neighbours& row, int k) {
+    const auto value = load(row.here + k);
+    return square(row.right(k) - value) + square(load(row.below + k) - value);
   }
 
-  /// Every other pixel of the rows, from the first column on; all these planes share the offset of
-  /// a row.
+  /// Every other pixel of the rows, from the first column on. All these planes have the same offset
+  /// from row to row.
   struct Pixels {
     Pixels(Scratch& scratch, int parity)
         : x(scratch.flow.x.row(parity, 0)),
           y(scratch.flow.y.row(parity, 0)),
           weight(scratch.weight.row(parity, 0)),
-          to_left(beside(scratch.weight, parity, 0) - weight) {}
+          to_left(left_of(scratch.weight, parity, 0) - weight) {}
 
     float* x;
     float* y;
@@ -449,18 +425,18 @@ class Relaxation {
     std::ptrdiff_t to_left;  ///< from a pixel to the one on its left
   };
 
-  /// Relaxes a vector of pixels, row by row, upwards.
-  class Climb {
+  /// Relaxes a vector of pixels, row by row from the bottom up.
+  class UpwardSweep {
    public:
-    HWY_INLINE Climb(const Pixels& pixels, std::ptrdiff_t below, std::ptrdiff_t row)
+    HWY_INLINE UpwardSweep(const Pixels& pixels, std::ptrdiff_t below, std::ptrdiff_t row)
         : below_x_(load(pixels.x + below)),
           below_y_(load(pixels.y + below)),
           x_(load(pixels.x + row)),
           y_(load(pixels.y + row)),
           weight_(load(pixels.weight + row)) {}
 
-    HWY_INLINE void improve(const Pixels& pixels, std::ptrdiff_t row, std::ptrdiff_t above,
-                            const float* equation) {
+    HWY_INLINE void relax(const Pixels& pixels, std::ptrdiff_t row, std::ptrdiff_t above,
+                          const float* equation) {
       const auto coefficient = [&](int which) HWY_ATTR {
         return load(equation + which * EquationRows::block);
       };
@@ -470,23 +446,22 @@ class Relaxation {
       const auto left_row = row + pixels.to_left;
       const auto left = load(pixels.weight + left_row);
       // Adds the row below last, because it has just been computed.
-      const auto pull = [&](const float* beside, Vector above_flow, Vector constant,
-                            Vector below_flow) HWY_ATTR {
-        const auto along = hn::Add(hn::Mul(left, load(beside)), hn::Mul(weight_, load(beside + 1)));
-        const auto sum = hn::Add(hn::Add(along, constant), hn::Mul(up, above_flow));
-        return hn::Add(sum, hn::Mul(weight_, below_flow));
+      const auto smoothed = [&](const float* beside, Vector above_flow, Vector constant,
+                                Vector below_flow) HWY_ATTR {
+        const auto along = left * load(beside) + weight_ * load(beside + 1);
+        const auto sum = along + constant + up * above_flow;
+        return sum + weight_ * below_flow;
       };
       const auto cross = coefficient(VariationalRefinement::cross);
       const auto keep = set(1 - over_relaxation);
-      const auto pull_x = pull(
-          pixels.x + left_row, above_x,
-          hn::Sub(coefficient(VariationalRefinement::constant_x), hn::Mul(cross, y_)), below_x_);
-      const auto pull_y = pull(pixels.y + left_row, above_y,
-                               coefficient(VariationalRefinement::constant_y), below_y_);
-      below_x_ = hn::Add(hn::Mul(keep, x_),
-                         hn::Mul(pull_x, coefficient(VariationalRefinement::inverse_x)));
-      below_y_ = hn::Add(hn::Mul(keep, y_), hn::Mul(hn::Sub(pull_y, hn::Mul(cross, below_x_)),
-                                                    coefficient(VariationalRefinement::inverse_y)));
+      const auto sum_x =
+          smoothed(pixels.x + left_row, above_x,
+                   coefficient(VariationalRefinement::constant_x) - cross * y_, below_x_);
+      const auto sum_y = smoothed(pixels.y + left_row, above_y,
+                                  coefficient(VariationalRefinement::constant_y), below_y_);
+      below_x_ = keep * x_ + sum_x * coefficient(VariationalRefinement::inverse_x);
+      below_y_ =
+          keep * y_ + (sum_y - cross * below_x_) * coefficient(VariationalRefinement::inverse_y);
       store(below_x_, pixels.x + row);
       store(below_y_, pixels.y + row);
       x_ = above_x;
@@ -502,58 +477,48 @@ class Relaxation {
     Vector weight_;
   };
 
-  /// Does half sweep i of row y - i, for every i. A few columns are relaxed in all these rows at a
-  /// time, so that most of what a row needs has just been loaded for the row below it. Two vectors
-  /// at a time, because each row depends on the row below it.
+  /// Runs half sweep i of row y - i, for each i. A few columns pass through all these rows at a
+  /// time, because a row needs mostly what has just been loaded for the row below it. Two vectors
+  /// at a time, because their dependent operations then overlap.
   void relax(int y) {
-    const int begin = std::max(0, y - height_ + 1);
-    const int end = std::min({half_sweeps, y + 1, (y - first_ + reach) / 2 + 1});
+    const int begin = std::max(0, y - height + 1);
+    const int end = std::min({half_sweeps, y + 1, (y - first + reach) / 2 + 1});
     const int parity = y & 1;
-    const Pixels pixels(scratch_, parity);
+    const Pixels pixels(scratch, parity);
     std::ptrdiff_t rows[half_sweeps + 1];
     const float* equations[half_sweeps + 1];
     for (int i = begin; i <= end; ++i) {
-      rows[i] = scratch_.weight.offset(ring(y - i));
-      equations[i] = scratch_.equations.row(parity, ring(y - i));
+      rows[i] = scratch.weight.offset(ring(y - i));
+      equations[i] = scratch.equations.row(parity, ring(y - i));
     }
-    const auto below = scratch_.weight.offset(ring(y - begin + 1));
+    const auto below = scratch.weight.offset(ring(y - begin + 1));
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
-    const int count = flow_.x.count(parity);
+    const int count = flow.x.count(parity);
     for (int k = 0; k < count; k += 2 * lanes) {
       const auto at = EquationRows::offset_of(k);
       const auto next = EquationRows::offset_of(k + lanes);
-      Climb left(pixels, below + k, rows[begin] + k);
-      Climb right(pixels, below + k + lanes, rows[begin] + k + lanes);
+      UpwardSweep left(pixels, below + k, rows[begin] + k);
+      UpwardSweep right(pixels, below + k + lanes, rows[begin] + k + lanes);
       for (int i = begin; i < end; ++i) {
-        left.improve(pixels, rows[i] + k, rows[i + 1] + k, equations[i] + at);
-        right.improve(pixels, rows[i] + k + lanes, rows[i + 1] + k + lanes, equations[i] + next);
+        left.relax(pixels, rows[i] + k, rows[i + 1] + k, equations[i] + at);
+        right.relax(pixels, rows[i] + k + lanes, rows[i + 1] + k + lanes, equations[i] + next);
       }
     }
     for (int i = begin; i < end; ++i) clear_past_end(ring(y - i), parity);
   }
 
   void store_row(int y) {
-    out_.x.copy_row(y, scratch_.flow.x, ring(y));
-    out_.y.copy_row(y, scratch_.flow.y, ring(y));
-    out_.x.replicate_ends(y);
-    out_.y.replicate_ends(y);
+    out.x.copy_row(y, scratch.flow.x, ring(y));
+    out.y.copy_row(y, scratch.flow.y, ring(y));
+    out.x.replicate_ends(y);
+    out.y.replicate_ends(y);
   }
-
-  const Derivatives& derivatives_;
-  const Field& start_;
-  const Field& flow_;
-  int first_;
-  int last_;
-  Scratch& scratch_;
-  Field& out_;
-  int width_;
-  int height_;
 };
 
 /// Rows [first, last).
 void relax_rows(const Derivatives& derivatives, const Field& start, const Field& flow, int first,
                 int last, Scratch& scratch, Field& out) {
-  Relaxation(derivatives, start, flow, first, last, scratch, out).run();
+  Relaxation{derivatives, start, flow, first, last, scratch, out}.run();
 }
 
 /// Interleaves the components of a row.

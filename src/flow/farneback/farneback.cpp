@@ -11,19 +11,20 @@
 namespace eventcamera {
 namespace {
 
-constexpr int min_side = 32;  ///< of a pyramid level
+/// Minimum side of a pyramid level.
+constexpr int min_side = 32;
 
-/// Rows of the image at the edge of a band are blurred twice, for both bands, so bands must not be
-/// thin.
+/// Rows at the edge of a band are blurred twice, for both bands, so bands must not be thin.
 constexpr int rows_per_expansion = 32;
 
 int expansion_bands(int height) {
   return (height + rows_per_expansion - 1) / rows_per_expansion;
 }
 
-/// A tile of flow, as high as the image, passes through all iterations block by block, while the
-/// polynomials of the last blocks are in the cache. Each iteration needs more columns around the
-/// tile. So tiles are as wide as the number of threads allows. They end at multiples of 16 pixels.
+/// Tiles of a level, as high as the image. Each passes through all iterations block by block, while
+/// the polynomials of the last blocks are in the cache. Because each iteration needs more columns
+/// around the tile, tiles are as wide as the number of threads allows. They end at multiples of 16
+/// pixels.
 struct Tiles {
   Tiles(int level_width, int threads) : width(level_width) {
     constexpr int min_columns = 80;
@@ -69,7 +70,7 @@ void FarnebackFlow::start(int width, int height) {
 
 void FarnebackFlow::push(const ImageView<std::uint8_t>& image, ThreadPool& threads) {
   if (image.width != width_ || image.height != height_) start(image.width, image.height);
-  scratch_.resize(static_cast<std::size_t>(threads.threads()));
+  scratch_.resize(threads.threads());
   int bands = 0;
   for (auto& level : levels_) {
     std::swap(level.last, level.next);
@@ -108,7 +109,7 @@ void FarnebackFlow::expand(const ImageView<std::uint8_t>& image, Level& level, i
 
 ImageView<Flow> FarnebackFlow::flow(ThreadPool& threads) {
   assert(!levels_.empty());
-  scratch_.resize(static_cast<std::size_t>(threads.threads()));
+  scratch_.resize(threads.threads());
   const Level* coarser = nullptr;
   for (std::size_t i = levels_.size(); i-- > 0;) {
     Level& level = levels_[i];
@@ -121,8 +122,8 @@ ImageView<Flow> FarnebackFlow::flow(ThreadPool& threads) {
   return levels_.front().flow.view();
 }
 
-/// Computes columns [first, last) of a level's flow: of every other row, and between these the
-/// mean.
+/// Computes columns [first, last) of a level's flow: every other row by FlowUpdate, the rows
+/// between as their mean.
 void FarnebackFlow::find_columns(const Level* coarser, Level& level, int first, int last,
                                  Scratch& scratch) {
   constexpr int block_rows = FlowUpdate::window_rows;
@@ -138,7 +139,7 @@ void FarnebackFlow::find_columns(const Level* coarser, Level& level, int first, 
   const auto last_of = [&](int iteration) {
     return std::min(width, last + FlowUpdate::margin * (iteration_count - iteration));
   };
-  // Each iteration follows the previous one at a distance of one block.
+  // Each iteration runs one block behind the previous one.
   constexpr int kept_rows = 2 * block_rows;
   std::array<FlowRows, FarnebackFlow::iterations.back() + 1> rows;
   for (int i = 0; i < iteration_count; ++i)
@@ -165,7 +166,7 @@ void FarnebackFlow::find_columns(const Level* coarser, Level& level, int first, 
               level.flow.row(height - 1) + first);
 }
 
-/// Initializes columns [first, last) of row y from the flow of the coarser level, or with 0.
+/// Initializes columns [first, last) of row y from the coarser level, or with 0.
 void FarnebackFlow::start_row(const Level* coarser, const Level& level, int y, int first, int last,
                               Scratch& scratch, Flow* out) {
   if (coarser == nullptr) {

@@ -7,7 +7,6 @@
 #include "src/flow/dense_flow.hpp"
 #include "src/flow/farneback/flow_update.hpp"
 #include "src/flow/farneback/polynomial_expansion.hpp"
-#include "src/flow/farneback/pyramid.hpp"
 #include "src/flow/resampling.hpp"
 
 namespace eventcamera {
@@ -15,8 +14,8 @@ namespace eventcamera {
 /// Farneback's method (SCIA 2003), coarse to fine; the flow between equal images is 0.
 class FarnebackFlow final : public DenseFlow {
  public:
-  /// Iterations on each level, finest first. Most of the motion is found on the coarse ones, where
-  /// an iteration costs little.
+  /// Iterations on each level, finest first. Coarse levels find most of the motion, and iterations
+  /// are cheap there.
   static constexpr std::array iterations{2, 3, 4, 5};
 
   /// Number of pyramid levels of images of this size, each half as large as the one before.
@@ -39,7 +38,7 @@ class FarnebackFlow final : public DenseFlow {
     Resampling rows;
   };
 
-  /// Scratch memory of one thread.
+  /// Memory of one thread.
   struct Scratch {
     PyramidLevel::Scratch pyramid;
     std::array<std::vector<float>, 2 * PolynomialExpansion::reach + 1> rows;

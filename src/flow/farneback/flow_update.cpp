@@ -7,7 +7,6 @@
 
 #include "src/flow/scratch.hpp"
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/farneback/flow_update.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -29,7 +28,7 @@ constexpr int strip = FlowUpdate::strip;
 /// Coefficients of the normal equations: symmetric 2x2 matrix and right-hand side.
 constexpr int equations = FlowUpdate::equations;
 
-/// Polynomials of a row, interpolated between columns.
+/// Interpolates the polynomials of a row between columns.
 struct Columns {
   Lookup<Floats> first;
   Lookup<Floats> second;
@@ -40,7 +39,7 @@ struct Columns {
     const Floats floats;
     const auto low = hn::Load(floats, low_lanes);
     const auto high = hn::Load(floats, high_lanes);
-    return hn::Add(hn::Mul(left, first(low, high)), hn::Mul(right, second(low, high)));
+    return left * first(low, high) + right * second(low, high);
   }
 };
 
@@ -53,15 +52,14 @@ HWY_INLINE void add_weighted(const PolynomialExpansion& to, int column, int row,
     const float* low = to.at(column, row + i);
     const float* high = to.at(column + lanes, row + i);
     for (int k = 0; k < coefficients; ++k)
-      sums[k] =
-          hn::Add(sums[k], hn::Mul(weights[i], columns.of(low + k * group, high + k * group)));
+      sums[k] = sums[k] + weights[i] * columns.of(low + k * group, high + k * group);
   }
 }
 
 /// Positions in the later image to which the flow moves a vector of pixels.
 struct Targets {
-  hn::Mask<Words> inside;  ///< the image
-  WordVector column;       ///< of the pixel left of and above the target
+  hn::Mask<Words> inside;  ///< true within the image
+  WordVector column;       ///< of the pixel to the upper left of the target
   WordVector row;
   Vector right;  ///< sub-pixel offset from that pixel
   Vector down;
@@ -69,33 +67,33 @@ struct Targets {
   HWY_INLINE Targets(const PolynomialExpansion& to, Vector dx, Vector dy, int x, int y) {
     const Floats floats;
     const auto zero = hn::Zero(floats);
-    const auto to_x = hn::Add(iota(floats, static_cast<float>(x)), dx);
-    const auto to_y = hn::Add(hn::Set(floats, static_cast<float>(y)), dy);
+    const auto to_x = iota(floats, static_cast<float>(x)) + dx;
+    const auto to_y = hn::Set(floats, static_cast<float>(y)) + dy;
     const auto right_end = hn::Set(floats, static_cast<float>(to.width() - 1));
     const auto lower_end = hn::Set(floats, static_cast<float>(to.height() - 1));
-    const auto is_inside = hn::And(hn::And(hn::Ge(to_x, zero), hn::Le(to_x, right_end)),
-                                   hn::And(hn::Ge(to_y, zero), hn::Le(to_y, lower_end)));
+    const auto is_inside =
+        hn::And(hn::And(to_x >= zero, to_x <= right_end), hn::And(to_y >= zero, to_y <= lower_end));
     const auto in_x = hn::IfThenElseZero(is_inside, to_x);
     const auto in_y = hn::IfThenElseZero(is_inside, to_y);
     inside = hn::RebindMask(Words(), is_inside);
     column = hn::ConvertTo(Words(), in_x);
     row = hn::ConvertTo(Words(), in_y);
-    right = hn::Sub(in_x, hn::ConvertTo(floats, column));
-    down = hn::Sub(in_y, hn::ConvertTo(floats, row));
+    right = in_x - hn::ConvertTo(floats, column);
+    down = in_y - hn::ConvertTo(floats, row);
   }
 };
 
 /// Interpolates the later polynomials bilinearly; outside the image they are 0.
 ///
-/// Neighbours mostly have similar flow: they end between columns of the same two vectors, in the
-/// same row or an adjacent one. All such lanes read the same three rows; the row that a lane does
-/// not need has weight 0. The remaining lanes are processed next, grouped in the same way.
+/// Neighbours mostly have similar flow: their targets lie between columns of the same two vectors,
+/// in the same row or an adjacent one. All such lanes read the same three rows; the row that a lane
+/// does not need has weight 0. The remaining lanes are then grouped in the same way.
 HWY_INLINE void interpolate(const PolynomialExpansion& to, const Targets& targets, Vector* sums) {
   const Words words;
   const Floats floats;
   constexpr int lanes = static_cast<int>(hn::MaxLanes(words));
-  const auto left = hn::Sub(hn::Set(floats, 1.0F), targets.right);
-  const auto up = hn::Sub(hn::Set(floats, 1.0F), targets.down);
+  const auto left = hn::Set(floats, 1.0F) - targets.right;
+  const auto up = hn::Set(floats, 1.0F) - targets.down;
   HWY_ALIGN std::int32_t columns[lanes];
   HWY_ALIGN std::int32_t rows[lanes];
   hn::Store(targets.column, words, columns);
@@ -106,14 +104,14 @@ HWY_INLINE void interpolate(const PolynomialExpansion& to, const Targets& target
     const auto lane = hn::FindFirstTrue(words, remaining);
     if (lane < 0) return;
     const int column = columns[lane] & -lanes;
-    const auto before = hn::Eq(targets.row, hn::Set(words, rows[lane] - 1));
+    const auto before = targets.row == hn::Set(words, rows[lane] - 1);
     const int row = rows[lane] - (hn::AllFalse(words, hn::And(before, remaining)) ? 0 : 1);
-    const auto index = hn::Sub(targets.column, hn::Set(words, column));
+    const auto index = targets.column - hn::Set(words, column);
     const auto in_columns =
-        hn::And(hn::Gt(index, hn::Set(words, -1)), hn::Lt(index, hn::Set(words, 2 * lanes - 1)));
+        hn::And(index > hn::Set(words, -1), index < hn::Set(words, 2 * lanes - 1));
     const auto in_reach = hn::And(in_columns, remaining);
-    const auto in_upper = hn::And(hn::Eq(targets.row, hn::Set(words, row)), in_reach);
-    const auto in_lower = hn::And(hn::Eq(targets.row, hn::Set(words, row + 1)), in_reach);
+    const auto in_upper = hn::And(targets.row == hn::Set(words, row), in_reach);
+    const auto in_lower = hn::And(targets.row == hn::Set(words, row + 1), in_reach);
     remaining = hn::AndNot(hn::Or(in_upper, in_lower), remaining);
     const auto upper = hn::RebindMask(floats, in_upper);
     const auto lower = hn::RebindMask(floats, in_lower);
@@ -123,7 +121,7 @@ HWY_INLINE void interpolate(const PolynomialExpansion& to, const Targets& target
         hn::IfThenElseZero(lower, targets.down),
     };
     const Lookup<Floats> first(index);
-    const Lookup<Floats> second(hn::Add(index, hn::Set(words, 1)));
+    const Lookup<Floats> second(index + hn::Set(words, 1));
     const Columns between{first, second, left, targets.right};
     const float* next = to.at(std::min(column + strip, to.width()), row + 1);
     for (int k = 0; k < coefficients; ++k) hwy::Prefetch(next + k * group);
@@ -136,7 +134,7 @@ HWY_INLINE void interpolate(const PolynomialExpansion& to, const Targets& target
 
 using RowSums = FlowUpdate::RowSums;
 
-/// Replaces the equations of each row of a block by the sum over this row and all later ones.
+/// Replaces the equations of each row of a block by their sum over this row and all later ones.
 void complete_block(RowSums& sums) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
@@ -145,7 +143,7 @@ void complete_block(RowSums& sums) {
       auto sum = hn::Load(floats, sums.rows[window_rows - 1][equation] + x);
       for (int row = window_rows - 2; row >= 0; --row) {
         float* at = sums.rows[row][equation] + x;
-        sum = hn::Add(sum, hn::Load(floats, at));
+        sum = sum + hn::Load(floats, at);
         hn::Store(sum, floats, at);
       }
     }
@@ -156,14 +154,14 @@ void complete_block(RowSums& sums) {
 template <int width>
 using EquationRows = float[equations][width + 2 * row_padding];
 
-/// Sums over the rows of a window: a strip's, preceded by the last sums of the strip to the left.
+/// Sums over the rows of a window for a strip, after the last sums of the strip to the left.
 struct Window {
   static constexpr int before = row_padding;
   HWY_ALIGN EquationRows<before + strip> sums = {};
 };
 
-/// Adds the equations of columns [left, right) of image row y, as row `row` of the current block,
-/// and computes the sums over the last rows, as many as a window has.
+/// Adds the equations of columns [left, right) of image row y, which is row `row` of the current
+/// block, and computes the sums over the rows of the window that ends there.
 void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, const Flow* flow,
              int y, int left, int right, float row_weight, const float* column_weights, int row,
              RowSums& sums, Window& window) {
@@ -182,36 +180,34 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
     const float* next = from.at(std::min(x + strip, from.width()), y);
     for (int k = 0; k < coefficients; ++k) hwy::Prefetch(next + k * group);
     const auto here = [&](int k) { return hn::Load(floats, polynomials + k * group); };
-    const auto weight = hn::Mul(hn::Set(floats, row_weight), hn::LoadU(floats, column_weights + x));
-    // Outside the image, the earlier polynomial alone gives a.
+    const auto weight = hn::Set(floats, row_weight) * hn::LoadU(floats, column_weights + x);
+    // Outside the image, a comes from the earlier polynomial alone.
     const auto a_weight = hn::IfThenElse(hn::RebindMask(floats, targets.inside), half, one);
-    auto a_yy = hn::Mul(hn::Add(here(2), there[2]), a_weight);
-    auto a_xx = hn::Mul(hn::Add(here(3), there[3]), a_weight);
-    auto a_xy = hn::Mul(hn::Add(here(4), there[4]), hn::Mul(a_weight, half));
-    auto b_y = hn::Add(hn::Mul(hn::Sub(here(0), there[0]), half),
-                       hn::Add(hn::Mul(a_yy, dy), hn::Mul(a_xy, dx)));
-    auto b_x = hn::Add(hn::Mul(hn::Sub(here(1), there[1]), half),
-                       hn::Add(hn::Mul(a_xy, dy), hn::Mul(a_xx, dx)));
-    a_yy = hn::Mul(a_yy, weight);
-    a_xx = hn::Mul(a_xx, weight);
-    a_xy = hn::Mul(a_xy, weight);
-    b_y = hn::Mul(b_y, weight);
-    b_x = hn::Mul(b_x, weight);
-    const auto xy_squared = hn::Mul(a_xy, a_xy);
+    auto a_yy = (here(2) + there[2]) * a_weight;
+    auto a_xx = (here(3) + there[3]) * a_weight;
+    auto a_xy = (here(4) + there[4]) * (a_weight * half);
+    auto b_y = (here(0) - there[0]) * half + (a_yy * dy + a_xy * dx);
+    auto b_x = (here(1) - there[1]) * half + (a_xy * dy + a_xx * dx);
+    a_yy = a_yy * weight;
+    a_xx = a_xx * weight;
+    a_xy = a_xy * weight;
+    b_y = b_y * weight;
+    b_x = b_x * weight;
+    const auto xy_squared = a_xy * a_xy;
     const int at = x - left;
     const auto put = [&](int equation, Vector value) {
       float* start = sums.start[equation] + at;
-      const auto sum = hn::Add(hn::Load(floats, start), value);
+      const auto sum = hn::Load(floats, start) + value;
       const auto end = hn::Load(floats, sums.rows[row + 1][equation] + at);
       hn::Store(sum, floats, start);
       hn::Store(value, floats, sums.rows[row][equation] + at);
-      hn::Store(hn::Add(end, sum), floats, window.sums[equation] + Window::before + at);
+      hn::Store(end + sum, floats, window.sums[equation] + Window::before + at);
     };
-    put(0, hn::Add(hn::Mul(a_yy, a_yy), xy_squared));
-    put(1, hn::Mul(hn::Add(a_yy, a_xx), a_xy));
-    put(2, hn::Add(hn::Mul(a_xx, a_xx), xy_squared));
-    put(3, hn::Add(hn::Mul(a_yy, b_y), hn::Mul(a_xy, b_x)));
-    put(4, hn::Add(hn::Mul(a_xy, b_y), hn::Mul(a_xx, b_x)));
+    put(0, a_yy * a_yy + xy_squared);
+    put(1, (a_yy + a_xx) * a_xy);
+    put(2, a_xx * a_xx + xy_squared);
+    put(3, a_yy * b_y + a_xy * b_x);
+    put(4, a_xy * b_y + a_xx * b_x);
   }
 }
 
@@ -220,8 +216,7 @@ void add_threes(const float* row, int width, float* out) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
   const auto at = [&](int x) { return hn::LoadU(floats, row + x); };
-  for (int x = 0; x < width; x += lanes)
-    hn::Store(hn::Add(hn::Add(at(x), at(x + 1)), at(x + 2)), floats, out + x);
+  for (int x = 0; x < width; x += lanes) hn::Store(at(x) + at(x + 1) + at(x + 2), floats, out + x);
 }
 
 /// Adds up every third of fifteen pixels: out[x] = row[x] + row[x + 3] + ... + row[x + 12]
@@ -230,9 +225,9 @@ void add_fives(const float* row, int width, float* out) {
   const int lanes = static_cast<int>(hn::Lanes(floats));
   const auto at = [&](int x) { return hn::LoadU(floats, row + x); };
   for (int x = 0; x < width; x += lanes) {
-    const auto first = hn::Add(at(x), at(x + 3));
-    const auto last = hn::Add(at(x + 9), at(x + 12));
-    hn::Store(hn::Add(hn::Add(first, at(x + 6)), last), floats, out + x);
+    const auto first = at(x) + at(x + 3);
+    const auto last = at(x + 9) + at(x + 12);
+    hn::Store(first + at(x + 6) + last, floats, out + x);
   }
 }
 
@@ -251,7 +246,7 @@ void solve(const EquationRows<strip>& sums, int width, Flow* flow) {
       return hn::PromoteTo(doubles, hn::Load(floats, sums[equation] + x));
     };
     const auto difference = [](Doubles a, Doubles b, Doubles c, Doubles d) {
-      return hn::Sub(hn::Mul(a, b), hn::Mul(c, d));
+      return a * b - c * d;
     };
     const auto g_yy = sum(0);
     const auto g_xy = sum(1);
@@ -259,11 +254,10 @@ void solve(const EquationRows<strip>& sums, int width, Flow* flow) {
     const auto h_y = sum(3);
     const auto h_x = sum(4);
     const auto rounded = [&](Doubles value) { return hn::DemoteTo(floats, value); };
-    const auto determinant = rounded(hn::Add(difference(g_yy, g_xx, g_xy, g_xy), regular));
-    const auto inverse = hn::Div(hn::Set(floats, 1.0F), determinant);
-    hn::StoreInterleaved2(hn::Mul(rounded(difference(g_yy, h_x, g_xy, h_y)), inverse),
-                          hn::Mul(rounded(difference(g_xx, h_y, g_xy, h_x)), inverse), floats,
-                          &flow[x].x);
+    const auto determinant = rounded(difference(g_yy, g_xx, g_xy, g_xy) + regular);
+    const auto inverse = hn::Set(floats, 1.0F) / determinant;
+    hn::StoreInterleaved2(rounded(difference(g_yy, h_x, g_xy, h_y)) * inverse,
+                          rounded(difference(g_xx, h_y, g_xy, h_x)) * inverse, floats, &flow[x].x);
   }
 }
 

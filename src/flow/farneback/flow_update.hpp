@@ -9,11 +9,10 @@
 
 namespace eventcamera {
 
-/// The last rows of flow that were found, in a ring of `count`. Each is padded by row_padding
-/// pixels.
+/// Ring of the last `count` rows of flow. Each row is padded by row_padding pixels.
 struct FlowRows {
   Flow* data;
-  std::ptrdiff_t stride;  ///< pixels from one found row to the next
+  std::ptrdiff_t stride;  ///< pixels from one row to the next
   int count;
 
   Flow* row(int y) const { return data + y % count * stride; }
@@ -21,11 +20,10 @@ struct FlowRows {
 
 /// One iteration of Farneback's method, which refines a flow.
 ///
-/// The polynomials at both ends of a pixel's flow differ by a shift, the solution of two linear
+/// The polynomials at both ends of a pixel's flow differ by a shift, which solves two linear
 /// equations. These are summed over a window (least squares) and solved for the flow of its centre.
-/// The polynomials vary slowly from row to row, so every other row is enough: only these have
-/// equations, and flow is found for them. The result does not depend on how columns are divided
-/// between calls.
+/// Polynomials vary slowly from row to row, so only every other row has equations, and gets flow
+/// ("found rows"). The result does not depend on how columns are divided between calls.
 class FlowUpdate {
  public:
   static constexpr int row_step = 2;   ///< image rows from one found row to the next
@@ -41,14 +39,14 @@ class FlowUpdate {
   /// of faint textures.
   static constexpr double regularization = 1e-4;
 
-  /// Columns of flow needed on each side of the filled columns: `reach`, aligned. Columns before
-  /// them, up to a multiple of 16, are read too, but have no effect.
+  /// Columns of flow needed on each side of the filled columns: `reach`, aligned. Further columns
+  /// to the left, up to a multiple of 16, are read but have no effect.
   static constexpr int margin = 8;
 
   /// Sums of the equations of a strip over the rows of a window.
   ///
-  /// Found rows are counted in blocks, from the first row of the first window. The sum over a
-  /// window is the sum over the end of a block plus the sum over the start of the next.
+  /// Found rows are divided into blocks, starting at the first row of the first window. The sum
+  /// over a window is the sum over the end of a block plus the sum over the start of the next.
   struct RowSums {
     /// Equations of the rows of a block; once it is complete, sums over each row and all later
     /// ones. The last row is 0.
@@ -63,10 +61,9 @@ class FlowUpdate {
   FlowUpdate() = default;
   FlowUpdate(int width, int height);
 
-  /// Number of rows of an image for which flow is found.
+  /// Number of found rows of an image.
   static constexpr int rows(int height) { return (height + row_step - 1) / row_step; }
 
-  /// Number of blocks of an image.
   static constexpr int blocks(int height) {
     return (rows(height) + 2 * row_reach + window_rows - 1) / window_rows;
   }

@@ -10,7 +10,7 @@
 namespace eventcamera {
 namespace {
 
-/// Bit i is bit 2i or bit 2i + 1 of a word.
+/// ORs pairs of bits: bit i of the result is bit 2i | bit 2i + 1.
 std::uint64_t join_pairs(std::uint64_t bits) {
   bits = (bits | bits >> 1) & 0x5555555555555555U;
   bits = (bits | bits >> 1) & 0x3333333333333333U;
@@ -24,19 +24,19 @@ std::uint64_t join_pairs(std::uint64_t bits) {
 
 void PointTracker::Blocks::clear() {
   for (int y = 0; y < region_side; ++y) {
-    if (rows_[static_cast<std::size_t>(y)] == 0) continue;
-    rows_[static_cast<std::size_t>(y)] = 0;
+    if (rows_[y] == 0) continue;
+    rows_[y] = 0;
     std::fill_n(&track(0, y), region_side, Track{});
   }
 }
 
-Track PointTracker::Blocks::between(int x, int y) const {
+Track PointTracker::Blocks::interpolated(int x, int y) const {
   const int column = x / 2;
   const int row = y / 2;
   const auto& own = track(column, row);
   Flow flow = own.flow;
-  const auto approach = [&](int beside, int below) {
-    // Without branches: a block past the border is the own one.
+  const auto add_share_of = [&](int beside, int below) {
+    // Without branches: past the border, this is the block itself.
     const auto& other =
         track(std::clamp(beside, 0, region_side - 1), std::clamp(below, 0, region_side - 1));
     const auto part = [&](float from, float to) {
@@ -45,8 +45,8 @@ Track PointTracker::Blocks::between(int x, int y) const {
     };
     flow = {flow.x + part(own.flow.x, other.flow.x), flow.y + part(own.flow.y, other.flow.y)};
   };
-  approach(x % 2 == 0 ? column - 1 : column + 1, row);
-  approach(column, y % 2 == 0 ? row - 1 : row + 1);
+  add_share_of(x % 2 == 0 ? column - 1 : column + 1, row);
+  add_share_of(column, y % 2 == 0 ? row - 1 : row + 1);
   return {flow, own.found};
 }
 
@@ -85,8 +85,7 @@ std::span<const Track> PointTracker::track(std::span<const Point> points, Thread
   const int across = (image.width() + side - 1) / side;
   const int down = (image.height() + side - 1) / side;
   threads.for_each(across * down, [&](int i, int thread) {
-    follow(points, i % across * side, i / across * side,
-           regions_[static_cast<std::size_t>(thread)]);
+    track_region(points, i % across * side, i / across * side, regions_[thread]);
   });
   return tracks_;
 }
@@ -98,22 +97,22 @@ void PointTracker::find_rows(std::span<const Point> points, int height) {
   rows_.resize(static_cast<std::size_t>(height) + 1, points.size());
 }
 
-void PointTracker::follow(std::span<const Point> points, int left, int top, Region& region) {
+void PointTracker::track_region(std::span<const Point> points, int left, int top, Region& region) {
   auto& finest = region.levels[0];
   finest.clear();
   const int side = block_side_ * region_side;
   std::array<std::span<const Point>, std::size_t{max_block_side} * region_side> rows;
   const int bottom = std::min(top + side, static_cast<int>(rows_.size()) - 1);
-  if (rows_[static_cast<std::size_t>(top)] == rows_[static_cast<std::size_t>(bottom)]) return;
+  if (rows_[top] == rows_[bottom]) return;
   bool any = false;
   for (int y = top; y < bottom; ++y) {
-    const auto first = rows_[static_cast<std::size_t>(y)];
+    const auto first = rows_[y];
     const auto row = points.subspan(first, rows_[static_cast<std::size_t>(y) + 1] - first);
     if (row.empty()) continue;
     const auto at = [](const Point& p, int x) { return p.x < x; };
     const auto begin = std::lower_bound(row.begin(), row.end(), left, at);
     const auto end = std::lower_bound(begin, row.end(), left + side, at);
-    rows[static_cast<std::size_t>(y - top)] = {begin, end};
+    rows[y - top] = {begin, end};
     any |= begin != end;
     for (auto it = begin; it != end; ++it)
       finest.add((it->x - left) / block_side_, (y - top) / block_side_);
@@ -126,10 +125,10 @@ void PointTracker::follow(std::span<const Point> points, int left, int top, Regi
   }
   for (std::size_t level = level_count; level-- > 0;) search(level, left, top, region);
   for (int y = top; y < bottom; ++y) {
-    for (const auto& point : rows[static_cast<std::size_t>(y - top)])
+    for (const auto& point : rows[y - top])
       tracks_[static_cast<std::size_t>(&point - points.data())] =
           block_side_ == 1 ? finest.track(point.x - left, y - top)
-                           : finest.between(point.x - left, y - top);
+                           : finest.interpolated(point.x - left, y - top);
   }
 }
 

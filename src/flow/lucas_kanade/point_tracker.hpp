@@ -16,7 +16,6 @@ struct Point {
   int y;
 };
 
-/// Result of tracking a point.
 struct Track {
   Flow flow{};         ///< meaningless if not found
   bool found = false;  ///< false: the point was lost
@@ -25,14 +24,14 @@ struct Track {
 /// Pyramidal Lucas-Kanade from the last image to the next, on 4 levels. 8-bit images, all of the
 /// same size.
 ///
-/// Blocks of 2x2 pixels, or single pixels, are tracked, with a window of 16x16 pixels. The search
-/// for a block starts at twice the flow of the block of the coarser level that contains it; a block
-/// that is lost there passes on the flow that its search started from.
+/// Tracks blocks of 2x2 pixels, or single pixels, with a window of 16x16 pixels. The search for a
+/// block starts at twice the flow of the block of the coarser level that contains it; a lost block
+/// keeps the flow that its search started from.
 ///
-/// A point has the flow of its block. If that is 2x2 pixels, it adds a quarter of the difference to
-/// the flow of the block on the left or right, and of the one above or below, whichever is nearer
-/// to the point. These differences are clipped to half a pixel, and 0 if that block is not tracked,
-/// was lost, or is in another one of the regions of 128x128 pixels into which images are divided.
+/// A point takes the flow of its block. With blocks of 2x2 pixels, it adds a quarter of the
+/// difference to the nearer horizontal neighbour of the block, and to the nearer vertical one.
+/// These differences are clipped to half a pixel, and are 0 if the neighbour is not tracked, was
+/// lost, or is in another of the regions of 128x128 pixels into which images are divided.
 class PointTracker {
  public:
   /// `block_side` is 1 or 2. Blocks of 2x2 pixels take a quarter of the time.
@@ -58,21 +57,20 @@ class PointTracker {
    public:
     Blocks() : tracks_(std::size_t{region_side} * region_side) {}
 
-    /// Removes all blocks.
     void clear();
-    void add(int x, int y) { rows_[static_cast<std::size_t>(y)] |= std::uint64_t{1} << x; }
+    void add(int x, int y) { rows_[y] |= std::uint64_t{1} << x; }
     /// Adds the blocks that contain blocks of the next finer level.
     void add_coarser(const Blocks& finer);
     /// Blocks of a row: bit x.
-    std::uint64_t row(int y) const { return rows_[static_cast<std::size_t>(y)]; }
+    std::uint64_t row(int y) const { return rows_[y]; }
     /// First and last row with blocks; there must be one.
     int first_row() const;
     int last_row() const;
     /// Columns with blocks, of any row: bit x.
     std::uint64_t columns() const;
 
-    /// Track of a pixel of the region, interpolated between blocks, which are 2x2 pixels.
-    Track between(int x, int y) const;
+    /// Track of a pixel, interpolated between blocks of 2x2 pixels.
+    Track interpolated(int x, int y) const;
 
     Track& track(int x, int y) { return tracks_[index(x, y)]; }
     const Track& track(int x, int y) const { return tracks_[index(x, y)]; }
@@ -97,12 +95,12 @@ class PointTracker {
   };
 
   void find_rows(std::span<const Point> points, int height);
-  void follow(std::span<const Point> points, int left, int top, Region& region);
+  void track_region(std::span<const Point> points, int left, int top, Region& region);
   void search(std::size_t level, int left, int top, Region& region) const;
   /// Searches for the blocks of a tile whose first one is (x, y) of its region.
   void search_tile_at(std::size_t level, int left, int top, int x, int y, Region& region) const;
 
-  /// Blocks from one of a tile to the next.
+  /// Distance between the blocks of a tile, in blocks.
   int blocks_apart() const { return Tile::width / Tile::side / block_side_; }
 
   int block_side_;  ///< pixels

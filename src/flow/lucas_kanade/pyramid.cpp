@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/pyramid.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
@@ -35,11 +34,10 @@ void halve_row(const Image<std::uint8_t>& image, int y, std::uint8_t* out, int w
   const int columns = before + 2 * width + 2;
   for (int i = 0; i < columns; i += lanes) {
     const int x = i - before;
-    const auto outer = hn::Add(load(2 * y - 2, x), load(2 * y + 2, x));
-    const auto inner = hn::Add(load(2 * y - 1, x), load(2 * y + 1, x));
+    const auto outer = load(2 * y - 2, x) + load(2 * y + 2, x);
+    const auto inner = load(2 * y - 1, x) + load(2 * y + 1, x);
     const auto middle = load(2 * y, x);
-    const auto sum =
-        hn::Add(hn::Add(outer, hn::ShiftLeft<2>(hn::Add(inner, middle))), hn::ShiftLeft<1>(middle));
+    const auto sum = outer + hn::ShiftLeft<2>(inner + middle) + hn::ShiftLeft<1>(middle);
     hn::StoreU(sum, words, blurred + i);
   }
   for (int x = 0; x < width; x += lanes) {
@@ -53,9 +51,9 @@ void halve_row(const Image<std::uint8_t>& image, int y, std::uint8_t* out, int w
     hn::LoadInterleaved2(words, at, left2, left1);
     hn::LoadInterleaved2(words, at + 2, middle, right1);
     hn::LoadInterleaved2(words, at + 4, right2, unused);
-    const auto inner = hn::ShiftLeft<2>(hn::Add(hn::Add(left1, right1), middle));
-    const auto sum = hn::Add(hn::Add(hn::Add(left2, right2), inner), hn::ShiftLeft<1>(middle));
-    const auto rounded = hn::ShiftRight<8>(hn::Add(sum, hn::Set(words, 128)));
+    const auto inner = hn::ShiftLeft<2>(left1 + right1 + middle);
+    const auto sum = left2 + right2 + inner + hn::ShiftLeft<1>(middle);
+    const auto rounded = hn::ShiftRight<8>(sum + hn::Set(words, 128));
     hn::StoreU(hn::DemoteTo(bytes, hn::BitCast(hn::RebindToSigned<Words>(), rounded)), bytes,
                out + x);
   }
@@ -77,17 +75,15 @@ void gradient_row(const Image<std::uint8_t>& image, int y, int left, int right, 
     const auto load = [&](int row, int column) {
       return hn::PromoteTo(values, hn::LoadU(Bytes(), image.row(row) + column));
     };
-    const auto weigh = [&](auto outer, auto middle) {
-      return hn::Add(hn::Mul(outer, three), hn::Mul(middle, ten));
-    };
-    const auto difference = [&](int row) { return hn::Sub(load(row, x + 1), load(row, x - 1)); };
+    const auto weigh = [&](auto outer, auto middle) { return outer * three + middle * ten; };
+    const auto difference = [&](int row) { return load(row, x + 1) - load(row, x - 1); };
     const auto smooth = [&](int row) {
-      return weigh(hn::Add(load(row, x - 1), load(row, x + 1)), load(row, x));
+      return weigh(load(row, x - 1) + load(row, x + 1), load(row, x));
     };
     const auto column = iota(values, static_cast<std::int16_t>(x));
-    const auto within = hn::And(hn::Lt(hn::Set(values, -1), column), hn::Lt(column, width));
-    const auto dx = weigh(hn::Add(difference(y - 1), difference(y + 1)), difference(y));
-    const auto dy = hn::Sub(smooth(y + 1), smooth(y - 1));
+    const auto within = hn::And(hn::Set(values, -1) < column, column < width);
+    const auto dx = weigh(difference(y - 1) + difference(y + 1), difference(y));
+    const auto dy = smooth(y + 1) - smooth(y - 1);
     hn::StoreU(hn::IfThenElseZero(within, dx), values, out_x + x - left);
     hn::StoreU(hn::IfThenElseZero(within, dy), values, out_y + x - left);
   }
@@ -161,7 +157,7 @@ void Pyramid::build_level(std::size_t level, ThreadPool& threads, const MakeRow&
   auto& image = levels_[level];
   auto& is_black = is_black_[level];
   for_each_row(threads, image.height(), [&](int y) {
-    auto& was_black = is_black[static_cast<std::size_t>(y)];
+    auto& was_black = is_black[y];
     const bool black = make_row(y);
     if (black && was_black != 0) return;
     was_black = black ? 1 : 0;
@@ -175,7 +171,7 @@ void Pyramid::build(const ImageView<std::uint8_t>& image, ThreadPool& threads,
                     std::span<const std::uint8_t> is_black) {
   shape(image.width, image.height);
   build_level(0, threads, [&](int y) {
-    if (!is_black.empty() && is_black[static_cast<std::size_t>(y)] != 0) return true;
+    if (!is_black.empty() && is_black[y] != 0) return true;
     levels_[0].assign_row(y, image.row(y));
     return false;
   });
@@ -184,8 +180,7 @@ void Pyramid::build(const ImageView<std::uint8_t>& image, ThreadPool& threads,
     const auto& above = is_black_[level - 1];
     build_level(level, threads, [&](int y) {
       bool black = true;
-      for (int i = 2 * y - 2; i <= 2 * y + 2; ++i)
-        black &= above[static_cast<std::size_t>(reflected(i, from.height()))] != 0;
+      for (int i = 2 * y - 2; i <= 2 * y + 2; ++i) black &= above[reflected(i, from.height())] != 0;
       if (!black)
         HWY_DYNAMIC_DISPATCH(halve_row)(from, y, levels_[level].row(y), levels_[level].width());
       return black;

@@ -11,17 +11,17 @@
 namespace eventcamera {
 
 /// Gaussian pyramid of an image, reflected at its border: each level is the previous one blurred
-/// with (1 4 6 4 1) / 16 each way and subsampled by 2, while both sides are longer than `min_side`;
-/// at most `max_levels` levels.
+/// with (1 4 6 4 1) / 16 each way and subsampled by 2. It ends before a side of min_side or less,
+/// or at max_levels.
 class Pyramid {
  public:
   static constexpr int margin = 16;  ///< pixels that windows may extend past the border
   static constexpr int max_levels = 4;
   static constexpr int min_side = 15;
 
-  /// Computes the levels of an image of any size; reuses the memory of the last one if the size is
-  /// the same. `is_black`, if not empty, is 1 for each row that is known to be 0; rows that stay
-  /// black on a level are skipped.
+  /// Computes the levels of an image of any size; images of the same size reuse the memory.
+  /// `is_black`, if not empty, is 1 for each row that is known to be 0; rows that stay black on a
+  /// level are skipped.
   void build(const ImageView<std::uint8_t>& image, ThreadPool& threads,
              std::span<const std::uint8_t> is_black = {});
 
@@ -47,7 +47,6 @@ class ScharrGradients {
   /// border. The image must be reflected at its border.
   void compute(const Image<std::uint8_t>& image, const Box& box);
 
-  /// Row y of the image.
   const std::int16_t* x(int y) const { return x_.row(y - box_.top) - box_.left; }
   const std::int16_t* y(int y) const { return y_.row(y - box_.top) - box_.left; }
   /// Elements from one row to the next.

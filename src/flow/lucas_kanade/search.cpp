@@ -4,19 +4,155 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <optional>
 
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/search.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
-#include "src/flow/lucas_kanade/window_sums-inl.hpp"
 #include "src/flow/product_sum-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
+
+/// Pairs of columns, or of rows, of a window.
+constexpr int window_pairs = Tile::window / 2;
+/// Pairs of columns of a tile's windows, rounded up to whole vectors.
+constexpr int column_pairs = 2 * Tile::side;
+
+/// Pairs of columns, one per lane.
+using Pairs = hn::CappedTag<std::int32_t, Tile::side>;
+using Pair = hn::Vec<Pairs>;
+constexpr int pairs_at_once = hn::MaxLanes(Pairs());
+
+#if HWY_TARGET == HWY_SCALAR
+template <class A, class B>
+HWY_INLINE Pair pair_products(const A* a, const B* b) {
+  return hn::Set(Pairs(), a[0] * b[0] + a[1] * b[1]);
+}
+#else
+using PairValues = hn::Repartition<std::int16_t, Pairs>;
+
+HWY_INLINE hn::Vec<PairValues> load_pairs(const std::int16_t* at) {
+  return hn::LoadU(PairValues(), at);
+}
+HWY_INLINE hn::Vec<PairValues> load_pairs(const std::uint8_t* at) {
+  return hn::PromoteTo(PairValues(), hn::LoadU(hn::Rebind<std::uint8_t, PairValues>(), at));
+}
+
+/// Products of two rows, from these columns on, added up in pairs.
+template <class A, class B>
+HWY_INLINE Pair pair_products(const A* a, const B* b) {
+  auto odd = hn::Zero(Pairs());
+  const auto even =
+      hn::ReorderWidenMulAccumulate(Pairs(), load_pairs(a), load_pairs(b), hn::Zero(Pairs()), odd);
+  return hn::RearrangeToOddPlusEven(even, odd);
+}
+#endif
+
+/// All pairs of a row.
+class PairRow {
+ public:
+  static constexpr std::size_t size = column_pairs / pairs_at_once;
+
+  /// All 0. Not left to std::array, whose constructor GCC 12 compiles without the target's
+  /// instructions.
+  PairRow() {
+    for (auto& vector : vectors_) vector = hn::Zero(Pairs());
+  }
+  Pair& operator[](std::size_t i) { return vectors_[i]; }
+  const Pair& operator[](std::size_t i) const { return vectors_[i]; }
+
+ private:
+  Pair vectors_[size];
+};
+
+/// A vector that begins n lanes into `left` and ends in `right`.
+template <int n>
+HWY_INLINE Pair lanes_from(Pair left, Pair right) {
+#if HWY_MAX_BYTES >= 32
+  const auto middle = hn::ConcatLowerUpper(Pairs(), right, left);
+  if constexpr (n < 4)
+    return hn::CombineShiftRightLanes<n>(Pairs(), middle, left);
+  else if constexpr (n == 4)
+    return middle;
+  else
+    return hn::CombineShiftRightLanes<n - 4>(Pairs(), right, middle);
+#elif HWY_MAX_BYTES == 16
+  return hn::CombineShiftRightLanes<n>(Pairs(), right, left);
+#else
+  return n == 0 ? left : right;
+#endif
+}
+
+/// Pairs n and up of a row, from its vector `first` on.
+template <int n>
+HWY_INLINE Pair pairs_from(const PairRow& row, std::size_t first) {
+  const auto left = first + n / pairs_at_once;
+  if constexpr (n % pairs_at_once == 0) {
+    return left < PairRow::size ? row[left] : hn::Zero(Pairs());
+  } else {
+    return lanes_from<n % pairs_at_once>(
+        left < PairRow::size ? row[left] : hn::Zero(Pairs()),
+        left + 1 < PairRow::size ? row[left + 1] : hn::Zero(Pairs()));
+  }
+}
+
+/// A row whose elements are each the sum of itself and the one `n` to its right.
+template <int n>
+HWY_INLINE PairRow add_pairs(const PairRow& row) {
+  PairRow sums;
+  for (std::size_t i = 0; i < PairRow::size; ++i) sums[i] = row[i] + pairs_from<n>(row, i);
+  return sums;
+}
+
+/// Computes `count` sums of products over the window of each block in the first `rows` rows of
+/// blocks of a tile. Windows overlap, so rows and columns are summed in pairs first: this takes the
+/// time of about two windows summed on their own.
+///
+/// products(row, column) returns pair_products() in a row of pixels from a column on, both counted
+/// from the first pixel of the tile's first window; store(row, column, left, right) takes the sums
+/// over the left and the right half of the windows of pairs_at_once blocks.
+template <std::size_t count, class Products, class Store>
+HWY_INLINE void sum_windows(int rows, const Products& products, const Store& store) {
+  const Pairs pairs;
+  HWY_ALIGN std::int32_t of_rows[Tile::side + window_pairs - 1][count][column_pairs];
+  PairRow sums[count];
+  for (int row = 0; row < rows + window_pairs - 1; ++row) {
+    for (std::size_t i = 0; i < PairRow::size; ++i) {
+      const int pair = static_cast<int>(i) * pairs_at_once;
+      const auto upper = products(2 * row, 2 * pair);
+      const auto lower = products(2 * row + 1, 2 * pair);
+      for (std::size_t k = 0; k < count; ++k) {
+        const auto both = upper[k] + lower[k];
+        hn::Store(both, pairs, of_rows[row][k] + pair);
+        if (row < window_pairs - 1) sums[k][i] = sums[k][i] + both;
+      }
+    }
+  }
+  for (int row = 0; row < rows; ++row) {
+    PairRow halves[count];
+    for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t i = 0; i < PairRow::size; ++i)
+        sums[k][i] =
+            sums[k][i] + hn::Load(pairs, of_rows[row + window_pairs - 1][k] + i * pairs_at_once);
+      halves[k] = add_pairs<2>(add_pairs<1>(sums[k]));
+      for (std::size_t i = 0; i < PairRow::size; ++i)
+        sums[k][i] = sums[k][i] - hn::Load(pairs, of_rows[row][k] + i * pairs_at_once);
+    }
+    for (std::size_t i = 0; i < PairRow::size / 2; ++i) {
+      Pair left[count];
+      Pair right[count];
+      for (std::size_t k = 0; k < count; ++k) {
+        left[k] = halves[k][i];
+        right[k] = pairs_from<window_pairs / 2>(halves[k], i);
+      }
+      store(row, static_cast<int>(i) * pairs_at_once, left, right);
+    }
+  }
+}
 
 /// A window row, or part of it if vectors are shorter.
 using Values = hn::CappedTag<std::int16_t, 16>;
@@ -31,7 +167,7 @@ using Ints = hn::RebindToSigned<Floats>;
 
 constexpr int max_moves = 11;
 constexpr float min_move = 0.03F;
-/// A search that moves by more than max_late_move after early_moves has nothing to converge to.
+/// A search that still moves by more than max_late_move after early_moves does not converge.
 constexpr int early_moves = 4;
 constexpr float max_late_move = 2.0F;
 /// Two successive moves that cancel to within this distance oscillate: the search ends halfway.
@@ -49,11 +185,9 @@ constexpr int corners = 4;
 /// Smaller eigenvalue of the mean gradient matrix over a window, from its sums.
 template <class Floats, class Value = hn::Vec<Floats>>
 HWY_INLINE Value min_eigenvalue(Floats floats, Value xx, Value xy, Value yy) {
-  const auto difference = hn::Sub(xx, yy);
-  const auto root = hn::Sqrt(
-      hn::Add(hn::Mul(difference, difference), hn::Mul(hn::Set(floats, 4.0F), hn::Mul(xy, xy))));
-  return hn::Div(hn::Sub(hn::Add(xx, yy), root),
-                 hn::Set(floats, static_cast<float>(2 * Tile::window * Tile::window)));
+  const auto difference = xx - yy;
+  const auto root = hn::Sqrt(difference * difference + hn::Set(floats, 4.0F) * (xy * xy));
+  return (xx + yy - root) / hn::Set(floats, static_cast<float>(2 * Tile::window * Tile::window));
 }
 
 /// Sums over a window of the products of both gradients and the pixels of the other image.
@@ -75,11 +209,10 @@ HWY_INLINE void for_each_row(const Body& body) {
   }
 }
 
-/// Partial sums per ProductSum in the output of store_parts(): one per 128-bit block.
+/// Partial sums of a ProductSum that store_parts() writes: one per 128-bit block.
 constexpr std::ptrdiff_t parts = hn::MaxLanes(Sums()) == 8 ? 2 : 1;
 
-/// Reduces the lanes of four sums within 128-bit blocks: out[4 * part + k] is a partial sum of sum
-/// k.
+/// Adds up the lanes of four sums in 128-bit blocks: out[4 * part + k] is a part of sum k.
 template <class Factors>
 HWY_INLINE void store_parts(const ProductSum<Factors>& sum0, const ProductSum<Factors>& sum1,
                             const ProductSum<Factors>& sum2, const ProductSum<Factors>& sum3,
@@ -92,7 +225,7 @@ HWY_INLINE void store_parts(const ProductSum<Factors>& sum0, const ProductSum<Fa
 #endif
 }
 
-// A window row of both gradients, and a row of pixels to multiply both with.
+// A window row of both gradients, and a row of pixels by which both are multiplied.
 #if HWY_MAX_BYTES >= 64
 using BothValues = hn::FixedTag<std::int16_t, 32>;
 using Both = hn::Vec<BothValues>;
@@ -156,11 +289,11 @@ struct Windows {
   int index(const Search& search) const { return (search.y - first_row) * Tile::side + search.x; }
 };
 
-/// Sums of the windows of all blocks of a tile, moved by displacements where several blocks search.
+/// Window sums of all blocks of a tile, at displacements where several blocks search.
 ///
-/// Displacements are in whole pixels, and have an index of their own if they are near the start of
-/// the tile's first search. A search needs the sums at four corners: its displacement, and those
-/// one pixel to the right, one below, and both.
+/// Displacements are in whole pixels; each has an index if it is near the start of the tile's first
+/// search. A search needs the sums at four corners: at its displacement, one pixel to the right,
+/// one below, and both.
 class SharedSums {
  public:
   SharedSums(const Image<std::uint8_t>& to, const Windows& windows, const Flow& start)
@@ -172,17 +305,17 @@ class SharedSums {
   /// Indices of displacements.
   HWY_INLINE hn::Vec<Ints> index(hn::Vec<Floats> x, hn::Vec<Floats> y) const {
     const Floats floats;
-    const auto column = hn::Sub(x, hn::Set(floats, first_x_));
-    const auto row = hn::Sub(y, hn::Set(floats, first_y_));
+    const auto column = x - hn::Set(floats, first_x_);
+    const auto row = y - hn::Set(floats, first_y_);
     const auto last = hn::Set(floats, side - 1);
-    const auto near = hn::And(hn::And(hn::Ge(column, hn::Zero(floats)), hn::Lt(column, last)),
-                              hn::And(hn::Ge(row, hn::Zero(floats)), hn::Lt(row, last)));
-    const auto at = hn::Add(hn::Mul(row, hn::Set(floats, side)), column);
+    const auto near = hn::And(hn::And(column >= hn::Zero(floats), column < last),
+                              hn::And(row >= hn::Zero(floats), row < last));
+    const auto at = row * hn::Set(floats, side) + column;
     return hn::ConvertTo(Ints(), hn::IfThenElse(near, at, hn::Set(floats, far)));
   }
 
-  /// Computes the sums of displacements at which enough of the blocks search. False if there are
-  /// none.
+  /// Computes the sums of displacements at which at least `enough` blocks search. Returns false if
+  /// there are none.
   bool share(std::span<const std::int32_t> blocks, const std::int32_t* displacement) {
     if (blocks.size() < enough) return false;
     bool any = false;
@@ -200,18 +333,18 @@ class SharedSums {
     return sums_[corners_[displacement][c] - 1][window];
   }
 
-  /// Number of searches at one displacement that take longer than the sums of all windows.
+  /// Number of searches at one displacement from which on summing all windows is faster.
   static constexpr int enough = 5;
 
  private:
   static constexpr int side = 32;  ///< of the square of displacements that have an index
-  static constexpr float before =
-      side / 2.0F;  ///< pixels of the square on either side of the start
+  /// Pixels of the square on either side of the start.
+  static constexpr float before = side / 2.0F;
   static constexpr std::int32_t far = side * side - 1;  ///< index of all other displacements
   static constexpr int max_sums = 64;                   ///< maximum number of corners with sums
   static constexpr std::uint8_t none = 0;
 
-  /// Returns false if there is no memory left for them, or a window leaves the image.
+  /// Returns false if max_sums is reached, or a window leaves the image.
   bool compute(std::int32_t displacement) {
     const std::array<std::int32_t, corners> all{displacement, displacement + 1, displacement + side,
                                                 displacement + side + 1};
@@ -255,7 +388,7 @@ class SharedSums {
                                      pair_products(slope_y + at, there)};
         },
         [&](int row, int column, const auto& left, const auto& right) {
-          hn::StoreInterleaved2(hn::Add(left[0], right[0]), hn::Add(left[1], right[1]), Pairs(),
+          hn::StoreInterleaved2(left[0] + right[0], left[1] + right[1], Pairs(),
                                 &out[row * Tile::side + column].x);
         });
   }
@@ -279,7 +412,7 @@ class Blocks {
          const Windows& windows)
       : to_(to), windows_(windows), count_(static_cast<int>(searches.size())) {
     for (int i = 0; i < count_; ++i) {
-      const auto& search = searches[static_cast<std::size_t>(i)];
+      const auto& search = searches[i];
       window_[i] = windows.index(search);
       left_[i] = static_cast<float>(windows.left + 2 * search.x);
       top_[i] = static_cast<float>(tile.top - Tile::before + 2 * search.y);
@@ -294,19 +427,19 @@ class Blocks {
     const int lanes = static_cast<int>(hn::Lanes(floats));
     for (int i = 0; i < count_; i += lanes) {
       const auto scale = hn::Set(floats, slope_product);
-      const auto xx = hn::Mul(hn::Load(floats, xx_ + i), scale);
-      const auto xy = hn::Mul(hn::Load(floats, xy_ + i), scale);
-      const auto yy = hn::Mul(hn::Load(floats, yy_ + i), scale);
-      const auto determinant = hn::Sub(hn::Mul(xx, yy), hn::Mul(xy, xy));
+      const auto xx = hn::Load(floats, xx_ + i) * scale;
+      const auto xy = hn::Load(floats, xy_ + i) * scale;
+      const auto yy = hn::Load(floats, yy_ + i) * scale;
+      const auto determinant = xx * yy - xy * xy;
       const auto followed =
-          hn::And(hn::Ge(min_eigenvalue(floats, xx, xy, yy), hn::Set(floats, min_texture)),
-                  hn::Ge(determinant, hn::Set(floats, std::numeric_limits<float>::epsilon())));
+          hn::And(min_eigenvalue(floats, xx, xy, yy) >= hn::Set(floats, min_texture),
+                  determinant >= hn::Set(floats, std::numeric_limits<float>::epsilon()));
       const auto present =
           hn::FirstN(floats, static_cast<std::size_t>(std::min(lanes, count_ - i)));
       hn::Store(xx, floats, xx_ + i);
       hn::Store(xy, floats, xy_ + i);
       hn::Store(yy, floats, yy_ + i);
-      hn::Store(hn::Div(hn::Set(floats, 1.0F), determinant), floats, inverse_ + i);
+      hn::Store(hn::Set(floats, 1.0F) / determinant, floats, inverse_ + i);
       const auto ones = hn::IfThenElseZero(hn::And(followed, present), hn::Set(floats, 1.0F));
       hn::Store(ones, floats, followed_ + i);
       hn::Store(ones, floats, active_ + i);
@@ -317,14 +450,14 @@ class Blocks {
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
     for (int i = 0; i < count_; i += lanes) {
-      const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
+      const auto active = hn::Load(floats, active_ + i) != hn::Zero(floats);
       locate(i, active, hn::Load(floats, flow_x_ + i), hn::Load(floats, flow_y_ + i));
     }
     for (int round = 0; round < max_moves; ++round) {
       update_sums();
       bool any = false;
       for (int i = 0; i < count_; i += lanes) {
-        const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
+        const auto active = hn::Load(floats, active_ + i) != hn::Zero(floats);
         if (hn::AllFalse(floats, active)) continue;
         any = true;
         move(i, active, round);
@@ -335,7 +468,7 @@ class Blocks {
 
   void store(std::span<Search> searches) const {
     for (int i = 0; i < count_; ++i) {
-      auto& search = searches[static_cast<std::size_t>(i)];
+      auto& search = searches[i];
       const float x = left_[i] + std::floor(flow_x_[i]);
       const float y = top_[i] + std::floor(flow_y_[i]);
       search.found = followed_[i] != 0 && x >= -Tile::window && y >= -Tile::window &&
@@ -367,8 +500,7 @@ class Blocks {
         [&](int row, int column, const auto& left, const auto& right) {
           const Pairs pairs;
           const int at = row * Tile::side + column;
-          for (std::size_t k = 0; k < xy; ++k)
-            hn::Store(hn::Add(left[k], right[k]), pairs, sums[k] + at);
+          for (std::size_t k = 0; k < xy; ++k) hn::Store(left[k] + right[k], pairs, sums[k] + at);
           hn::Store(left[xy], pairs, sums[xy] + at);
           hn::Store(right[xy], pairs, sums[xy_right] + at);
         });
@@ -394,9 +526,7 @@ class Blocks {
     moved_count_ = 0;
   }
 
-  std::span<const std::int32_t> moved() const {
-    return std::span(moved_).first(static_cast<std::size_t>(moved_count_));
-  }
+  std::span<const std::int32_t> moved() const { return std::span(moved_).first(moved_count_); }
 
   /// Removes blocks whose displacement has shared sums from moved_, and copies their sums.
   void use_shared_sums() {
@@ -468,21 +598,21 @@ class Blocks {
     const Floats floats;
     const auto cell_x = hn::Floor(flow_x);
     const auto cell_y = hn::Floor(flow_y);
-    const auto x = hn::Add(cell_x, hn::Load(floats, left_ + i));
-    const auto y = hn::Add(cell_y, hn::Load(floats, top_ + i));
+    const auto x = cell_x + hn::Load(floats, left_ + i);
+    const auto y = cell_y + hn::Load(floats, top_ + i);
     const auto min = hn::Set(floats, -static_cast<float>(Tile::window));
-    const auto inside = hn::And(
-        hn::And(hn::Ge(x, min), hn::Lt(x, hn::Set(floats, static_cast<float>(to_.width())))),
-        hn::And(hn::Ge(y, min), hn::Lt(y, hn::Set(floats, static_cast<float>(to_.height())))));
+    const auto inside =
+        hn::And(hn::And(x >= min, x < hn::Set(floats, static_cast<float>(to_.width()))),
+                hn::And(y >= min, y < hn::Set(floats, static_cast<float>(to_.height()))));
     active = hn::And(active, inside);
     const Ints ints;
     const auto stride = hn::Set(ints, static_cast<std::int32_t>(to_.stride()));
     const auto row = hn::ConvertTo(ints, hn::IfThenElseZero(inside, y));
     const auto column = hn::ConvertTo(ints, hn::IfThenElseZero(inside, x));
-    hn::Store(hn::Add(hn::Mul(row, stride), column), ints, at_ + i);
+    hn::Store(row * stride + column, ints, at_ + i);
     if (shared_) hn::Store(shared_->index(cell_x, cell_y), ints, displacement_ + i);
-    const auto moved = hn::And(active, hn::Or(hn::Ne(cell_x, hn::Load(floats, cell_x_ + i)),
-                                              hn::Ne(cell_y, hn::Load(floats, cell_y_ + i))));
+    const auto moved = hn::And(active, hn::Or(cell_x != hn::Load(floats, cell_x_ + i),
+                                              cell_y != hn::Load(floats, cell_y_ + i)));
     hn::Store(cell_x, floats, cell_x_ + i);
     hn::Store(cell_y, floats, cell_y_ + i);
     hn::Store(hn::IfThenElseZero(active, hn::Set(floats, 1.0F)), floats, active_ + i);
@@ -499,8 +629,8 @@ class Blocks {
     const Ints ints;
     const auto flow_x = hn::Load(floats, flow_x_ + i);
     const auto flow_y = hn::Load(floats, flow_y_ + i);
-    const auto beyond_x = hn::Sub(flow_x, hn::Load(floats, cell_x_ + i));
-    const auto beyond_y = hn::Sub(flow_y, hn::Load(floats, cell_y_ + i));
+    const auto beyond_x = flow_x - hn::Load(floats, cell_x_ + i);
+    const auto beyond_y = flow_y - hn::Load(floats, cell_y_ + i);
     // Sums of gradient * (there - here).
     hn::Vec<Floats> mismatch_x[corners];
     hn::Vec<Floats> mismatch_y[corners];
@@ -509,18 +639,14 @@ class Blocks {
       hn::Vec<Ints> there_y;
       hn::LoadInterleaved2(ints, &there_[c][i].x, there_x, there_y);
       const auto subtract = [&](auto there, const std::int32_t* here) {
-        return hn::ConvertTo(floats, hn::Sub(there, hn::Load(ints, here + i)));
+        return hn::ConvertTo(floats, there - hn::Load(ints, here + i));
       };
       mismatch_x[c] = subtract(there_x, here_x_);
       mismatch_y[c] = subtract(there_y, here_y_);
     }
     const auto bilinear = [&](const auto& at) {
-      const auto between = [](auto a, auto b, auto part) {
-        return hn::Add(a, hn::Mul(hn::Sub(b, a), part));
-      };
-      return hn::Mul(
-          between(between(at[0], at[1], beyond_x), between(at[2], at[3], beyond_x), beyond_y),
-          hn::Set(floats, mismatch_product));
+      return lerp(lerp(at[0], at[1], beyond_x), lerp(at[2], at[3], beyond_x), beyond_y) *
+             hn::Set(floats, mismatch_product);
     };
     const auto x = bilinear(mismatch_x);
     const auto y = bilinear(mismatch_y);
@@ -528,22 +654,22 @@ class Blocks {
     const auto xy = hn::Load(floats, xy_ + i);
     const auto yy = hn::Load(floats, yy_ + i);
     const auto inverse = hn::Load(floats, inverse_ + i);
-    const auto move_x = hn::Mul(hn::Sub(hn::Mul(xy, y), hn::Mul(yy, x)), inverse);
-    const auto move_y = hn::Mul(hn::Sub(hn::Mul(xy, x), hn::Mul(xx, y)), inverse);
-    auto to_x = hn::Add(flow_x, move_x);
-    auto to_y = hn::Add(flow_y, move_y);
-    const auto square = hn::Add(hn::Mul(move_x, move_x), hn::Mul(move_y, move_y));
-    auto stops = hn::Le(square, hn::Set(floats, min_move * min_move));
+    const auto move_x = (xy * y - yy * x) * inverse;
+    const auto move_y = (xy * x - xx * y) * inverse;
+    auto to_x = flow_x + move_x;
+    auto to_y = flow_y + move_y;
+    const auto square = move_x * move_x + move_y * move_y;
+    auto stops = square <= hn::Set(floats, min_move * min_move);
     if (round >= early_moves)
-      stops = hn::Or(stops, hn::Gt(square, hn::Set(floats, max_late_move * max_late_move)));
+      stops = hn::Or(stops, square > hn::Set(floats, max_late_move * max_late_move));
     if (round > 0) {
       const auto limit = hn::Set(floats, turning_back);
-      const auto turns = hn::AndNot(
-          stops, hn::And(hn::Lt(hn::Abs(hn::Add(move_x, hn::Load(floats, before_x_ + i))), limit),
-                         hn::Lt(hn::Abs(hn::Add(move_y, hn::Load(floats, before_y_ + i))), limit)));
+      const auto turns =
+          hn::AndNot(stops, hn::And(hn::Abs(move_x + hn::Load(floats, before_x_ + i)) < limit,
+                                    hn::Abs(move_y + hn::Load(floats, before_y_ + i)) < limit));
       const auto half = hn::Set(floats, 0.5F);
-      to_x = hn::IfThenElse(turns, hn::Sub(to_x, hn::Mul(move_x, half)), to_x);
-      to_y = hn::IfThenElse(turns, hn::Sub(to_y, hn::Mul(move_y, half)), to_y);
+      to_x = hn::IfThenElse(turns, to_x - move_x * half, to_x);
+      to_y = hn::IfThenElse(turns, to_y - move_y * half, to_y);
       stops = hn::Or(stops, turns);
     }
     to_x = hn::IfThenElse(active, to_x, flow_x);

@@ -8,9 +8,8 @@
 
 namespace eventcamera {
 
-/// 8x8 blocks of a level, whose first pixels are two pixels apart: blocks of 2x2 pixels, or every
-/// second one of each row and column of pixels. A block is searched for with a window of 16x16
-/// pixels around it.
+/// 8x8 blocks of a level that begin two pixels apart: blocks of 2x2 pixels, or every other pixel of
+/// every other row. The window of a block is the 16x16 pixels around it.
 struct Tile {
   static constexpr int side = 8;          ///< blocks
   static constexpr int width = 2 * side;  ///< pixels
@@ -34,8 +33,8 @@ struct Search {
 
 /// Lucas-Kanade on one level (Lucas and Kanade 1981; Bouguet 2001): moves a window towards the
 /// minimum of its squared difference, at most 11 times, until a move is shorter than 0.03 pixels,
-/// undoes the last one, or is longer than 2 pixels after 4 others. Needs the gradients of `from` in
-/// all windows. At most one search per block, in raster order.
+/// reverses the last one, or is longer than 2 pixels after 4 others. Needs the gradients of `from`
+/// in all windows. At most one search per block, in raster order.
 ///
 /// The window sum that determines a move is bilinear in the window's position, so it is
 /// interpolated between the integer sums at the four pixels around it. The window is summed once

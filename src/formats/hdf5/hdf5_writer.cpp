@@ -79,7 +79,8 @@ void Hdf5Writer::append(std::span<const AbsoluteEvent> events) {
   const auto complete = events_ / hdf5_chunk * hdf5_chunk;
   const auto max_new =
       std::clamp<std::size_t>(committed_events_ / new_share, hdf5_chunk, max_uncommitted);
-  if (Clock::now() - committed_ >= commit_interval_ && !file_->output.is_committing())
+  const bool is_due = !committed_ || Clock::now() - *committed_ >= commit_interval_;
+  if (is_due && !file_->output.is_committing())
     start_commit(true);
   else if (complete >= committed_events_ + max_new)
     start_commit(false);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "src/core/event.hpp"
@@ -65,7 +66,7 @@ class Hdf5Writer {
   std::unique_ptr<File> file_;
   std::unique_ptr<Hdf5Layout> layout_;
   Microseconds latest_ = INT64_MIN;
-  Clock::time_point committed_{};  ///< time of the last commit of all events
+  std::optional<Clock::time_point> committed_;  ///< time of the last commit of all events
   std::size_t events_ = 0;
   std::size_t committed_events_ = 0;
 };

@@ -240,12 +240,6 @@ int luma_at(ivec2 at, ivec2 motion, int j, int steps) {
   return blended * 257 + (1 << 11) >> 12;
 }
 
-int motion_per_step(uint flow, int steps) {
-  if ((flow & 0x7fffffffu) > 0x7f800000u) return 0;  // NaN
-  float limited = clamp(uintBitsToFloat(flow), -16384.0, 16384.0);
-  return int(roundEven(limited * (65536.0 / float(steps))));
-}
-
 /* a pixel */
 
 float loaded(int plane, int pixel) {
@@ -367,7 +361,8 @@ void main() {
   ivec2 motion = ivec2(0);
   if (steps > 1) {
     int flow = 2 * height * ((width + 3) / 4) + 2 * pixel;
-    motion = ivec2(motion_per_step(scene[flow], steps), motion_per_step(scene[flow + 1], steps));
+    float factor = 65536.0 / float(steps);
+    motion = ivec2(motion_per_step(scene[flow], factor), motion_per_step(scene[flow + 1], factor));
   }
   for (int i = 0; i < sub_intervals; ++i) {
     int at = plan + 2 + 10 * i;

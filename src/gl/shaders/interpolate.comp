@@ -48,11 +48,6 @@ int shade(ivec2 at, ivec2 motion, int j) {
   return from_last * (256 - weight) + from_now * weight + (1 << 19) >> 20;
 }
 
-int motion_per_step(float flow) {
-  if ((floatBitsToUint(flow) & 0x7fffffffu) > 0x7f800000u) return 0;  // NaN
-  return int(roundEven(clamp(flow, -16384.0, 16384.0) * intBitsToFloat(factor)));
-}
-
 void main() {
   int lane = int(gl_LocalInvocationID.x);
   int y = int(gl_WorkGroupID.y);
@@ -64,8 +59,9 @@ void main() {
   barrier();
   ivec2 at = ivec2(gl_GlobalInvocationID.x, y);
   if (at.x < width) {
-    vec2 flow = flows[y * width + at.x];
-    ivec2 motion = ivec2(motion_per_step(flow.x), motion_per_step(flow.y));
+    uvec2 flow = floatBitsToUint(flows[y * width + at.x]);
+    ivec2 motion = ivec2(motion_per_step(flow.x, intBitsToFloat(factor)),
+                         motion_per_step(flow.y, intBitsToFloat(factor)));
     uint bit = 1u << (lane % 32);
     int before = shade(at, motion, first_step - 1);
     for (int j = first_step; j <= last_step; ++j) {

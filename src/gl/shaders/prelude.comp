@@ -1,4 +1,5 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later Shared by all shaders.
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Shared by all shaders.
 
 // First word of a point or block that does not exist.
 const uint none = 0x7fffffffu;
@@ -19,4 +20,10 @@ int place(int i, int from, int to, out float weight) {
   if (first >= from - 1) return from - 1;
   weight = max(float(numerator - first * 2 * to), 0.0) / float(2 * to);
   return first;
+}
+
+// Displacement per step, in 1/65536 of a pixel, from the bits of a flow; `factor` is 65536 / steps.
+int motion_per_step(uint flow, float factor) {
+  if ((flow & 0x7fffffffu) > 0x7f800000u) return 0;  // NaN
+  return int(roundEven(clamp(uintBitsToFloat(flow), -16384.0, 16384.0) * factor));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Blurs a picture with a Gaussian and shrinks it, like src/flow/farneback/pyramid: first along the
-// columns, then along the rows. 64 pixels of a row per group.
+// Blurs a picture with a Gaussian and shrinks it, like PyramidLevel of src/flow/farneback: first
+// along the columns, then along the rows. 64 pixels of a row per group.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Picture { uint picture[]; };

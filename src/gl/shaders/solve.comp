@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later Sums the equations over 15 columns and 7 rows that
-// have equations, and solves them for the flow of the centre; the border is replicated. 64x4 pixels
-// per group, a column of four per invocation.
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Sums the equations over 15 columns and 7 rows of equations, and solves them for the flow of the
+// centre; the border is replicated. 64x4 pixels per group, a column of four per invocation.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Equations { float equations[]; };
