@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "src/core/rgb_luma.hpp"
+#include "src/core/luma.hpp"
 #include "src/gl/context.hpp"
 #include "src/gl/objects.hpp"
 
