@@ -206,9 +206,8 @@ Costs costs_of(gl::Context& context, const Method& method, const Clip& clip,
       finish();
     }));
     kernels.push_back(gpu.time_of([&] {
-      call.push_back(time_of([&] {
-        simulator->queue(texture.frame(), i * bench::frame_time, settings);
-      }));
+      call.push_back(
+          time_of([&] { simulator->queue(texture.frame(), i * bench::frame_time, settings); }));
     }));
     const EventBuckets* made = nullptr;
     read.push_back(time_of([&] { made = simulator->read(); }));
