@@ -175,6 +175,17 @@ TEST(EventCut, StartsOverWhereTheStreamDoes) {
   }
 }
 
+TEST(EventCut, ForgetsTriggersThatWaitAtAFlush) {
+  Cut cut;
+  cut.push_triggers({{1'000, 0, true}, {11'500, 0, true}});
+  cut.push(0, {2'000});
+  flush({cut.h.get()});
+  push_segment(cut.h.get());
+  cut.push_triggers({{12'000, 0, true}, {15'000, 0, true}});
+  cut.push(10'000, {11'700, 13'000});
+  EXPECT_EQ(cut.windows(), Texts{"12000+3000: 1000 DISCONT"});
+}
+
 TEST(EventCut, StartsOverWhereTimeGoesBack) {
   Cut cut;
   cut.push_triggers({{51'000, 0, true}});

@@ -333,10 +333,12 @@ class Busy : public testing::TestWithParam<const char*> {
     EXPECT_EQ(h.push(frame(h, i)), GST_FLOW_OK);
   }
 
-  /// Expects interval i to be the next output.
-  void expect_interval(std::size_t i, const Buffer& output) const {
+  /// Expects interval i to be the next output. In the first one after a restart, eventsim-diff has
+  /// nothing to follow yet.
+  void expect_interval(std::size_t i, const Buffer& output, bool is_first = false) const {
     ASSERT_TRUE(output);
     EXPECT_EQ(GST_BUFFER_PTS(output.get()), time_of(static_cast<int>(i)));
+    if (is_first && GetParam() == std::string_view("gleventsim-diff")) return;
     EXPECT_TRUE(bytes_of(output.get()) == intervals[i]);
   }
 
@@ -382,7 +384,7 @@ TEST_P(Busy, IntervalsComeBeforeWhatFollowsThem) {
   gst_harness_set_src_caps_str(h.get(),
                                "video/x-raw, format=GRAY8, width=16, height=16, framerate=25/1");
   const auto output = h.pull();
-  expect_interval(4, output);
+  expect_interval(4, output, true);
   EXPECT_TRUE(GST_BUFFER_FLAG_IS_SET(output.get(), GST_BUFFER_FLAG_DISCONT));
   EXPECT_TRUE(contains(h.out_caps(), "width=(int)16"));
 }
@@ -394,7 +396,7 @@ TEST_P(Busy, IntervalsAreDroppedByAFlush) {
   push(1);
   push(2);
   h.wait_for_events();
-  expect_interval(1, h.pull());
+  expect_interval(1, h.pull(), true);
   EXPECT_FALSE(h.pull());
 }
 

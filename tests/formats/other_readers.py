@@ -647,6 +647,7 @@ class Text(TableTest):
         # Also in long files, where 1 is read fast elsewhere.
         found, _ = self.read_text('t,x,y,p\n' + ''.join(f'{i},3,4,{1 + (i % 4 == 0)}\n' for i in range(1000)))
         self.assertEqual(sum(p for *_, p in found), 250)
+        self.assertIn('are 0 1 2;', self.refused_text('t,x,y,p\n1,1,1,0\n2,1,1,1\n3,1,1,2\n'))
         self.assertIn('are 0 1 2 3;', self.refused_text('t,x,y,p\n1,1,1,0\n2,1,1,1\n3,1,1,2\n4,1,1,3\n'))
         self.assertIn('unsigned', self.refused_text('t,x,y,p\n1,1,1,0\n2,1,1,255\n'))
 

@@ -114,9 +114,17 @@ void read_file(const std::string& kind, const std::string& file, const std::stri
   if (!decoder->open(source)) {
     contents = decode(*decoder, bytes);
   } else {
-    if (const auto& t = options["seek"]; !t.empty())
-      decoder->restart(decoder->seek_point_before(std::stoll(t)).value());
-    contents.take_all(*decoder);
+    // Forwards and, after everything has been read, backwards.
+    const auto read = [&] {
+      Contents some;
+      if (const auto& t = options["seek"]; !t.empty())
+        decoder->restart(decoder->seek_point_before(std::stoll(t)).value());
+      some.take_all(*decoder);
+      return some;
+    };
+    contents = read();
+    if (!options["seek"].empty() && read().events != contents.events)
+      throw std::logic_error("other events after a seek backwards");
   }
   if (options["seek"].empty() &&
       decode(*make_decoder(kind, options), bytes, 0).events != contents.events)

@@ -251,10 +251,27 @@ Function driver(const char* name) {
   return reinterpret_cast<Function>(gl_test::load(name));
 }
 
+/// Calls that wait for the GPU, or would copy what it has not yet written.
+int waits = 0;
 int releases = 0;
+bool is_gpu_busy = false;
 
-void* load_counting_releases(const char* name) {
-  if (std::string_view(name) == "eglReleaseThread")
+void* load_counting_waits(const char* name) {
+  const std::string_view function = name;
+  if (function == "eglClientWaitSyncKHR")
+    return reinterpret_cast<void*>(
+        +[](EGLDisplay display, EGLSyncKHR sync, EGLint flags, EGLTimeKHR timeout) -> EGLint {
+          waits += timeout > 0;
+          if (timeout == 0 && is_gpu_busy) return EGL_TIMEOUT_EXPIRED_KHR;
+          return eglClientWaitSync(display, sync, flags, timeout);
+        });
+  if (function == "glMapBufferRange")
+    return reinterpret_cast<void*>(+[](GLenum target, GLintptr offset, GLsizeiptr length,
+                                       GLbitfield access) -> void* {
+      ++waits;
+      return driver<PFNGLMAPBUFFERRANGEPROC>("glMapBufferRange")(target, offset, length, access);
+    });
+  if (function == "eglReleaseThread")
     return reinterpret_cast<void*>(+[]() -> EGLBoolean {
       ++releases;
       return eglReleaseThread();
@@ -264,7 +281,7 @@ void* load_counting_releases(const char* name) {
 
 TEST(Simulator, LeavesNoDataOfEglInAThreadThatWaits) {
   const EglContext current(false);
-  const gl::Context context(load_counting_releases);
+  const gl::Context context(load_counting_waits);
   const auto simulator = gl::make_frame_simulator(context, {64, 48, 8});
   Texture texture(64, 48, 1);
   simulator->queue(texture.show(bytes_of(scene::noise<std::uint8_t>(64, 48, 8, 1))), 0, {});
@@ -274,6 +291,48 @@ TEST(Simulator, LeavesNoDataOfEglInAThreadThatWaits) {
   std::thread([&] { simulator->wait(); }).join();
   EXPECT_EQ(releases, 1);
   EXPECT_EQ(simulator->read(), nullptr);
+}
+
+TEST(Simulator, ReadsEventsBackWhileTheGpuWorksOnTheNextFrame) {
+  const EglContext current(false);
+  const gl::Context context(load_counting_waits);
+  const LumaFormat format{130, 61, 8};
+  Texture texture(format.width, format.height, 1);
+  const auto frame_of = [&](unsigned i) {
+    return texture.show(bytes_of(scene::noise<std::uint8_t>(format.width, format.height, 8, i)));
+  };
+  using Make = std::unique_ptr<gl::Simulator> (*)(const gl::Context&, const LumaFormat&);
+  const Make make_dense = [](const gl::Context& gl, const LumaFormat& of) {
+    return std::unique_ptr<gl::Simulator>(gl::make_dense_simulator(gl, of));
+  };
+  for (const auto& [make, threshold] : {std::pair<Make, double>{gl::make_frame_simulator, 20},
+                                        {make_dense, 20},
+                                        {gl::make_sparse_simulator, 200},
+                                        {gl::make_diff_simulator, 200}}) {
+    const Settings settings{threshold, threshold};
+    const auto waiting = make(context, format);
+    const auto simulator = make(context, format);
+    std::vector<std::vector<Event>> expected;
+    for (unsigned i = 0; i < 4; ++i)
+      if (const auto* events =
+              gl_test::events_until(*waiting, frame_of(i), i * scene::frame_time, settings))
+        expected.push_back(scene::copy(*events));
+    std::vector<std::vector<Event>> made;
+    for (unsigned i = 0; i < 4; ++i) {
+      waits = 0;
+      is_gpu_busy = true;
+      simulator->queue(frame_of(i), i * scene::frame_time, settings);
+      EXPECT_EQ(waits, 0);
+      is_gpu_busy = false;
+      const auto* events = i > 0 ? simulator->read() : nullptr;
+      EXPECT_EQ(events == nullptr, i <= 1);
+      if (events != nullptr) made.push_back(scene::copy(*events));
+    }
+    waits = 0;
+    made.push_back(scene::copy(*simulator->read()));
+    EXPECT_GT(waits, 0);
+    EXPECT_EQ(made, expected);
+  }
 }
 
 /// What a lost context does, as drivers differ.

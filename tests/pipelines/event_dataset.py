@@ -181,7 +181,7 @@ class DataSets(unittest.TestCase):
         make_video("bad/videos/uneven.mkv", more="! identity drop-probability=0.4")
         cut = make_video("bad/videos/cut.mkv", frames=100)
         os.truncate(cut, os.path.getsize(cut) // 3)
-        write("bad/videos/noise.mkv", "no video" * 999)
+        write("bad/videos/noise.mkv", "".join(map(chr, range(128))) * 80)
         printed = event_dataset(recipe_of("bad"), status=1)
         self.assertIn("refused: short: too short: 1 frames of at least 2", printed)
         self.assertRegex(printed, "refused: cut: corrupt: its frames end 2.* s before the 4.0 s of the file")

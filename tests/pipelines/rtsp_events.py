@@ -46,6 +46,9 @@ class Client(Pipeline):
         self.set_state(Gst.State.PLAYING)
         return self
 
+    def pause(self):
+        self._pipeline.set_state(Gst.State.PAUSED)  # does not wait, since nothing arrives
+
     def first(self, count, sink="out"):
         return list(itertools.islice(self.samples(sink), count))
 
@@ -120,7 +123,7 @@ def pauses():
     """While a client pauses, frames are dropped, not kept: 3.5 MB a second."""
     with Server() as server, client_of(server.base) as client:
         client.first(5)
-        client.set_state(Gst.State.PAUSED)
+        client.pause()
         time.sleep(1)
         before = server.memory()
         time.sleep(4)
