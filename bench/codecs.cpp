@@ -13,13 +13,12 @@
 #include <span>
 
 #include "bench/codec_timing.hpp"
-#include "src/formats/aedat/aedat2_decoder.hpp"
-#include "src/formats/aedat/aedat3_decoder.hpp"
-#include "src/formats/aedat/aedat4_decoder.hpp"
+#include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
+#include "src/formats/aedat/aedat_decoder.hpp"
 #include "src/formats/byte_source.hpp"
 #include "src/formats/hdf5/ecf.hpp"
-#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/hdf5/hdf5_decoder.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
@@ -155,7 +154,7 @@ void add_mcap(const std::string& name, BagCompression compression) {
       [=] {
         return make_mcap_encoder({size, BagEvents::evt3, compression});
       },
-      [] { return std::make_unique<BagDecoder>(""); });
+      [] { return make_bag_decoder(""); });
 }
 
 void add_aedat4(const std::string& name, Aedat4Compression compression) {
@@ -164,14 +163,14 @@ void add_aedat4(const std::string& name, Aedat4Compression compression) {
       [=] {
         return std::make_unique<Aedat4Encoder>(Aedat4Settings{size, "bench", compression});
       },
-      [] { return std::make_unique<Aedat4Decoder>(); });
+      [] { return make_aedat4_decoder(); });
 }
 
 void add_csv(const std::string& name) {
   const auto format = std::ranges::find(csv_formats(), name, &NamedCsvFormat::name)->format;
   add(
-      "csv-" + name, edges(), [=] { return std::make_unique<CsvEncoder>(format, size); },
-      [] { return std::make_unique<CsvDecoder>(); });
+      "csv-" + name, edges(), [=] { return make_csv_encoder(format, size); },
+      [] { return make_csv_decoder(); });
 }
 
 void add_ecf() {
@@ -207,11 +206,11 @@ void add_hdf5(const std::string& name, Hdf5Format format, Hdf5Writer::Compressio
     std::filesystem::remove(path);
   };
   add_read(name, edges(), load, [=](const Bytes& /*bytes*/) {
-    Events out;
-    Hdf5Reader reader(**file);
-    while (reader.read(10'000, out) > 0) {
-    }
-    return out.size();
+    const auto decoder = make_hdf5_decoder();
+    decoder->open(**file);
+    std::size_t read = 0;
+    while (const auto item = decoder->next()) read += std::get<EventItem>(*item).events.size();
+    return read;
   });
   add_write(name, edges(), [=](Bytes& bytes) {
     write(bytes);
@@ -231,17 +230,17 @@ int main(int argc, char** argv) {
   add_read(
       "aedat2", small,
       [&](Bytes& bytes) { bytes = aedat_files::aedat2_davis(small, davis, "Davis346"); },
-      [](const Bytes& bytes) { return decode(*std::make_unique<Aedat2Decoder>(), bytes); });
+      [](const Bytes& bytes) { return decode(*make_aedat2_decoder(), bytes); });
   add_read(
       "aedat3", small, [&](Bytes& bytes) { bytes = aedat_files::aedat3(small, "DAVIS346", 4096); },
-      [](const Bytes& bytes) { return decode(*std::make_unique<Aedat3Decoder>(), bytes); });
+      [](const Bytes& bytes) { return decode(*make_aedat3_decoder(), bytes); });
   add_aedat4("none", Aedat4Compression::none);
   add_aedat4("lz4", Aedat4Compression::lz4);
   add_aedat4("zstd", Aedat4Compression::zstd);
   for (const auto* const name : {"names", "metavision", "rpg"}) add_csv(name);
   add(
       "npy", edges(), [] { return std::make_unique<NpyEncoder>(); },
-      [] { return std::make_unique<NpyDecoder>(TableSettings{.size = size}); });
+      [] { return make_npy_decoder(TableSettings{.size = size}); });
   add_ecf();
   add_hdf5("dsec", Hdf5Format::dsec, Hdf5Writer::Compression::none);
   add_hdf5("dsec-gzip", Hdf5Format::dsec, Hdf5Writer::Compression::gzip);

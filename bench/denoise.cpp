@@ -27,10 +27,10 @@ struct Labelled {
 Labelled read_labelled(const char* path) {
   std::ifstream file(path, std::ios::binary);
   const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(file), {}};
-  CsvDecoder decoder;
+  const auto decoder = make_csv_decoder();
   Decoded decoded;
-  decoder.decode(bytes, decoded);
-  decoder.finish(decoded);
+  decoder->decode(bytes, decoded);
+  decoder->finish(decoded);
   Labelled result;
   for (const auto& event : decoded.events) {
     const auto t = static_cast<std::uint32_t>(event.t - decoded.events.front().t);

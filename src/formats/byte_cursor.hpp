@@ -19,7 +19,6 @@ class ByteCursor {
 
   bool failed() const { return failed_; }
 
-  /// Number of bytes read.
   std::size_t position() const { return position_; }
 
   std::span<const std::uint8_t> rest() const { return bytes_.subspan(position_); }
@@ -77,6 +76,12 @@ class ByteAppender {
   void put(std::string_view text) {
     put(static_cast<std::uint32_t>(text.size()));
     out_.insert(out_.end(), text.begin(), text.end());
+  }
+
+  template <class First, class Second, class... More>
+  void put(First first, Second second, More... more) {
+    put(first);
+    put(second, more...);
   }
 
   /// Appends zeros up to a multiple of `alignment` after `start`.

@@ -52,7 +52,6 @@ class ByteQueue {
     copied_ = 0;
   }
 
-  /// Number of bytes in the queue.
   std::size_t size() const { return kept_.size() - head_ + piece_.size(); }
 
   /// Offset of the front in the file.

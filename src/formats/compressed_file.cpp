@@ -127,14 +127,6 @@ std::unique_ptr<FileDecompressor::Codec> FileDecompressor::codec_of(
   return nullptr;
 }
 
-void FileDecompressor::push(std::span<const std::uint8_t> piece) {
-  piece_ = piece;
-}
-
-void FileDecompressor::finish() {
-  is_finished_ = true;
-}
-
 std::span<const std::uint8_t> FileDecompressor::next() {
   if (!is_known_) {
     const auto count = std::min(piece_.size(), magic_size - start_.size());

@@ -27,10 +27,10 @@ class FileDecompressor {
   FileDecompressor& operator=(const FileDecompressor&) = delete;
 
   /// Adds bytes, which must stay valid until next() returns nothing.
-  void push(std::span<const std::uint8_t> piece);
+  void push(std::span<const std::uint8_t> piece) { piece_ = piece; }
 
   /// Declares the end of the file: next() returns the rest.
-  void finish();
+  void finish() { is_finished_ = true; }
 
   /// Returns the next bytes, valid until the next call; none if more are needed. Throws
   /// UnsupportedFormat if the file becomes too large for its size.
@@ -42,10 +42,8 @@ class FileDecompressor {
   /// there on.
   std::optional<std::uint64_t> corrupt_at() const { return corrupt_at_; }
 
-  /// True if a file with these first bytes is compressed.
   static bool is_compressed(std::span<const std::uint8_t> start);
 
-  /// Bytes that is_compressed() needs.
   static constexpr std::size_t magic_size = 4;
 
  private:

@@ -24,9 +24,8 @@
 //                               EventDecoder: a single stream of events and triggers, as aedat/ 1
 //                               to 3
 //   unit_stream_decoder.cpp       a header and units of a few bytes, which a UnitDecoder reads:
-//                                 evt/, dat/, es/; time_base.hpp unwraps their times
-//   event_table.cpp               rows or columns of numbers: text/, numpy/, hdf5/;
-//                                 table_sample.cpp detects the meaning of the columns
+//                                 evt/, dat/, es/
+//   event_table.cpp               rows or columns of numbers: text/, numpy/, hdf5/
 // recording_reader.hpp          plays a recording: origin, duration, sensor size, seeks, counts
 //   sensor_sizes.hpp              sensor size of a file that does not state it
 //   chunker.cpp                   events -> intervals of equal length, sorted
@@ -78,10 +77,8 @@ class SeekPoints {
   std::uint64_t next_ = 0;
 };
 
-/// Content of a stream of a recording.
 enum class StreamKind : std::uint8_t { events, frames, triggers, imu, other };
 
-/// A stream of a recording.
 struct StreamInfo {
   int id = 0;  ///< its ID in the file
   StreamKind kind = StreamKind::other;
@@ -109,7 +106,6 @@ constexpr int bytes_per_pixel(PixelFormat format) {
   return 0;
 }
 
-/// A frame of a camera.
 struct Frame {
   Microseconds t = 0;
   Microseconds begin = 0;
@@ -142,19 +138,16 @@ struct EventItem {
   std::span<const AbsoluteEvent> events;
 };
 
-/// A frame of a stream.
 struct FrameItem {
   std::size_t stream;
   Frame frame;
 };
 
-/// Triggers of a stream.
 struct TriggerItem {
   std::size_t stream;
   std::span<const Trigger> triggers;
 };
 
-/// IMU samples of a stream.
 struct ImuItem {
   std::size_t stream;
   std::span<const ImuSample> samples;

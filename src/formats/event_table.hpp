@@ -64,7 +64,6 @@ inline Label label_from(std::int64_t cause, std::int64_t object_class) {
 /// Meaning of the numbers in a column of polarities.
 class PolarityCode {
  public:
-  /// Counts the numbers of some rows.
   void count(double number);
 
   /// Chooses between 1 = ON, with 0 or -1 for OFF, and 2 = ON with 1 = OFF, by the counted numbers.
@@ -154,6 +153,64 @@ class RowValidator {
 
  private:
   std::uint64_t x_end_ = max_side, y_end_ = max_side;
+};
+
+struct TableNumber {
+  enum class Form : std::uint8_t {
+    integer,
+    decimals,  ///< two or more, as in 0.003820
+    floating,  ///< with an exponent, with one decimal, or in binary
+  };
+
+  double value;  ///< NaN if the field is not a number
+  Form form = Form::integer;
+};
+
+/// The first rows of a table, to detect columns and time unit that nothing else states.
+class TableSample {
+ public:
+  using Row = std::vector<TableNumber>;
+
+  /// Number of rows sufficient for detection.
+  static constexpr std::size_t max_rows = 256;
+  static constexpr std::size_t max_binary_rows = 4096;  ///< of files with random access
+
+  void add(Row row) { rows_.push_back(std::move(row)); }
+  bool empty() const { return rows_.empty(); }
+
+  /// True if any row is an event with these columns.
+  bool has_events(const Columns& columns) const { return !times_of(columns).empty(); }
+
+  /// True if every row has this many fields.
+  bool has_columns(std::size_t count) const;
+
+  /// True if there are several rows with this many fields, and the first one counts them, like an
+  /// index of pandas.
+  bool counts_rows(std::size_t columns) const;
+
+  /// Detects the columns. If only one column has fractions, it is the time. Otherwise returns the
+  /// first of txyp, xypt and xytp for which p is a polarity, x and y are coordinates and t never
+  /// decreases; with `is_xypt`, xypt is tried first. A column that counts rows may precede them.
+  /// Nothing if no order fits.
+  std::optional<Columns> find_columns(bool is_xypt = false) const;
+
+  /// Detects the time unit: seconds if a time has a fraction; otherwise microseconds, or
+  /// nanoseconds if only these give a plausible date. If `is_either`, the gaps between times decide
+  /// between the two. Nothing if they are ambiguous, if events were too far apart in this unit, or
+  /// if the times seem to be numbers of frames. `may_be_own`: it has the names or types of a
+  /// table that this project writes, whose events may be far apart if their polarity is 0 or 1.
+  std::optional<TimeUnit> find_unit(const Columns& columns, bool is_either,
+                                    bool may_be_own = false) const;
+
+  /// Detects the meaning of the polarities. Throws UnsupportedFormat if it is ambiguous.
+  PolarityCode find_polarities(const Columns& columns) const;
+
+ private:
+  std::vector<TableNumber> times_of(const Columns& columns) const;
+  std::optional<TimeUnit> guessed_unit(const Columns& columns, bool is_either,
+                                       const std::vector<TableNumber>& times) const;
+
+  std::vector<Row> rows_;
 };
 
 }  // namespace eventcamera

@@ -2,7 +2,7 @@
 #include "src/formats/file_formats.hpp"
 
 #include <algorithm>
-#include <string>
+#include <string_view>
 
 #include "src/core/byte_order.hpp"
 #include "src/formats/atis/atis_bin.hpp"
@@ -10,7 +10,6 @@
 #include "src/formats/magic.hpp"
 #include "src/formats/prophesee_header.hpp"
 #include "src/formats/text/csv_decoder.hpp"
-#include "src/formats/text/utf8_text.hpp"
 
 namespace eventcamera {
 namespace {
@@ -98,39 +97,6 @@ Likelihood match_dat(Bytes bytes) {
   return matches ? Likelihood::high : Likelihood::none;
 }
 
-/// Matches text whose columns have names, or that CsvDecoder decodes as several lines of events
-/// without exception. Ambiguous time units and events outside a sensor do not matter here; they are
-/// reported when the file is read.
-Likelihood match_csv(Bytes bytes) {
-  constexpr std::size_t max_bytes = 4096;
-  constexpr std::size_t min_events = 3;
-  bytes = bytes.first(std::min(bytes.size(), max_bytes));
-  const auto is_text = [](char letter) {
-    const auto byte = static_cast<std::uint8_t>(letter);
-    return byte >= ' ' || (byte >= '\t' && byte <= '\r');
-  };
-  std::string converted;
-  auto text = Utf8Text().text_of(bytes, converted);
-  if (!std::ranges::all_of(text, is_text)) return Likelihood::none;
-  text = text.substr(0, text.rfind('\n') + 1);
-  CsvDecoder decoder({.unit = TimeUnit::microseconds});
-  Decoded decoded;
-  try {
-    decoder.decode({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, decoded);
-    decoder.finish(decoded);
-  } catch (const UnsupportedFormat&) {
-    // The reader reports the error.
-    return decoder.has_names() ? Likelihood::certain : Likelihood::none;
-  }
-  const auto events = decoded.events.size() + decoder.corruption().outside;
-  return certain_if(decoder.has_names() ||
-                    (events >= min_events && decoder.corruption().places == 0));
-}
-
-Likelihood match_atis_bin(Bytes bytes) {
-  return is_atis_bin(bytes) ? Likelihood::high : Likelihood::none;
-}
-
 constexpr FileFormat table[] = {
     {.media_type = "application/x-aedat",
      .extensions = "aedat,aedat4",
@@ -177,11 +143,11 @@ constexpr FileFormat table[] = {
     {.media_type = "application/x-event-csv",
      .extensions = "csv,txt",
      .written = "csv; txt format=rpg",
-     .match = match_csv,
+     .match = [](Bytes bytes) { return certain_if(is_csv(bytes)); },
      .has_signature = false},
     {.media_type = "application/x-atis-bin",
      .extensions = "bin",
-     .match = match_atis_bin,
+     .match = [](Bytes bytes) { return is_atis_bin(bytes) ? Likelihood::high : Likelihood::none; },
      .has_signature = false},
 };
 

@@ -38,7 +38,6 @@ struct FileFormat {
 
 std::span<const FileFormat> file_formats();
 
-/// Returns the format with this media type, or null.
 const FileFormat* file_format_of(std::string_view media_type);
 
 /// Maximum number of bytes examined at the start of a file.

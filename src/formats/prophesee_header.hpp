@@ -57,7 +57,6 @@ class PropheseeHeader {
 
   bool ended() const { return ended_; }
 
-  /// True if there was any line.
   bool found() const { return found_; }
 
   /// Value of a key; empty if there is none.

@@ -187,11 +187,16 @@ void RecordingReader::interrupt() {
 
 void RecordingReader::begin_times() {
   input_.expect_more();
-  finishing_ = drained_ = false;
   shift_.reset();
   for (auto& stream : streams_) start_chunker(stream);
+  forget_output(0);
+}
+
+/// Continues with output from `start` on.
+void RecordingReader::forget_output(Microseconds start) {
+  finishing_ = drained_ = false;
   next_stream_ = 0;
-  newest_ = 0;
+  newest_ = start;
   output_due_.reset();
   triggers_.clear();
   imu_samples_.clear();
@@ -242,10 +247,9 @@ bool RecordingReader::survey() {
   start_due_ = false;
   learn_streams();
   while (!is_surveyed()) {
-    const auto item = next_item();
+    const auto item = survey_next();
     if (!item && !input_.is_finished()) return false;
     if (!item) break;
-    std::visit([this](const auto& some) { survey(some); }, *item);
     input_.hold(*item);
   }
   const auto has_begun = [](const Stream& stream) {
@@ -321,7 +325,7 @@ bool RecordingReader::is_origin_known() const {
     }
     const bool of_events = stream.info.kind == StreamKind::events;
     if (of_events && stream.info.size.width <= 0) {
-      // All bytes are there: hold on, to guess from as many events as possible.
+      // The file was read to its end: guess from as many events as possible.
       if (input_.is_finished()) return false;
       awaited |= !stream.is_sampled;
     }
@@ -339,11 +343,10 @@ std::optional<Microseconds> RecordingReader::earliest() const {
   return earliest;
 }
 
-/// Reads the next item without holding it. False if there is none.
-bool RecordingReader::survey_next() {
+std::optional<Item> RecordingReader::survey_next() {
   const auto item = next_item();
   if (item) std::visit([this](const auto& some) { survey(some); }, *item);
-  return item.has_value();
+  return item;
 }
 
 void RecordingReader::survey(const EventItem& item) {
@@ -447,13 +450,9 @@ void RecordingReader::restart(const std::optional<SeekPoint>& seek_point, Micros
 
 /// Prepares for items at `start` or later.
 void RecordingReader::begin_segment(Microseconds start, std::optional<Microseconds> stop) {
-  start_ = newest_ = start;
+  start_ = start;
   stop_ = stop;
-  finishing_ = drained_ = false;
-  next_stream_ = 0;
-  output_due_.reset();
-  triggers_.clear();
-  imu_samples_.clear();
+  forget_output(start);
   counts_ = {};
   for (std::size_t i = 0; i < streams_.size(); ++i) {
     auto& stream = streams_[i];
@@ -500,12 +499,11 @@ std::optional<RecordingReader::Output> RecordingReader::next() {
   while (true) {
     if (const auto output = next_output()) return output;
     if (drained_ || is_past_stop()) return std::nullopt;
-    if (const auto item = next_item()) {
+    if (const auto item = begun_ ? next_item() : survey_next()) {
       if (begun_) {
         std::visit([this](const auto& some) { add(some); }, *item);
         if (const auto found = disorder()) throw not_sorted(*found);
       } else {
-        std::visit([this](const auto& some) { survey(some); }, *item);
         input_.hold(*item);
         if (is_origin_known()) begin();
       }

@@ -50,7 +50,6 @@ class RecordingReader {
   /// before it is returned.
   enum class SizeFrom : std::uint8_t { file, user, assumption };
 
-  /// A stream of the file.
   struct Stream {
     StreamInfo info;
     SizeFrom size_from = SizeFrom::file;
@@ -117,7 +116,7 @@ class RecordingReader {
   /// Reads the pushed bytes and drops their items.
   void discard() { input_.discard(); }
 
-  /// Words: the next ones start anew, with unknown state and times.
+  /// Words: the next ones start over, with unknown state and times.
   void interrupt();
 
   /// Words: the next ones continue the words, but not the times of the intervals.
@@ -196,7 +195,6 @@ class RecordingReader {
   /// True if the file is a table that had to be sorted.
   bool is_sorted() const { return input_.is_sorted(); }
 
-  /// The first corruption of the file.
   const Corruption& corruption() const { return input_.decoder().corruption(); }
 
  private:
@@ -296,7 +294,7 @@ class RecordingReader {
   void learn_duration(std::optional<Microseconds> stated, bool is_whole);
   bool is_origin_known() const;
   std::optional<Microseconds> earliest() const;
-  bool survey_next();
+  std::optional<Item> survey_next();
   void survey(const EventItem& item);
   void survey(const FrameItem& item);
   void survey(const TriggerItem& /*item*/) {}
@@ -306,6 +304,7 @@ class RecordingReader {
   void begin_segment(Microseconds start, std::optional<Microseconds> stop);
 
   void show(std::size_t index);
+  void forget_output(Microseconds start);
   void start_chunker(Stream& stream);
   void add(const EventItem& item);
   void add(const FrameItem& item);

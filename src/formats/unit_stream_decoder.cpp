@@ -19,19 +19,6 @@ static Microseconds latest_of(std::span<const AbsoluteEvent> events) {
   return std::ranges::max(latest);
 }
 
-UnitStreamDecoder::UnitStreamDecoder(std::unique_ptr<UnitDecoder> decoder, SensorSize size) {
-  begin(std::move(decoder), size);
-}
-
-void UnitStreamDecoder::begin(std::unique_ptr<UnitDecoder> decoder, SensorSize size) {
-  decoder_ = std::move(decoder);
-  stream_.size = size;
-}
-
-std::size_t UnitStreamDecoder::read_header(std::span<const std::uint8_t>, bool) {
-  return 0;
-}
-
 /// Consumes the available part of the header from the front of rest_.
 void UnitStreamDecoder::read_headers(bool ended) {
   std::size_t taken = 0;
@@ -88,26 +75,22 @@ void UnitStreamDecoder::restore(const SeekPoint& seek_point) {
 
 std::size_t UnitStreamDecoder::read_units(std::span<const std::uint8_t> bytes, Decoded& out) {
   // Seek points are recorded between batches: a batch without events must end, too.
-  constexpr std::ptrdiff_t max_batch = 1 << 15;
-  const auto* from = bytes.data();
-  const auto* const to = from + bytes.size();
-  for (;;) {
+  constexpr std::size_t max_batch = 1 << 15;
+  for (std::size_t at = 0;;) {
     if (seek_points_.due(position_)) {
       const auto state = decoder_->state();
       seek_points_.note({latest_, position_, state.clock, state.rest});
     }
-    const auto count = std::min(to - from, max_batch);
-    batch_.open(out, static_cast<std::size_t>(count));
-    batch_.start = from;
-    batch_.start_position = position_;
+    const auto events = out.events.size();
     const auto triggers = out.triggers.size();
-    const auto* reached = decoder_->read(from, from + count, batch_);
-    latest_ = std::max(latest_, latest_of(batch_.close()));
+    const auto few = bytes.subspan(at, std::min(bytes.size() - at, max_batch));
+    const auto read = decoder_->decode(few, position_, batch_, out);
+    latest_ = std::max(latest_, latest_of(std::span(out.events).subspan(events)));
     for (const auto& trigger : std::span(out.triggers).subspan(triggers))
       latest_ = std::max(latest_, trigger.t);
-    if (reached == from) return bytes.size() - static_cast<std::size_t>(to - from);
-    position_ += static_cast<std::uint64_t>(reached - from);
-    from = reached;
+    if (read == 0) return at;
+    at += read;
+    position_ += read;
   }
 }
 

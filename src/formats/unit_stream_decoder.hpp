@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "src/core/byte_order.hpp"
@@ -27,24 +28,22 @@ class Batch {
 
   explicit Batch(Corruption& corruption) : corruption_(corruption) {}
 
-  /// Places the batch after the events of `out`, to which close() adds it. Its capacity fits this
-  /// number of bytes: allocating more takes longer than decoding a few bytes.
-  void open(Decoded& out, std::size_t bytes) {
+  /// Places the batch after the events of `out`, to which close() adds it. Its capacity fits
+  /// `bytes`: allocating more takes longer than decoding a few bytes.
+  void open(Decoded& out, std::span<const std::uint8_t> bytes, std::uint64_t position) {
     constexpr std::size_t max_size = 4096;
     const auto size =
-        std::min(max_size, events_per_unit + events_per_byte * std::min(bytes, max_size));
+        std::min(max_size, events_per_unit + events_per_byte * std::min(bytes.size(), max_size));
     out_ = &out;
-    begin_ = out.events.size();
-    out.events.resize(begin_ + size);
-    end = out.events.data() + begin_;
+    const auto begin = out.events.size();
+    out.events.resize(begin + size);
+    end = out.events.data() + begin;
     full_ = end + size - events_per_unit;
+    start_ = bytes.data();
+    start_position_ = position;
   }
 
-  /// Returns its events.
-  std::span<const AbsoluteEvent> close() {
-    out_->events.resize(static_cast<std::size_t>(end - out_->events.data()));
-    return std::span(out_->events).subspan(begin_);
-  }
+  void close() { out_->events.resize(static_cast<std::size_t>(end - out_->events.data())); }
 
   /// No further unit is read once `end` reaches this.
   AbsoluteEvent* full() const { return full_; }
@@ -53,7 +52,7 @@ class Batch {
 
   /// Records that the bytes at `at` are not a valid unit. Consecutive bad units count as one place.
   void bad(const std::uint8_t* at, std::size_t bytes, const char* what) {
-    const auto position = start_position + static_cast<std::uint64_t>(at - start);
+    const auto position = start_position_ + static_cast<std::uint64_t>(at - start_);
     if (position != bad_end_) corruption_.note(position, what);
     bad_end_ = position + bytes;
   }
@@ -61,13 +60,12 @@ class Batch {
   void outside(std::uint64_t events) { corruption_.outside += events; }
   void skipped(std::uint64_t items) { corruption_.skipped += items; }
 
-  AbsoluteEvent* end = nullptr;         ///< end of the events
-  const std::uint8_t* start = nullptr;  ///< start of the bytes
-  std::uint64_t start_position = 0;     ///< its offset in the file
+  AbsoluteEvent* end = nullptr;  ///< end of the events
 
  private:
   Decoded* out_ = nullptr;
-  std::size_t begin_ = 0;  ///< in the events of out_
+  const std::uint8_t* start_ = nullptr;  ///< start of the bytes
+  std::uint64_t start_position_ = 0;     ///< its offset in the file
   AbsoluteEvent* full_ = nullptr;
   Corruption& corruption_;
   std::uint64_t bad_end_ = ~std::uint64_t{0};
@@ -92,6 +90,16 @@ class UnitDecoder {
   virtual const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                                    Batch& batch) = 0;
 
+  /// Appends the events of the next batch of `bytes`, which are at `position` in the file, and
+  /// returns the number of bytes read.
+  std::size_t decode(std::span<const std::uint8_t> bytes, std::uint64_t position, Batch& batch,
+                     Decoded& out) {
+    batch.open(out, bytes, position);
+    const auto* const end = read(bytes.data(), bytes.data() + bytes.size(), batch);
+    batch.close();
+    return static_cast<std::size_t>(end - bytes.data());
+  }
+
   /// Complete state of the decoder; State{} at the start of the data.
   virtual State state() const = 0;
   virtual void restore(const State& state) = 0;
@@ -100,7 +108,6 @@ class UnitDecoder {
   UnitDecoder() = default;
 };
 
-/// Bounds of a sensor.
 class Bounds {
  public:
   /// A sensor of unknown size has sides of `default_side` pixels.
@@ -127,8 +134,9 @@ class Bounds {
 /// EventDecoder for formats with a header followed by units of a few bytes.
 class UnitStreamDecoder : public EventDecoder {
  public:
-  /// For data without a header.
-  UnitStreamDecoder(std::unique_ptr<UnitDecoder> decoder, SensorSize size);
+  UnitStreamDecoder(std::unique_ptr<UnitDecoder> decoder, SensorSize size) {
+    begin(std::move(decoder), size);
+  }
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) final;
   void finish(Decoded& out) final;
@@ -139,9 +147,14 @@ class UnitStreamDecoder : public EventDecoder {
   /// Consumes part of the header from the front of `bytes` and returns its size; 0 if more bytes
   /// are needed. Calls begin() at the end of the header. `ended`: no more bytes will follow. Throws
   /// UnsupportedFormat.
-  virtual std::size_t read_header(std::span<const std::uint8_t> bytes, bool ended);
+  virtual std::size_t read_header(std::span<const std::uint8_t> /*bytes*/, bool /*ended*/) {
+    return 0;
+  }
 
-  void begin(std::unique_ptr<UnitDecoder> decoder, SensorSize size);
+  void begin(std::unique_ptr<UnitDecoder> decoder, SensorSize size) {
+    decoder_ = std::move(decoder);
+    stream_.size = size;
+  }
 
   /// Position of the first unit; valid only after begin().
   std::uint64_t units_begin() const { return units_begin_; }

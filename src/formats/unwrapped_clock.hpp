@@ -26,7 +26,6 @@ class UnwrappedClock {
     return time();
   }
 
-  /// Time of the last timestamp.
   Microseconds time() const { return static_cast<Microseconds>(time_); }
   void restore(Microseconds time) { time_ = static_cast<std::uint64_t>(time); }
 

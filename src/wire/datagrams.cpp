@@ -12,12 +12,8 @@ namespace eventcamera {
 
 namespace {
 
-// Layouts of the datagrams of each format. A layout has
+// Layouts of the datagrams of each format. A layout derives from LayoutOf, and has
 //
-// - min_event_size and max_size, in bytes: the minimum size of an event, and the maximum size of
-//   a sent datagram; received ones may have any size;
-// - begin(first, out): writes the header, if any;
-// - size_of(event): bytes that write() would write;
 // - write(event, out): writes an event;
 // - read(bytes, in): reads a received datagram, and returns why it is invalid, or null.
 
@@ -34,7 +30,6 @@ class WrappedTime {
     return *expected_;
   }
 
-  /// Advances the expected time.
   void pass(Microseconds time) {
     if (expected_) *expected_ += time;
   }
@@ -46,7 +41,6 @@ class WrappedTime {
 /// Largest time that fits into 64-bit nanoseconds.
 constexpr Microseconds max_time = std::numeric_limits<Nanoseconds>::max() / 1000;
 
-/// A datagram being written.
 class Writer {
  public:
   std::size_t size() const { return size_; }
@@ -72,7 +66,6 @@ constexpr Fault no_time = "an event has no time";
 constexpr Fault time_range = "a time is out of range";
 constexpr Fault not_boolean = "a polarity is neither 0 nor 1";
 
-/// Contents of a received datagram.
 struct Reading {
   std::vector<AbsoluteEvent>& events;
   int width;   ///< of the sensor
@@ -93,19 +86,27 @@ bool is_on(const AbsoluteEvent& event) {
   return event.polarity() == Polarity::on;
 }
 
-/// 32-bit words: bit 31: no timestamp follows, 30-16: x, 15: ON, 14-0: y; then optionally a word
-/// with the low 32 bits of the time.
-template <bool has_timestamps>
-class Spif {
- public:
-  static constexpr std::size_t min_event_size = has_timestamps ? 8 : 4;
-  // 128 events: AEStream reads at most 512 bytes, without timestamps, and spiffer at most 1024.
-  static constexpr std::size_t max_size = 128 * min_event_size;
+/// Base of layouts, by default without a header, of events of the same size.
+template <std::size_t event_size, std::size_t max_sent>
+struct LayoutOf {
+  static constexpr std::size_t min_event_size = event_size;
+  /// Maximum size of a sent datagram; received ones may have any size.
+  static constexpr std::size_t max_size = max_sent;
 
-  explicit Spif(const DatagramSettings& settings) : order_(settings.byte_order) {}
-
+  /// Writes the header.
   void begin(Microseconds /*first*/, Writer& /*out*/) {}
-  std::size_t size_of(const AbsoluteEvent& /*event*/) const { return min_event_size; }
+
+  /// Bytes that write() would write.
+  std::size_t size_of(const AbsoluteEvent& /*event*/) const { return event_size; }
+};
+
+/// 32-bit words: bit 31: no timestamp follows, 30-16: x, 15: ON, 14-0: y; then optionally a word
+/// with the low 32 bits of the time. AEStream reads at most 512 bytes, without timestamps, and
+/// spiffer at most 1024.
+template <bool has_timestamps>
+class Spif : public LayoutOf<has_timestamps ? 8 : 4, 128 * (has_timestamps ? 8 : 4)> {
+ public:
+  explicit Spif(const DatagramSettings& settings) : order_(settings.byte_order) {}
 
   void write(const AbsoluteEvent& event, Writer& out) {
     out.put((has_timestamps ? 0U : untimed) | std::uint32_t{event.x} << 16 | event.y_p, order_);
@@ -140,14 +141,8 @@ class Spif {
 };
 
 /// Events of 13 bytes: 64-bit t, x, y, and a byte for ON.
-class T64X16Y16On8 {
+class T64X16Y16On8 : public LayoutOf<13, 1300> {
  public:
-  static constexpr std::size_t min_event_size = 13;
-  static constexpr std::size_t max_size = 100 * min_event_size;
-
-  void begin(Microseconds /*first*/, Writer& /*out*/) {}
-  std::size_t size_of(const AbsoluteEvent& /*event*/) const { return min_event_size; }
-
   void write(const AbsoluteEvent& event, Writer& out) {
     out.put(static_cast<std::uint64_t>(event.t));
     out.put(event.x);
@@ -171,14 +166,8 @@ class T64X16Y16On8 {
 };
 
 /// Events of 8 bytes: the low 32 bits of t, x, and y << 1 | ON.
-class T32X16Y15On1 {
+class T32X16Y15On1 : public LayoutOf<8, 800> {
  public:
-  static constexpr std::size_t min_event_size = 8;
-  static constexpr std::size_t max_size = 100 * min_event_size;
-
-  void begin(Microseconds /*first*/, Writer& /*out*/) {}
-  std::size_t size_of(const AbsoluteEvent& /*event*/) const { return min_event_size; }
-
   void write(const AbsoluteEvent& event, Writer& out) {
     out.put(static_cast<std::uint32_t>(event.t));
     out.put(event.x);
@@ -199,11 +188,8 @@ class T32X16Y15On1 {
 
 /// A 64-bit t, then the body of an Event Stream of DVS events. Rows count from the bottom, as in
 /// the tools of its authors.
-class EventStream {
+class EventStream : public LayoutOf<5, 1400> {
  public:
-  static constexpr std::size_t min_event_size = 5;
-  static constexpr std::size_t max_size = 1400;
-
   explicit EventStream(const DatagramSettings& settings) : height_(settings.height) {}
 
   void begin(Microseconds first, Writer& out) {
@@ -259,11 +245,8 @@ class EventStream {
 
 /// Optionally a sequence number, then pairs of a camera address and the low 32 bits of t;
 /// big-endian.
-class Jaer {
+class Jaer : public LayoutOf<8, 1400> {
  public:
-  static constexpr std::size_t min_event_size = 8;
-  static constexpr std::size_t max_size = 1400;
-
   explicit Jaer(const DatagramSettings& settings)
       : addresses_(settings.width == 128 && settings.height == 128 ? dvs128_layout : davis_layout),
         has_sequence_number_(settings.has_sequence_number),
@@ -277,8 +260,6 @@ class Jaer {
     sent_ = (sent_ + 1) & 0x7fff'ffff;
     if (has_sequence_number_) out.put(sent_, std::endian::big);
   }
-
-  std::size_t size_of(const AbsoluteEvent& /*event*/) const { return min_event_size; }
 
   void write(const AbsoluteEvent& event, Writer& out) {
     out.put(addresses_.address(width_ - 1 - event.x, height_ - 1 - event.y(), is_on(event)),

@@ -34,7 +34,6 @@ struct DatagramSettings {
   bool has_sequence_number = true;               ///< in datagrams of jAER
 };
 
-/// A packed datagram.
 struct Datagram {
   std::span<const std::uint8_t> bytes;
   std::size_t events;
@@ -56,10 +55,8 @@ class DatagramPacker {
   /// Adds events, which must be within the sensor, and sends each datagram that they complete.
   virtual void pack(std::span<const AbsoluteEvent> events, const Send& send) = 0;
 
-  /// Sends the incomplete datagram, if any.
   virtual void flush(const Send& send) = 0;
 
-  /// Drops the incomplete datagram, if any.
   virtual void drop() noexcept = 0;
 
   /// Time of the first event of the incomplete datagram, if any.

@@ -13,7 +13,6 @@
 #include "src/core/sensor_size.hpp"
 #include "src/formats/evt/evt3_words.hpp"
 #include "src/formats/evt/words.hpp"
-#include "src/wire/rtp_packer.hpp"
 #include "src/wire/rtp_payload.hpp"
 
 namespace eventcamera {
@@ -89,7 +88,6 @@ class PendingInterval {
 /// Packs events into RTP payloads, each of which can be decoded by itself.
 class RtpPacker {
  public:
-  /// Minimum of max_size.
   static constexpr std::size_t min_size = RtpPayloadHeader::size + 16;
 
   /// `first_event` is the number of the first event. Throws std::invalid_argument if the format

@@ -18,7 +18,6 @@ constexpr std::uint64_t max_silence = 1'000'000'000;
 /// Number of second senders that are remembered.
 constexpr std::size_t max_second_senders = 16;
 
-/// Appends the events of a packet.
 class Appender {
  public:
   Appender(const RtpPayloadHeader& header, std::vector<Event>& events)
@@ -137,17 +136,13 @@ std::optional<RtpPayloadHeader> RtpUnpacker::decode(const RtpPacket& packet) {
 bool RtpUnpacker::decode_evt3(const RtpPayloadHeader& header, std::span<const std::uint8_t> words) {
   evt3_->restore({});
   corruption_ = {};
-  words_.events.clear();
   words_.triggers.clear();
   Appender appender(header, events_);
   Batch batch(corruption_);
-  batch.start = words.data();
-  const auto* from = words.data();
-  const auto* const to = from + words.size();
-  while (from != to) {
-    batch.open(words_, static_cast<std::size_t>(to - from));
-    from = evt3_->read(from, to, batch);
-    for (const auto& event : batch.close())
+  while (!words.empty()) {
+    words_.events.clear();
+    words = words.subspan(evt3_->decode(words, 0, batch, words_));
+    for (const auto& event : words_.events)
       if (!appender.append(static_cast<std::uint64_t>(event.t), event.x, event.y_p)) return false;
   }
   return corruption_.places == 0 && corruption_.outside == 0 &&

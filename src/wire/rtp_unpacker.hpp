@@ -56,14 +56,12 @@ class RtpSenderTracker {
   /// them in a row, the sender must have restarted: they are no longer late.
   bool is_late(const RtpPacket& packet) const;
 
-  /// Counts a late packet.
   void drop_late(const RtpPacket& packet);
 
   /// Makes the sender of the packet, which is not late, the current one.
   Loss follow(const RtpPacket& packet, const RtpPayloadHeader& header);
 
  private:
-  /// Position in the stream of a sender.
   struct Position {
     std::uint32_t ssrc;
     std::uint16_t next_sequence_number;
@@ -161,7 +159,6 @@ class RtpUnpacker {
   bool is_of_interval(const RtpPacket& packet, const RtpPayloadHeader& header) const;
   /// Whether the decoded events may follow the current interval's.
   bool continues_interval() const;
-  /// Adds the decoded events to the interval.
   void add(const RtpPacket& packet, const RtpPayloadHeader& header);
   void close_interval();
 

@@ -7,7 +7,7 @@
 #include <csignal>
 
 #include "src/formats/byte_source.hpp"
-#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/hdf5/hdf5_decoder.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "tests/elements/pipeline.hpp"
 
@@ -39,14 +39,24 @@ std::vector<std::uint8_t> contents(const std::string& path) {
   return {text.begin(), text.end()};
 }
 
-Events read(const std::string& path) {
+Decoded read_all(const std::string& path) {
   MemoryBytes bytes(contents(path));
-  Hdf5Reader reader(bytes);
-  Events events;
-  while (reader.read(10'000, events) > 0) continue;
-  EXPECT_EQ(reader.corruption().places, 0U) << reader.corruption().first;
-  EXPECT_EQ(reader.size(), (SensorSize{width, height}));
-  return events;
+  const auto decoder = make_hdf5_decoder();
+  decoder->open(bytes);
+  Decoded out;
+  while (const auto item = decoder->next()) {
+    if (const auto* const some = std::get_if<EventItem>(&*item))
+      out.events.insert(out.events.end(), some->events.begin(), some->events.end());
+    if (const auto* const some = std::get_if<TriggerItem>(&*item))
+      out.triggers.insert(out.triggers.end(), some->triggers.begin(), some->triggers.end());
+  }
+  EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
+  EXPECT_EQ(decoder->streams().front().size, (SensorSize{width, height}));
+  return out;
+}
+
+Events read(const std::string& path) {
+  return read_all(path).events;
 }
 
 TEST(Hdf5Elements, WriteWhatTheyRead) {
@@ -92,11 +102,7 @@ TEST(Hdf5Elements, KeepTriggers) {
                 in_quotes(out) + "  t. ! queue");
   ASSERT_TRUE(player.play()) << player.error;
   EXPECT_TRUE(read(out) == events);
-  std::vector<Trigger> found;
-  MemoryBytes bytes(contents(out));
-  Hdf5Reader reader(bytes);
-  while (reader.read_triggers(1000, found) > 0) continue;
-  EXPECT_EQ(found, triggers);
+  EXPECT_EQ(read_all(out).triggers, triggers);
   EXPECT_EQ(player.stat("out", "triggers"), triggers.size());
 }
 

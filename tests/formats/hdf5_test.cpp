@@ -142,8 +142,7 @@ TEST_F(Hdf5, TriggersComeBack) {
 }
 
 TEST_F(Hdf5, WhatALayoutCannotHoldIsRefused) {
-  for (const auto& settings : {Settings{Hdf5Format::v2e, Compression::none, vga},
-                               {Hdf5Format::dsec, Compression::none, {}},
+  for (const auto& settings : {Settings{Hdf5Format::dsec, Compression::none, {}},
                                {Hdf5Format::metavision, Compression::none, {2049, 480}}})
     EXPECT_THROW(Hdf5Writer(path(), settings), std::invalid_argument);
   EXPECT_THROW(Hdf5Writer("/nowhere/at/all.h5", metavision), std::runtime_error);

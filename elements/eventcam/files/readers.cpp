@@ -19,7 +19,7 @@
 #include "src/formats/aedat/aedat_decoder.hpp"
 #endif
 #ifdef HAVE_HDF5
-#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/hdf5/hdf5_decoder.hpp"
 #endif
 #ifdef HAVE_NPZ
 #include "src/formats/numpy/npz.hpp"
@@ -251,7 +251,9 @@ static const EventReaderFormat csv = {
     .description = "Reads CSV files of events",
     .caps = "application/x-event-csv",
     .add_properties = add_table_properties,
-    .make_decoder = make_table_decoder<CsvDecoder>,
+    .make_decoder = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Decoder> {
+      return make_csv_decoder(table_settings(settings));
+    },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_reader_type(csv))
 
@@ -282,7 +284,9 @@ static const EventReaderFormat npy = {
     .description = "Reads NumPy files of events",
     .caps = "application/x-npy",
     .add_properties = add_table_properties,
-    .make_decoder = make_table_decoder<NpyDecoder>,
+    .make_decoder = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Decoder> {
+      return make_npy_decoder(table_settings(settings));
+    },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_reader_type(npy))
 
@@ -414,7 +418,7 @@ static const EventReaderFormat aedat = {
     .has_triggers = true,
     .add_properties = add_sensor_size,
     .make_decoder = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Decoder> {
-      return std::make_unique<AedatDecoder>(settings.sensor);
+      return make_aedat_decoder(settings.sensor);
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_reader_type(aedat))
@@ -455,11 +459,6 @@ static void add_topics(FormatProperties& properties) {
                        "first topic of events in the file, and all of images");
 }
 
-static std::unique_ptr<Decoder> make_bag_decoder(const GstCaps* /*caps*/,
-                                                 const FormatSettings& settings) {
-  return std::make_unique<BagDecoder>(settings.topics);
-}
-
 static const EventReaderFormat mcap = {
     .type_name = "GstEventMcapDemux",
     .long_name = "MCAP demuxer",
@@ -468,7 +467,10 @@ static const EventReaderFormat mcap = {
     .has_many_streams = true,
     .has_triggers = true,
     .add_properties = add_topics,
-    .make_decoder = make_bag_decoder,
+    .make_decoder =
+        [](const GstCaps*, const FormatSettings& settings) {
+          return make_bag_decoder(settings.topics);
+        },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventmcapdemux, "eventmcapdemux", GST_RANK_PRIMARY,
                             event_reader_type(mcap))
@@ -502,7 +504,10 @@ static const EventReaderFormat bag = {
     .has_many_streams = true,
     .has_triggers = true,
     .add_properties = add_topics,
-    .make_decoder = make_bag_decoder,
+    .make_decoder =
+        [](const GstCaps*, const FormatSettings& settings) {
+          return make_bag_decoder(settings.topics);
+        },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventbagdemux, "eventbagdemux", GST_RANK_PRIMARY,
                             event_reader_type(bag))

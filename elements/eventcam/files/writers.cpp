@@ -197,7 +197,7 @@ static const EventWriterFormat csv = {
     .create = [](SensorSize size, EventWriterFormat::Choice choice,
                  const GstCaps*) -> std::unique_ptr<Encoder> {
       const auto& named = csv_formats()[static_cast<std::size_t>(choice.variant)];
-      return std::make_unique<CsvEncoder>(named.format, size);
+      return make_csv_encoder(named.format, size);
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventcsvenc, "eventcsvenc", GST_RANK_PRIMARY, event_writer_type(csv))

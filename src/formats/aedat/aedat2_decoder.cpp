@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/aedat/aedat2_decoder.hpp"
-
 #include <algorithm>
 #include <cctype>
 #include <cstddef>
+#include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 
+#include "src/core/address_layout.hpp"
 #include "src/core/byte_order.hpp"
+#include "src/formats/aedat/aedat_decoder.hpp"
+#include "src/formats/aedat/aedat_header.hpp"
+#include "src/formats/byte_queue.hpp"
 
 namespace eventcamera {
 
@@ -19,7 +23,7 @@ struct Aedat2Camera {
   SensorSize size;
   AddressLayout layout;
 };
-inline constexpr Aedat2Camera aedat2_cameras[] = {
+constexpr Aedat2Camera aedat2_cameras[] = {
     {"dvs128", {128, 128}, dvs128_layout},     {"dvs640", {640, 480}, dvs640_layout},
     {"davis128", {128, 128}, davis_layout},    {"davis208", {208, 192}, davis_layout},
     {"davis240", {240, 180}, davis_layout},    {"sbret", {240, 180}, davis_layout},
@@ -27,7 +31,7 @@ inline constexpr Aedat2Camera aedat2_cameras[] = {
     {"davisrgbw640", {640, 480}, davis_layout}};
 
 /// Layout of addresses, inferred from their magnitude. v2e has no DVS128.
-inline AddressLayout aedat2_layout_of(std::span<const std::uint32_t> addresses, bool of_v2e) {
+AddressLayout aedat2_layout_of(std::span<const std::uint32_t> addresses, bool of_v2e) {
   const auto many_are_past = [&](std::uint32_t max_address) {
     const auto count = std::ranges::count_if(
         addresses, [&](std::uint32_t address) { return address > max_address; });
@@ -80,210 +84,226 @@ std::optional<SensorSize> size_in(std::string_view line) {
   return std::nullopt;
 }
 
-}  // namespace
-
-Aedat2Decoder::Aedat2Decoder(SensorSize assumed, Aedat2Version version)
-    : assumed_(assumed),
-      address_size_(version == Aedat2Version::one ? 2 : 4),
-      record_size_(address_size_ + 4),
-      header_(version == Aedat2Version::one ? "#!AER-DAT1.0" : "#!AER-DAT2.0",
-              "#End Of ASCII Header") {
-  if (version == Aedat2Version::one) layout_ = dvs128_layout;
-}
-
-void Aedat2Decoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
-  queue_.push(bytes);
-  if (header_read_ || read_header()) read_records(out);
-  queue_.keep();
-}
-
-void Aedat2Decoder::finish(Decoded& out) {
-  finished_ = true;
-  if (!header_read_ && !read_header()) {
-    if (header_.in_first_line()) throw header_.wrong_magic();
-    if (header_.in_line()) corruption_.note(queue_.position(), "truncated AEDAT header");
-    end_header();
+class Aedat2Decoder final : public EventDecoder {
+ public:
+  Aedat2Decoder(SensorSize assumed, Aedat2Version version)
+      : assumed_(assumed),
+        address_size_(version == Aedat2Version::one ? 2 : 4),
+        record_size_(address_size_ + 4),
+        header_(version == Aedat2Version::one ? "#!AER-DAT1.0" : "#!AER-DAT2.0",
+                "#End Of ASCII Header") {
+    if (version == Aedat2Version::one) layout_ = dvs128_layout;
   }
-  read_records(out);
-  if (queue_.size() > 0 && !scanning_)
-    corruption_.note(queue_.position(), "truncated AEDAT record");
-}
 
-bool Aedat2Decoder::read_header() {
-  auto next = header_.next(queue_);
-  for (; next == AedatHeader::Next::line; next = header_.next(queue_)) handle_line(header_.line());
-  if (next == AedatHeader::Next::more) return false;
-  end_header();
-  return true;
-}
+  void decode(std::span<const std::uint8_t> bytes, Decoded& out) override {
+    queue_.push(bytes);
+    if (header_read_ || read_header()) read_records(out);
+    queue_.keep();
+  }
 
-/// Evaluates a line of the header.
-void Aedat2Decoder::handle_line(const std::string& line) {
-  constexpr std::string_view chip = "# AEChip:";
-  if (line.starts_with(chip)) {
-    const auto name = lowercase(std::string_view(line).substr(chip.size()));
-    const auto* const camera = std::ranges::find_if(aedat2_cameras, [&](const Aedat2Camera& known) {
-      return name.find(known.name) != name.npos;
-    });
-    if (camera != std::end(aedat2_cameras)) {
-      stream_.size = camera->size;
-      layout_ = camera->layout;
-    } else if (assumed_ == SensorSize{}) {
-      throw UnsupportedFormat("unsupported camera in the AEDAT 2.0 header: " + name +
-                              "; set width and height");
+  void finish(Decoded& out) override {
+    finished_ = true;
+    if (!header_read_ && !read_header()) {
+      if (header_.in_first_line()) throw header_.wrong_magic();
+      if (header_.in_line()) corruption_.note(queue_.position(), "truncated AEDAT header");
+      header_read_ = true;
     }
-  } else if (stream_.size == SensorSize{}) {
-    stream_.size = size_in(line).value_or(SensorSize{});
+    read_records(out);
+    if (queue_.size() > 0 && !scanning_)
+      corruption_.note(queue_.position(), "truncated AEDAT record");
   }
-  if (line.find("v2e") != std::string::npos) of_v2e_ = true;
-}
 
-void Aedat2Decoder::end_header() {
-  header_read_ = true;
-  data_at_ = queue_.position();
-}
+ private:
+  struct Record {
+    std::uint32_t address;
+    std::int32_t t;
+  };
 
-/// False if more bytes are needed.
-bool Aedat2Decoder::find_camera() {
-  if (limit_ == SensorSize{}) {
-    if (!layout_ && !find_layout()) return false;
-    find_size();
+  bool read_header() {
+    auto next = header_.next(queue_);
+    for (; next == AedatHeader::Next::line; next = header_.next(queue_))
+      handle_line(header_.line());
+    header_read_ = next != AedatHeader::Next::more;
+    return header_read_;
   }
-  return true;
-}
 
-/// Determines the layout from the first addresses. False if more bytes are needed.
-bool Aedat2Decoder::find_layout() {
-  const auto wanted = record_size_ * layout_records;
-  if (queue_.size() < wanted && !finished_) return false;
-  const auto bytes = queue_.peek(std::min(queue_.size(), wanted));
-  std::vector<std::uint32_t> addresses;
-  for (std::size_t i = 0; i + record_size_ <= std::min(bytes.size(), wanted); i += record_size_)
-    addresses.push_back(record_at(bytes.data() + i).address);
-  layout_ = aedat2_layout_of(addresses, of_v2e_);
-  return true;
-}
-
-/// Uses the stated size, or the size of all cameras with this layout.
-void Aedat2Decoder::find_size() {
-  constexpr SensorSize max_davis_size{640, 480};
-  if (stream_.size == SensorSize{}) stream_.size = assumed_;
-  if (stream_.size == SensorSize{} && layout_ == dvs128_layout) stream_.size = {128, 128};
-  if (stream_.size == SensorSize{} && layout_ == dvs640_layout) stream_.size = {640, 480};
-  stream_.mirrored = stream_.size == SensorSize{};
-  limit_ = stream_.mirrored ? max_davis_size : stream_.size;
-}
-
-void Aedat2Decoder::read_records(Decoded& out) {
-  if (!find_camera()) return;
-  while (!scanning_ || scan()) {
-    const auto bytes = queue_.peek(record_size_);
-    const auto count = bytes.size() / record_size_;
-    std::size_t i = 0;
-    for (; i < count; ++i) {
-      const auto record = record_at(bytes.data() + i * record_size_);
-      if (!within_sensor(record.address) || far(record.t)) break;
-      append(record, out);
+  void handle_line(const std::string& line) {
+    constexpr std::string_view chip = "# AEChip:";
+    if (line.starts_with(chip)) {
+      const auto name = lowercase(std::string_view(line).substr(chip.size()));
+      const auto* const camera = std::ranges::find_if(
+          aedat2_cameras,
+          [&](const Aedat2Camera& known) { return name.find(known.name) != name.npos; });
+      if (camera != std::end(aedat2_cameras)) {
+        stream_.size = camera->size;
+        layout_ = camera->layout;
+      } else if (assumed_ == SensorSize{}) {
+        throw UnsupportedFormat("unsupported camera in the AEDAT 2.0 header: " + name +
+                                "; set width and height");
+      }
+    } else if (stream_.size == SensorSize{}) {
+      stream_.size = size_in(line).value_or(SensorSize{});
     }
-    queue_.consume(i * record_size_);
-    if (count == 0 || (i < count && !read_odd_record(out))) return;
+    if (line.find("v2e") != std::string::npos) of_v2e_ = true;
   }
-}
 
-/// Handles a record with an odd address or time. False if more bytes are needed.
-bool Aedat2Decoder::read_odd_record(Decoded& out) {
-  const auto wanted = record_size_ * (1 + records_after);
-  if (queue_.size() < wanted && !finished_) return false;
-  const auto bytes = queue_.peek(std::min(queue_.size(), wanted));
-  const auto after = std::min(wanted, bytes.size()) / record_size_ - 1;
-  const auto record = record_at(bytes.data());
-  bool sound_after = true;
-  for (std::size_t i = 1; i <= after; ++i)
-    sound_after &= within_sensor(record_at(bytes.data() + i * record_size_).address);
-  const bool within = within_sensor(record.address);
-  if (!sound_after) {
-    corruption_.note(queue_.position(), "no AEDAT records here");
-    queue_.consume(1);
-    scanning_ = true;
+  /// Determines the layout from the first addresses. False if more bytes are needed.
+  bool find_layout() {
+    const auto wanted = record_size_ * layout_records;
+    if (queue_.size() < wanted && !finished_) return false;
+    const auto bytes = queue_.peek(std::min(queue_.size(), wanted));
+    std::vector<std::uint32_t> addresses;
+    for (std::size_t i = 0; i + record_size_ <= std::min(bytes.size(), wanted); i += record_size_)
+      addresses.push_back(record_at(bytes.data() + i).address);
+    layout_ = aedat2_layout_of(addresses, of_v2e_);
     return true;
   }
-  if (!within)
-    ++corruption_.outside;
-  else if (after > 0 && !far(record_at(bytes.data() + record_size_).t))
-    corruption_.note(queue_.position(), "timestamp far from those around it");
-  else
-    append(record, out);
-  queue_.consume(record_size_);
-  return true;
-}
 
-/// Skips to the next valid records. False if more bytes are needed.
-bool Aedat2Decoder::scan() {
-  const auto wanted = record_size_ * sound_records;
-  while (true) {
-    const auto bytes = queue_.peek(wanted);
-    if (bytes.empty()) return false;
-    std::optional<std::int32_t> before;
-    bool sound = true;
-    for (std::size_t i = 0; i < sound_records && sound; ++i) {
-      const auto record = record_at(bytes.data() + i * record_size_);
-      const auto step = std::int64_t{record.t} - before.value_or(record.t);
-      sound = within_sensor(record.address) && step >= 0 && step < large_step;
-      before = record.t;
+  /// Uses the stated size, or the size of all cameras with this layout.
+  void find_size() {
+    constexpr SensorSize max_davis_size{640, 480};
+    if (stream_.size == SensorSize{}) stream_.size = assumed_;
+    if (stream_.size == SensorSize{} && layout_ == dvs128_layout) stream_.size = {128, 128};
+    if (stream_.size == SensorSize{} && layout_ == dvs640_layout) stream_.size = {640, 480};
+    stream_.mirrored = stream_.size == SensorSize{};
+    limit_ = stream_.mirrored ? max_davis_size : stream_.size;
+  }
+
+  void read_records(Decoded& out) {
+    if (limit_ == SensorSize{}) {
+      if (!layout_ && !find_layout()) return;
+      find_size();
     }
-    if (sound) break;
-    queue_.consume(1);
+    while (!scanning_ || scan()) {
+      const auto bytes = queue_.peek(record_size_);
+      const auto count = bytes.size() / record_size_;
+      std::size_t i = 0;
+      for (; i < count; ++i) {
+        const auto record = record_at(bytes.data() + i * record_size_);
+        if (!within_sensor(record.address) || far(record.t)) break;
+        append(record, out);
+      }
+      queue_.consume(i * record_size_);
+      if (count == 0 || (i < count && !read_odd_record(out))) return;
+    }
   }
-  scanning_ = false;
-  return true;
-}
 
-bool Aedat2Decoder::within_sensor(std::uint32_t address) const {
-  if (address > layout_->max_address) return false;
-  return layout_->is_sample(address) || layout_->is_external(address) ||
-         (layout_->x(address) < limit_.width && layout_->y(address) < limit_.height);
-}
-
-/// True if `t` is a large step from the last time, possibly over a wrap.
-bool Aedat2Decoder::far(std::int32_t t) const {
-  if (!last_) return false;
-  const auto step = unwrapped(t) - (wraps_ + *last_);
-  return step > large_step;
-}
-
-/// Returns the time with wraps undone.
-Microseconds Aedat2Decoder::unwrapped(std::int32_t t) const {
-  if (!last_) return t;
-  const auto step = std::int64_t{t} - *last_;
-  if (step < -max_disorder) return wraps_ + wrap + t;
-  if (step > wrap - max_disorder) return wraps_ - wrap + t;  // late event from before the wrap
-  return wraps_ + t;
-}
-
-void Aedat2Decoder::append(const Record& record, Decoded& out) {
-  const auto t = unwrapped(record.t);
-  if (!last_ || t > wraps_ + *last_) {
-    wraps_ = t - record.t;
-    last_ = record.t;
+  /// Handles a record with an odd address or time. False if more bytes are needed.
+  bool read_odd_record(Decoded& out) {
+    const auto wanted = record_size_ * (1 + records_after);
+    if (queue_.size() < wanted && !finished_) return false;
+    const auto bytes = queue_.peek(std::min(queue_.size(), wanted));
+    const auto after = std::min(wanted, bytes.size()) / record_size_ - 1;
+    const auto record = record_at(bytes.data());
+    bool sound_after = true;
+    for (std::size_t i = 1; i <= after; ++i)
+      sound_after &= within_sensor(record_at(bytes.data() + i * record_size_).address);
+    const bool within = within_sensor(record.address);
+    if (!sound_after) {
+      corruption_.note(queue_.position(), "no AEDAT records here");
+      queue_.consume(1);
+      scanning_ = true;
+      return true;
+    }
+    if (!within)
+      ++corruption_.outside;
+    else if (after > 0 && !far(record_at(bytes.data() + record_size_).t))
+      corruption_.note(queue_.position(), "timestamp far from those around it");
+    else
+      append(record, out);
+    queue_.consume(record_size_);
+    return true;
   }
-  const auto address = record.address;
-  if (layout_->is_sample(address)) return;
-  if (layout_->is_external(address)) {
-    out.triggers.push_back({t, 0, layout_->is_rising(address)});
-    return;
-  }
-  const auto x = layout_->x(address);
-  const auto y = layout_->y(address);
-  const auto polarity = layout_->is_on(address) ? Polarity::on : Polarity::off;
-  out.events.push_back(stream_.mirrored ? AbsoluteEvent::at(x, y, t, polarity)
-                                        : AbsoluteEvent::at(limit_.width - 1 - x,
-                                                            limit_.height - 1 - y, t, polarity));
-}
 
-Aedat2Decoder::Record Aedat2Decoder::record_at(const std::uint8_t* bytes) const {
-  constexpr auto big = std::endian::big;
-  return {address_size_ == 2 ? load<std::uint16_t>(bytes, big) : load<std::uint32_t>(bytes, big),
-          static_cast<std::int32_t>(load<std::uint32_t>(bytes + address_size_, big))};
+  /// Skips to the next valid records. False if more bytes are needed.
+  bool scan() {
+    const auto wanted = record_size_ * sound_records;
+    while (true) {
+      const auto bytes = queue_.peek(wanted);
+      if (bytes.empty()) return false;
+      std::optional<std::int32_t> before;
+      bool sound = true;
+      for (std::size_t i = 0; i < sound_records && sound; ++i) {
+        const auto record = record_at(bytes.data() + i * record_size_);
+        const auto step = std::int64_t{record.t} - before.value_or(record.t);
+        sound = within_sensor(record.address) && step >= 0 && step < large_step;
+        before = record.t;
+      }
+      if (sound) break;
+      queue_.consume(1);
+    }
+    scanning_ = false;
+    return true;
+  }
+
+  bool within_sensor(std::uint32_t address) const {
+    if (address > layout_->max_address) return false;
+    return layout_->is_sample(address) || layout_->is_external(address) ||
+           (layout_->x(address) < limit_.width && layout_->y(address) < limit_.height);
+  }
+
+  /// True if `t` is a large step from the last time, possibly over a wrap.
+  bool far(std::int32_t t) const {
+    if (!last_) return false;
+    return unwrapped(t) - (wraps_ + *last_) > large_step;
+  }
+
+  /// Returns the time with wraps undone.
+  Microseconds unwrapped(std::int32_t t) const {
+    if (!last_) return t;
+    const auto step = std::int64_t{t} - *last_;
+    if (step < -max_disorder) return wraps_ + wrap + t;
+    if (step > wrap - max_disorder) return wraps_ - wrap + t;  // late event from before the wrap
+    return wraps_ + t;
+  }
+
+  void append(const Record& record, Decoded& out) {
+    const auto t = unwrapped(record.t);
+    if (!last_ || t > wraps_ + *last_) {
+      wraps_ = t - record.t;
+      last_ = record.t;
+    }
+    const auto address = record.address;
+    if (layout_->is_sample(address)) return;
+    if (layout_->is_external(address)) {
+      out.triggers.push_back({t, 0, layout_->is_rising(address)});
+      return;
+    }
+    const auto x = layout_->x(address);
+    const auto y = layout_->y(address);
+    const auto polarity = layout_->is_on(address) ? Polarity::on : Polarity::off;
+    out.events.push_back(stream_.mirrored ? AbsoluteEvent::at(x, y, t, polarity)
+                                          : AbsoluteEvent::at(limit_.width - 1 - x,
+                                                              limit_.height - 1 - y, t, polarity));
+  }
+
+  Record record_at(const std::uint8_t* bytes) const {
+    constexpr auto big = std::endian::big;
+    return {address_size_ == 2 ? load<std::uint16_t>(bytes, big) : load<std::uint32_t>(bytes, big),
+            static_cast<std::int32_t>(load<std::uint32_t>(bytes + address_size_, big))};
+  }
+
+  const SensorSize assumed_;
+  const std::size_t address_size_;  ///< in bytes
+  const std::size_t record_size_;
+  ByteQueue queue_;
+  bool finished_ = false;
+
+  AedatHeader header_;
+  bool of_v2e_ = false;
+  bool header_read_ = false;
+  std::optional<AddressLayout> layout_;
+  SensorSize limit_;  ///< of rows and columns
+
+  bool scanning_ = false;             ///< searching for the next valid records
+  std::int64_t wraps_ = 0;            ///< sum of the wraps so far
+  std::optional<std::int32_t> last_;  ///< time of the latest record, as stored
+};
+
+}  // namespace
+
+std::unique_ptr<EventDecoder> make_aedat2_decoder(SensorSize assumed, Aedat2Version version) {
+  return std::make_unique<Aedat2Decoder>(assumed, version);
 }
 
 }  // namespace eventcamera

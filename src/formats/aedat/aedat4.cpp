@@ -80,6 +80,32 @@ constexpr std::array<KindText, 4> kinds{{
     {StreamKind::imu, "IMUS", "imu", "Inertial Measurement Unit data samples."},
 }};
 
+/// Reads the nodes outInfo/N and outInfo/N/info.
+void read_info_node(std::string_view xml, Aedat4Header& header) {
+  pugi::xml_document document;
+  // Keeps what precedes an error.
+  header.lists_streams =
+      document.load_buffer(xml.data(), xml.size(), parse_options, pugi::encoding_utf8);
+  const auto out_info = document.find_node([](const pugi::xml_node& node) {
+    return std::string_view(node.attribute("name").value()) == "outInfo";
+  });
+  auto& streams = header.streams;
+  for (const auto& stream : out_info.children("node")) {
+    const auto id = number(stream.attribute("name").value());
+    if (!id) continue;
+    if (streams.size() == max_streams ||
+        std::ranges::find(streams, *id, &StreamInfo::id) != streams.end()) {
+      header.lists_streams = false;
+      break;
+    }
+    const auto kind = aedat4_kind(value_of(stream, "typeIdentifier"));
+    // The error precedes its kind.
+    if (!header.lists_streams && kind == StreamKind::other) continue;
+    const auto details = stream.find_child_by_attribute("node", "name", "info");
+    streams.push_back({*id, kind, size_of(details), value_of(details, "source")});
+  }
+}
+
 }  // namespace
 
 StreamKind aedat4_kind(std::string_view identifier) {
@@ -87,29 +113,39 @@ StreamKind aedat4_kind(std::string_view identifier) {
   return text != kinds.end() ? text->kind : StreamKind::other;
 }
 
-/// Reads the nodes outInfo/N and outInfo/N/info.
-Aedat4InfoNode read_info_node(std::string_view xml) {
-  pugi::xml_document document;
-  Aedat4InfoNode info;
-  // Keeps what precedes an error.
-  info.whole = document.load_buffer(xml.data(), xml.size(), parse_options, pugi::encoding_utf8);
-  const auto out_info = document.find_node([](const pugi::xml_node& node) {
-    return std::string_view(node.attribute("name").value()) == "outInfo";
-  });
-  for (const auto& stream : out_info.children("node")) {
-    const auto id = number(stream.attribute("name").value());
-    if (!id) continue;
-    if (info.streams.size() == max_streams ||
-        std::ranges::find(info.streams, *id, &StreamInfo::id) != info.streams.end()) {
-      info.whole = false;
-      break;
-    }
-    const auto kind = aedat4_kind(value_of(stream, "typeIdentifier"));
-    if (!info.whole && kind == StreamKind::other) continue;  // the error precedes its kind
-    const auto details = stream.find_child_by_attribute("node", "name", "info");
-    info.streams.push_back({*id, kind, size_of(details), value_of(details, "source")});
+std::optional<Aedat4Header> read_aedat4_header(std::span<const std::uint8_t> bytes) {
+  constexpr std::size_t max_header = std::size_t{16} << 20;
+  constexpr auto size_at = aedat4_magic.size();
+  const auto known = std::min(bytes.size(), size_at);
+  if (!std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(known),
+                  aedat4_magic.begin()))
+    throw UnsupportedFormat("this is not AEDAT4: it does not begin with " +
+                            std::string(aedat4_magic.substr(0, size_at - 2)));
+  if (bytes.size() < size_at + aedat4::size_prefix) return std::nullopt;
+  const auto size = little_endian<std::uint32_t>(bytes.data() + size_at);
+  if (size > max_header)
+    throw UnsupportedFormat("this AEDAT4 file claims a header of " + std::to_string(size) +
+                            " bytes");
+  if (bytes.size() - size_at - aedat4::size_prefix < size) return std::nullopt;
+  const auto content = bytes.subspan(size_at, aedat4::size_prefix + size);
+  const auto* const root = aedat4::verified<aedat4::Header>(content, "IOHE");
+  if (root == nullptr) throw UnsupportedFormat("the header of this AEDAT4 file is corrupt");
+  if (root->compression() < 0 ||
+      root->compression() > static_cast<int>(Aedat4Compression::zstd_high))
+    throw UnsupportedFormat("this AEDAT4 file has an unknown compression, number " +
+                            std::to_string(root->compression()));
+  Aedat4Header header;
+  header.compression = static_cast<Aedat4Compression>(root->compression());
+  if (const auto xml = aedat4::elements_of(root->info_node()); xml.count > 0)
+    read_info_node({reinterpret_cast<const char*>(xml.data), xml.count}, header);
+  header.packets_at = size_at + content.size();
+  if (root->data_table_position() >= static_cast<std::int64_t>(header.packets_at)) {
+    header.table_at = static_cast<std::uint64_t>(root->data_table_position());
+    const auto* const field = reinterpret_cast<const flatbuffers::Table*>(root)->GetAddressOf(
+        aedat4::Header::VT_DATA_TABLE_POSITION);
+    header.table_field_at = size_at + static_cast<std::uint64_t>(field - content.data());
   }
-  return info;
+  return header;
 }
 
 std::string write_info_node(std::span<const StreamInfo> streams, Aedat4Compression compression) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -32,7 +33,6 @@ constexpr FrameCodec codec_of(Aedat4Compression compression) {
   return is_lz4 ? FrameCodec::lz4 : FrameCodec::zstd;
 }
 
-/// First line of the file.
 constexpr std::string_view aedat4_magic = "#!AER-DAT4.0\r\n";
 
 /// Meaning of a trigger's source, a number in the file: input and direction of the edge.
@@ -63,13 +63,18 @@ constexpr std::size_t aedat4_max_packet = std::size_t{64} << 20;
 /// Times beyond this, in either direction, are corrupt: 36,000 years.
 constexpr Microseconds aedat4_last_time = Microseconds{1} << 60;
 
-/// Content of the XML in an AEDAT4 header.
-struct Aedat4InfoNode {
+struct Aedat4Header {
+  Aedat4Compression compression = Aedat4Compression::none;
   std::vector<StreamInfo> streams;
-  bool whole = true;  ///< false: the XML is corrupt, and `streams` is incomplete
+  bool lists_streams = true;              ///< false: its XML is corrupt, and `streams` incomplete
+  std::uint64_t packets_at = 0;           ///< position of the first packet in the file
+  std::optional<std::uint64_t> table_at;  ///< position of the packet table, if stated
+  std::uint64_t table_field_at = 0;       ///< position of the field that states it
 };
 
-Aedat4InfoNode read_info_node(std::string_view xml);
+/// Parses the header at the start of a file; nothing if more bytes are needed. Throws
+/// UnsupportedFormat.
+std::optional<Aedat4Header> read_aedat4_header(std::span<const std::uint8_t> bytes);
 
 std::string write_info_node(std::span<const StreamInfo> streams, Aedat4Compression compression);
 
@@ -101,5 +106,13 @@ std::optional<std::uint64_t> aedat4_position_of(std::span<const Aedat4TableEntry
 
 /// Serializes the table, before compression.
 std::vector<std::uint8_t> aedat4_table_content(std::span<const Aedat4TableEntry> table);
+
+/// Decodes AEDAT4: streams of events, frames, triggers and IMU samples. Bytes are passed in pieces
+/// of any size; the split does not affect the result. A packet is the smallest unit that is read or
+/// skipped.
+///
+/// The ID of a trigger is the source of the edge: 0 the camera's input, 1 its generator, 2 a frame,
+/// 3 an exposure, 4 a reset of its clock, 5 a pulse at its input, 6 any other.
+std::unique_ptr<Decoder> make_aedat4_decoder();
 
 }  // namespace eventcamera

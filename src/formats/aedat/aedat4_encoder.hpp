@@ -15,10 +15,8 @@ namespace eventcamera {
 
 class Aedat4Builder;
 
-/// Creates a compressor of packets.
 FrameCompressor make_aedat4_compressor(Aedat4Compression compression);
 
-/// Settings of an AEDAT4 file.
 struct Aedat4Settings {
   SensorSize size;
   std::string source;  ///< name of the camera

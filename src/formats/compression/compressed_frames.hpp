@@ -23,7 +23,6 @@ class ExpansionLimit {
     return static_cast<std::size_t>(std::min<std::uint64_t>(limit, allowed_));
   }
 
-  /// Counts bytes that were decompressed.
   void count(std::size_t bytes) { allowed_ -= std::min<std::uint64_t>(bytes, allowed_); }
 
  private:
@@ -46,7 +45,6 @@ namespace eventcamera {
 /// Compressed formats that state where they end: LZ4 frames and Zstandard frames.
 enum class FrameCodec : std::uint8_t { lz4, zstd };
 
-/// Frees contexts of lz4 and zstd.
 struct CompressionDeleter {
   void operator()(LZ4F_dctx_s* context) const;
   void operator()(ZSTD_DCtx_s* context) const;
@@ -80,7 +78,6 @@ class FrameDecompressor {
 /// Compresses frames; without a codec, leaves them as they are.
 class FrameCompressor {
  public:
-  /// Compression levels.
   enum class Level : std::uint8_t { standard, high };
 
   explicit FrameCompressor(std::optional<FrameCodec> codec, Level level = Level::standard);

@@ -100,13 +100,8 @@ class DatDecoder final : public UnitStreamDecoder {
     if (source.read(begin, bytes) != bytes.size()) return;
     Corruption ignored;
     Batch batch(ignored);
-    const auto* from = bytes.data();
-    const auto* const to = from + bytes.size();
-    while (from != to) {
-      batch.open(out, static_cast<std::size_t>(to - from));
-      from = decoder->read(from, to, batch);
-      batch.close();
-    }
+    for (std::span<const std::uint8_t> rest = bytes; !rest.empty();)
+      rest = rest.subspan(decoder->decode(rest, begin, batch, out));
   }
 
  private:

@@ -8,7 +8,6 @@
 
 #include "src/formats/evt/cd_words.hpp"
 #include "src/formats/evt/words.hpp"
-#include "src/formats/time_base.hpp"
 #include "src/formats/word_writer.hpp"
 
 namespace eventcamera {
@@ -77,57 +76,38 @@ inline MaskedEvents first_masked(std::span<const AbsoluteEvent> events) {
 /// Format::put() encodes the first of the given events, with at most two words per event, and
 /// returns the number of encoded events.
 template <class Format>
-class CdEncoder final : public Encoder {
+class CdState {
  public:
-  CdEncoder(SensorSize size, std::string header)
-      : Encoder(std::move(header)), width_(static_cast<std::uint32_t>(size.width)) {}
-
-  std::uint64_t removed_time() const override { return gaps_.removed_time(); }
-
- private:
-  using Words = WordWriter<typename Format::Word>;
+  using Word = typename Format::Word;
+  using Words = WordWriter<Word>;
 
   static constexpr std::size_t words_at_once = 2 * events_at_once;
+  static constexpr auto max_trigger_id = CdWord::max_trigger_id;
+
+  explicit CdState(int width) : width_(static_cast<std::uint32_t>(width)) {}
+
+  bool is_at(std::uint64_t time) const { return time >> 6 == time_high_; }
+
+  void prepare(std::uint64_t time, Words& words) {
+    if (!is_at(time)) [[unlikely]]
+      put_time_high(time >> 6, words);
+  }
+
+  std::size_t write(std::span<const AbsoluteEvent> events, std::uint64_t time, Words& words) const {
+    return Format::put(events, time, width_, words);
+  }
+
+  static void write_trigger(const Trigger& trigger, std::uint64_t time, Words& words) {
+    words.put(Format::word(CdWord::of_trigger(Format::types.trigger, time, trigger)));
+  }
+
+ private:
   static constexpr int bits = 28;
   static constexpr std::uint64_t max_wraps = (GapLimiter::max_gap >> (bits + 6)) + 1;
   static constexpr std::uint64_t none = ~std::uint64_t{0};
 
-  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
-    const auto write = [&](std::span<const AbsoluteEvent> few, Words& words) {
-      const auto all = few;
-      while (!few.empty()) {
-        auto time = gaps_.written(few.front().t);
-        if (time >> 6 != time_high_) [[unlikely]] {
-          gaps_.pass(all.first(all.size() - few.size()));
-          time = advance_to(few.front().t, words);
-        }
-        few = few.subspan(Format::put(few, time, width_, words));
-      }
-      gaps_.pass(all);
-    };
-    write_events<typename Format::Word>(events, words_at_once, out, write);
-  }
-
-  bool append_trigger(const Trigger& trigger, std::vector<std::uint8_t>& out) override {
-    if (trigger.id > CdWord::max_trigger_id) return false;
-    Words words(out);
-    words.reserve(words_at_once);
-    const auto time = advance_to(trigger.t, words);
-    words.put(Format::word(CdWord::of_trigger(Format::types.trigger, time, trigger)));
-    return true;
-  }
-
-  static typename Format::Word time_high(std::uint64_t count) {
+  static Word time_high(std::uint64_t count) {
     return Format::word(CdWord::time_high(Format::types.time_high, count));
-  }
-
-  /// Writes the words up to a time, and returns it as it is written.
-  std::uint64_t advance_to(Microseconds t, Words& words) {
-    gaps_.advance_to(t);
-    const auto time = gaps_.written(t);
-    if (const auto count = time >> 6; count != time_high_) [[unlikely]]
-      put_time_high(count, words);
-    return time;
   }
 
   void put_time_high(std::uint64_t count, Words& words) {
@@ -166,20 +146,22 @@ class CdEncoder final : public Encoder {
   }
 
   std::uint32_t width_;
-  GapLimiter gaps_;
   std::uint64_t time_high_ = none;
 };
 
-/// 32-bit words: an event or a TIME_HIGH.
-struct Evt2 {
+/// Base of formats of 32-bit words.
+template <CdTypes word_types>
+struct ShortWords {
   using Word = std::uint32_t;
 
+  static constexpr CdTypes types = word_types;
   static constexpr bool has_steady_time = false;
 
-  static constexpr CdTypes types = evt2::types;
-
   static constexpr Word word(CdWord word) { return word.bits; }
+};
 
+/// An event or a TIME_HIGH.
+struct Evt2 : ShortWords<evt2::types> {
   static std::size_t put(std::span<const AbsoluteEvent> events, std::uint64_t time,
                          std::uint32_t /*width*/, WordWriter<Word>& words) {
     const auto& event = events.front();
@@ -281,16 +263,10 @@ class Evt21Decoder final : public CdDecoder<evt21::types> {
   }
 };
 
-/// 32-bit words: an event, a TIME_HIGH, or the start of a vector, whose second word is a mask.
-struct Evt4 {
-  using Word = std::uint32_t;
-
+/// An event, a TIME_HIGH, or the start of a vector, whose second word is a mask.
+struct Evt4 : ShortWords<evt4::types> {
   /// OpenEB's robust decoder drops events after a pause without TIME_HIGH.
   static constexpr bool has_steady_time = true;
-
-  static constexpr CdTypes types = evt4::types;
-
-  static constexpr Word word(CdWord word) { return word.bits; }
 
   static std::size_t put(std::span<const AbsoluteEvent> events, std::uint64_t time,
                          std::uint32_t width, WordWriter<Word>& words) {
@@ -374,15 +350,17 @@ std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size, std
     throw std::invalid_argument("EVT words support sensors of 1x1 to 2048x2048 pixels");
   switch (format) {
     case EvtFormat::evt2:
-      return std::make_unique<CdEncoder<Evt2>>(size, std::move(header));
+      return std::make_unique<WordEncoder<CdState<Evt2>>>(size, std::move(header));
     case EvtFormat::evt21:
-      return std::make_unique<CdEncoder<Evt21<EvtFormat::evt21>>>(size, std::move(header));
+      return std::make_unique<WordEncoder<CdState<Evt21<EvtFormat::evt21>>>>(size,
+                                                                             std::move(header));
     case EvtFormat::evt21_legacy:
-      return std::make_unique<CdEncoder<Evt21<EvtFormat::evt21_legacy>>>(size, std::move(header));
+      return std::make_unique<WordEncoder<CdState<Evt21<EvtFormat::evt21_legacy>>>>(
+          size, std::move(header));
     case EvtFormat::evt3:
       return make_evt3_encoder(size, std::move(header));
     case EvtFormat::evt4:
-      return std::make_unique<CdEncoder<Evt4>>(size, std::move(header));
+      return std::make_unique<WordEncoder<CdState<Evt4>>>(size, std::move(header));
   }
   throw std::invalid_argument("unknown EVT format");
 }

@@ -5,7 +5,6 @@
 
 #include "src/formats/evt/evt3_words.hpp"
 #include "src/formats/evt/words.hpp"
-#include "src/formats/time_base.hpp"
 
 namespace eventcamera {
 namespace {
@@ -103,7 +102,7 @@ class Evt3Decoder final : public UnitDecoder {
         base_ = word & 0x7ff;
         polarity_ = word & polarity_bit;
         if (to - at < 8) break;
-        // Complete vector, as cameras and Evt3Encoder write it.
+        // Complete vector, as cameras and Evt3Words writes it.
         const auto masks = little_endian<std::uint64_t>(at) >> 16;
         if ((masks & 0xf000f000f000) != 0x500040004000) break;
         const auto mask = (masks & 0xfff) | (masks >> 4 & 0xfff000) | (masks >> 8 & 0xff000000);
@@ -169,53 +168,21 @@ class Evt3Decoder final : public UnitDecoder {
   std::uint32_t polarity_ = 0;  // polarity of vectors
 };
 
-class Evt3Encoder final : public Encoder {
+class Evt3State : public Evt3Words {
  public:
-  Evt3Encoder(SensorSize size, std::string header)
-      : Encoder(std::move(header)), state_(size.width) {}
-
-  std::uint64_t removed_time() const override { return gaps_.removed_time(); }
-
- private:
-  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
-    const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint16_t>& words) {
-      const auto all = few;
-      while (!few.empty()) {
-        auto time = gaps_.written(few.front().t);
-        if (state_.steps_to(time) != 0) [[unlikely]] {
-          gaps_.pass(all.first(all.size() - few.size()));
-          time = written(few.front().t, words);
-        }
-        few = few.subspan(state_.write(few, time, words));
-      }
-      gaps_.pass(all);
-    };
-    write_events<std::uint16_t>(events, words_at_once, out, write);
-  }
-
-  bool append_trigger(const Trigger& trigger, std::vector<std::uint8_t>& out) override {
-    if (trigger.id > Evt3Words::max_trigger_id) return false;
-    WordWriter<std::uint16_t> words(out);
-    words.reserve(words_at_once);
-    const auto time = written(trigger.t, words);
-    state_.write_trigger(trigger, time, words);
-    return true;
-  }
+  using Word = std::uint16_t;
+  using Evt3Words::Evt3Words;
 
   static constexpr std::size_t words_at_once = 4 * events_at_once;
 
-  /// Returns the time to write, after reserving space for the words of a pause.
-  std::uint64_t written(Microseconds t, WordWriter<std::uint16_t>& words) {
-    gaps_.advance_to(t);
-    const auto time = gaps_.written(t);
-    const auto steps = state_.steps_to(time);
-    if (steps > 1 && steps <= Evt3Words::max_steps) [[unlikely]]
-      words.reserve(steps + words_at_once);
-    return time;
-  }
+  bool is_at(std::uint64_t time) const { return steps_to(time) == 0; }
 
-  Evt3Words state_;
-  GapLimiter gaps_;
+  /// Reserves space for the words of a pause.
+  void prepare(std::uint64_t time, WordWriter<Word>& words) const {
+    const auto steps = steps_to(time);
+    if (steps > 1 && steps <= max_steps) [[unlikely]]
+      words.reserve(steps + words_at_once);
+  }
 };
 
 }  // namespace
@@ -225,7 +192,7 @@ std::unique_ptr<UnitDecoder> make_evt3_unit_decoder(SensorSize size) {
 }
 
 std::unique_ptr<Encoder> make_evt3_encoder(SensorSize size, std::string header) {
-  return std::make_unique<Evt3Encoder>(size, std::move(header));
+  return std::make_unique<WordEncoder<Evt3State>>(size, std::move(header));
 }
 
 }  // namespace eventcamera

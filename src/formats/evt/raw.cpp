@@ -2,6 +2,7 @@
 #include "src/formats/evt/raw.hpp"
 
 #include <algorithm>
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,7 +14,6 @@
 namespace eventcamera {
 namespace {
 
-/// Names of a format in RAW headers.
 struct Name {
   EvtFormat format;
   std::string_view version;
@@ -40,24 +40,18 @@ std::string option(const std::string& format, const std::string& key) {
 /// Size of the sensor of a camera of Prophesee, by the numbers of its systems in OpenEB, and by the
 /// names of its plugin, sensor or generation; 0x0 if unknown.
 SensorSize size_of_camera(const PropheseeHeader& header) {
-  struct Sensor {
+  struct Camera {
     SensorSize size;
-    std::span<const std::string_view> names;
-    std::span<const std::string_view> systems;
+    std::initializer_list<std::string_view> names;
+    std::initializer_list<std::string_view> systems;
   };
-  constexpr std::string_view vga[] = {"gen3", "3.0", "3.1"};
-  constexpr std::string_view vga_systems[] = {"25", "29", "33", "34", "35", "40", "41"};
-  constexpr std::string_view hd[] = {"gen4", "imx636", "imx646", "4.0", "4.1", "4.2"};
-  constexpr std::string_view hd_systems[] = {"30", "31", "32", "39", "46", "48",
-                                             "49", "50", "53", "58", "66"};
-  constexpr std::string_view imx637[] = {"imx637", "imx647"};
-  constexpr std::string_view imx637_systems[] = {"52", "54"};
-  constexpr std::string_view genx320[] = {"genx320", "saphir"};
-  constexpr std::string_view genx320_systems[] = {"55", "59", "64"};
-  const Sensor cameras[] = {{{320, 320}, genx320, genx320_systems},
-                            {{640, 512}, imx637, imx637_systems},
-                            {{640, 480}, vga, vga_systems},
-                            {{1280, 720}, hd, hd_systems}};
+  const Camera cameras[] = {
+      {{320, 320}, {"genx320", "saphir"}, {"55", "59", "64"}},
+      {{640, 512}, {"imx637", "imx647"}, {"52", "54"}},
+      {{640, 480}, {"gen3", "3.0", "3.1"}, {"25", "29", "33", "34", "35", "40", "41"}},
+      {{1280, 720},
+       {"gen4", "imx636", "imx646", "4.0", "4.1", "4.2"},
+       {"30", "31", "32", "39", "46", "48", "49", "50", "53", "58", "66"}}};
   for (const auto* const key : {"plugin_name", "sensor_name", "sensor_generation"}) {
     auto text = header.value(key);
     std::ranges::transform(text, text.begin(), [](char letter) {

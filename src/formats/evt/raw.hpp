@@ -11,7 +11,6 @@
 
 namespace eventcamera {
 
-/// Formats of the words in a RAW file.
 enum class EvtFormat { evt2, evt21, evt21_legacy, evt3, evt4 };
 
 /// Name of a format, such as "EVT3". It does not include the order of the halves of EVT21 words.

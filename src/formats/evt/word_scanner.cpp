@@ -16,7 +16,6 @@
 namespace eventcamera {
 namespace {
 
-/// Meaning of a word in its place.
 struct ScannedWord {
   enum class Kind : std::uint8_t {
     time_high,  ///< with a count of the clock
@@ -249,7 +248,6 @@ class CameraClock {
   }
   bool continues(std::uint32_t count) const { return continues(high_, count); }
 
-  /// Advances by a small step.
   void follow(std::uint32_t count) {
     if (step(high_, count) == 0) return;
     before_ = high_;
@@ -427,8 +425,8 @@ class Scanner final : public WordScanner {
 
   /// Reads the stretches after the TIME_HIGH at committed_at_. In a transfer, one is enough,
   /// because its words begin where it begins. Among loose bytes, several distinguish words from
-  /// what looks like them; if one of them continues the clock and the first does not, the first has
-  /// a wrong time.
+  /// bytes that look like them; if one of them continues the clock and the first does not, the
+  /// first has a wrong time.
   Trial try_stretches(Words& words, std::uint32_t first) const {
     const int needed = is_padded_ ? 1 : 4;
     // Whether an old transfer came again is not known while its time is the last one.
@@ -537,7 +535,7 @@ class Scanner final : public WordScanner {
     elapsed_ = 0;
   }
 
-  /// Appends what was decided to be passed on.
+  /// Appends the committed words.
   void append_pending(std::vector<Piece>& out) {
     if (committed_size_ == 0) return;
     Piece next{.words = {piece_.words.begin() + static_cast<std::ptrdiff_t>(committed_size_),
@@ -560,7 +558,6 @@ class Scanner final : public WordScanner {
     read_ = 0;
   }
 
-  /// Counts the next bytes as lost.
   void lose(Words& words, std::ptrdiff_t count) {
     if (count == size) {
       const auto word = words.read(word_at(committed_at_));

@@ -94,23 +94,9 @@ bool read_runs(ByteCursor& reader, std::span<AbsoluteEvent> events, const SetVal
   return true;
 }
 
-void put_rows(std::span<const AbsoluteEvent> events, ByteAppender& writer) {
-  put_runs<std::uint16_t, 31>(events, writer, [](const AbsoluteEvent& event) { return event.y(); });
-}
-
 bool read_rows(ByteCursor& reader, std::span<AbsoluteEvent> events) {
   return read_runs<std::uint16_t, 31>(reader, events,
                                       [](AbsoluteEvent& event, std::uint16_t y) { event.y_p = y; });
-}
-
-void put_polarities(std::span<const AbsoluteEvent> events, ByteAppender& writer) {
-  put_runs<std::uint8_t, 127>(events, writer, polarity_bit);
-}
-
-bool read_polarities(ByteCursor& reader, std::span<AbsoluteEvent> events) {
-  return read_runs<std::uint8_t, 127>(reader, events, [](AbsoluteEvent& event, std::uint16_t on) {
-    event.y_p |= static_cast<std::uint16_t>(on << 15);
-  });
 }
 
 void put_columns(std::span<const AbsoluteEvent> events, ByteAppender& writer) {
@@ -240,12 +226,12 @@ void encode_ecf(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>
     put_all_packed(events, writer);
     return;
   }
-  put_rows(events, writer);
+  put_runs<std::uint16_t, 31>(events, writer, [](const AbsoluteEvent& event) { return event.y(); });
   if (packed == xp_packed) {
     put_xp_packed(events, writer);
   } else {
     put_columns(events, writer);
-    put_polarities(events, writer);
+    put_runs<std::uint8_t, 127>(events, writer, polarity_bit);
   }
 }
 
@@ -264,8 +250,11 @@ bool decode_ecf(std::span<const std::uint8_t> chunk, std::vector<AbsoluteEvent>&
   } else if ((head & xp_packed) != 0) {
     sound = sound && read_rows(reader, events) && read_xp_packed(reader, events);
   } else {
-    sound = sound && read_rows(reader, events) && read_columns(reader, events) &&
-            read_polarities(reader, events);
+    sound =
+        sound && read_rows(reader, events) && read_columns(reader, events) &&
+        read_runs<std::uint8_t, 127>(reader, events, [](AbsoluteEvent& event, std::uint16_t on) {
+          event.y_p |= static_cast<std::uint16_t>(on << 15);
+        });
   }
   if (!sound) out.resize(begin);
   return sound;

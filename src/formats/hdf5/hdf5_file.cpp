@@ -180,10 +180,6 @@ void Hdf5Output::fail(int error) const {
   throw std::system_error(error, std::generic_category(), path_.string() + " cannot be written");
 }
 
-void Hdf5Output::check() const {
-  if (error_ != 0) fail(error_);
-}
-
 void Hdf5Output::read(std::uint64_t position, std::span<std::uint8_t> out) const {
   auto left = out;
   for (auto at = position; !left.empty();) {
@@ -219,10 +215,6 @@ void Hdf5Output::write(std::uint64_t position, std::span<const std::uint8_t> byt
 
 void Hdf5Output::hold(std::uint64_t position, std::span<const std::uint8_t> bytes) {
   if (!bytes.empty()) held_.push_back({position, {bytes.begin(), bytes.end()}});
-}
-
-void Hdf5Output::truncate(std::uint64_t size) {
-  size_ = size;
 }
 
 void Hdf5Output::start_commit() {

@@ -44,12 +44,14 @@ class Hdf5Output {
   void finish();
 
   /// Throws std::system_error if a write failed.
-  void check() const;
+  void check() const {
+    if (error_ != 0) fail(error_);
+  }
 
   // Called by the library.
   void read(std::uint64_t position, std::span<std::uint8_t> out) const;
   void write(std::uint64_t position, std::span<const std::uint8_t> bytes);
-  void truncate(std::uint64_t size);
+  void truncate(std::uint64_t size) { size_ = size; }
   std::uint64_t size() const { return size_; }
 
  private:

@@ -13,7 +13,6 @@
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_dataset.hpp"
 #include "src/formats/hdf5/hdf5_handle.hpp"
-#include "src/formats/table_sample.hpp"
 #include "src/formats/unwrapped_clock.hpp"
 
 namespace eventcamera {
@@ -106,9 +105,7 @@ struct NamedColumns {
 class EcfTable final : public Hdf5Table {
  public:
   EcfTable(Hdf5Dataset events, SensorSize size)
-      : Hdf5Table(Hdf5Format::metavision),
-        events_(std::move(events)),
-        chunk_rows_(events_.chunk_rows()) {
+      : events_(std::move(events)), chunk_rows_(events_.chunk_rows()) {
     if (chunk_rows_ == 0 || chunk_rows_ > ecf_max_events)
       throw UnsupportedFormat("HDF5 dataset /CD/events has chunks too large for ECF");
     size_ = size;
@@ -167,9 +164,64 @@ class EcfTable final : public Hdf5Table {
   std::vector<AbsoluteEvent> decoded_;
 };
 
-/// Base of tables whose events are plain numbers.
-class NumberTable : public Hdf5Table {
+/// Events as plain numbers: rows of one dataset, or a dataset for each column.
+class NumberTable final : public Hdf5Table {
  public:
+  /// A dataset with the numbers of each event in a row: v2e, MVSEC, Metavision without compression,
+  /// and others. Detects the order and the unit unless they are known. Throws UnsupportedFormat.
+  NumberTable(Hdf5Dataset events, const std::string& path, SensorSize size,
+              std::optional<ColumnOrder> order, std::optional<TimeUnit> unit) {
+    const bool is_unsigned_32 = events.rank() == 2 && events.is_unsigned_32();
+    const bool are_integers = events.is_integers();
+    datasets_.push_back(std::move(events));
+    open_datasets();
+    size_ = size;
+    const auto sample = read_sample();
+    Columns columns(event_columns);
+    if (order) {
+      for (std::size_t i = 0; i < event_columns; ++i)
+        columns[(*order)[i]] = static_cast<EventColumn>(i);
+    } else {
+      const auto found = sample.find_columns();
+      if (!found || found->size() != event_columns)
+        throw UnsupportedFormat("unknown columns in the HDF5 dataset " + path +
+                                "; set column-order, or store datasets named t, x, y and p");
+      columns = *found;
+    }
+    for (std::size_t i = 0; i < event_columns; ++i)
+      places_[static_cast<std::size_t>(*columns[i])] = {0, i};
+    step_ = event_columns;
+    if (!unit && is_unsigned_32) unit = TimeUnit::microseconds;
+    set_unit(detect(sample, columns, unit, !are_integers, path), is_unsigned_32);
+  }
+
+  /// Datasets of a group that hold the columns t, x, y and p: the DSEC layout, and others without
+  /// its index. `group` is empty, or ends with a slash. Throws UnsupportedFormat.
+  NumberTable(hid_t file, const std::string& group, const NamedColumns& names,
+              std::optional<TimeUnit> unit) {
+    for (const auto& name : names.names) {
+      const auto& column = datasets_.emplace_back(file, group + name);
+      if (column.rank() != 1 || !column.is_numbers())
+        throw UnsupportedFormat("HDF5 group /" + group + " must hold columns of numbers");
+    }
+    open_datasets();
+    for (std::size_t i = 0; i < all_columns; ++i) places_[i] = {i, 0};
+    read_offset(file);
+    open_index(file);
+    const bool is_unsigned_32 = times().is_unsigned_32();
+    // Nanoseconds of 32 bits would wrap after four seconds.
+    if (!unit && (index_ || (is_unsigned_32 && !names.unit))) unit = TimeUnit::microseconds;
+    set_unit(detect(read_sample(), *columns_of("txyp"), unit ? unit : names.unit,
+                    !times().is_integers(), group + names.names[0]),
+             is_unsigned_32);
+    open_labels(file, group);
+    size_ = size_of_attributes(file);
+    if (size_ == SensorSize{} && !group.empty()) {
+      const Hdf5Handle events(H5Gopen2(file, group.c_str(), H5P_DEFAULT), H5Gclose);
+      size_ = size_of_attributes(events.get());
+    }
+  }
+
   std::uint64_t read(std::uint64_t row, RowValidator& validator, std::vector<AbsoluteEvent>& out,
                      Corruption& corruption) override {
     auto end = block_end(row, rows_);
@@ -182,26 +234,46 @@ class NumberTable : public Hdf5Table {
       note(corruption, *unread, row, "unreadable part of an HDF5 dataset");
       return end;
     }
-    if (wraps_ && row != next_row_) clock_.restore(unwrapped(row, t_.front()));
+    const auto column = [&](EventColumn of) {
+      const auto [dataset, number] = places_[static_cast<std::size_t>(of)];
+      return numbers_[dataset].data() + number;
+    };
+    const auto* const ts = column(EventColumn::t);
+    const auto* const xs = column(EventColumn::x);
+    const auto* const ys = column(EventColumn::y);
+    const auto* const ps = column(EventColumn::p);
+    const auto* const causes = has_labels_ ? column(EventColumn::cause) : nullptr;
+    const auto* const classes = has_labels_ ? column(EventColumn::object_class) : nullptr;
+    if (wraps_ && row != next_row_) clock_.restore(unwrapped(row, *ts));
     next_row_ = end;
-    for (std::size_t i = 0; i < t_.size(); ++i) {
-      Microseconds t = wraps_ ? clock_.follow(static_cast<std::uint32_t>(t_[i])) : t_[i];
+    for (std::size_t i = 0; i < (end - row) * step_; i += step_) {
+      Microseconds t = wraps_ ? clock_.follow(static_cast<std::uint32_t>(ts[i])) : ts[i];
       if (__builtin_add_overflow(t, offset_, &t)) {
-        note(corruption, t_dataset(), row, "timestamp out of range");
+        note(corruption, times(), row, "timestamp out of range");
         continue;
       }
-      const auto on = polarities_.is_on(p_[i]);
+      const auto on = polarities_.is_on(ps[i]);
       if (!on) {
-        note(corruption, t_dataset(), row, "polarity other than 0, 1 and -1");
+        note(corruption, times(), row, "polarity other than 0, 1 and -1");
         continue;
       }
-      const auto label = has_labels_ ? label_from(cause_[i], object_class_[i]) : Label{};
-      validator.append(t, x_[i], y_[i], *on, label, out, corruption);
+      const auto label = has_labels_ ? label_from(causes[i], classes[i]) : Label{};
+      validator.append(t, xs[i], ys[i], *on, label, out, corruption);
     }
     return end;
   }
 
   std::uint64_t row_before(Microseconds t) override {
+    Microseconds since = 0;
+    if (index_ && !__builtin_sub_overflow(t, offset_, &since) && since >= 0) {
+      const auto row = indexed(static_cast<std::uint64_t>(since / 1000));
+      // Ignore the index if it is wrong.
+      if (row && *row <= rows_ && *row > 0) {
+        const auto before = time_at(*row - 1);
+        const auto at = time_at(*row);
+        if (before && *before < t && (!at || *at >= t - 1000)) return *row;
+      }
+    }
     // Treats unreadable rows as late, so that no event is skipped.
     return first_row(rows_, [&](std::uint64_t row) {
       const auto time = time_at(row);
@@ -217,20 +289,49 @@ class NumberTable : public Hdf5Table {
     return t;
   }
 
- protected:
-  using Hdf5Table::Hdf5Table;
+ private:
   using Clock = UnwrappedClock<32>;
 
-  virtual Hdf5Dataset& t_dataset() = 0;
-  virtual std::size_t t_column() const { return 0; }  ///< in the rows of t_dataset()
+  /// Dataset of a column, and the column's number in its rows.
+  struct Place {
+    std::size_t dataset;
+    std::size_t number;
+  };
 
-  /// Reads t_, x_, y_ and p_, and the labels, if there are any. Returns the dataset that could not
-  /// be read, or nullptr.
-  virtual const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) = 0;
+  /// The clock at a row.
+  struct Sample {
+    std::uint64_t row;
+    Clock clock;
+  };
 
-  /// Number of rows to sample for detection.
-  std::uint64_t sample_rows() const {
-    return std::min<std::uint64_t>(rows_, TableSample::max_binary_rows);
+  void open_datasets() {
+    rows_ = datasets_.front().rows();
+    for (auto& dataset : datasets_) {
+      dataset.require_filters();
+      rows_ = std::min(rows_, dataset.rows());
+      claimed_rows_ = std::max(claimed_rows_, dataset.claimed_rows());
+    }
+  }
+
+  Hdf5Dataset& times() { return datasets_.front(); }
+
+  /// Reads `numbers_`. Returns the dataset that could not be read, or nullptr.
+  const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) {
+    numbers_.resize(datasets_.size());
+    for (std::size_t i = 0; i < datasets_.size(); ++i)
+      if (!datasets_[i].read(row, count, numbers_[i])) return &datasets_[i];
+    return nullptr;
+  }
+
+  /// Returns the first rows, up to the end of a chunk; none if they are corrupt.
+  TableSample read_sample() {
+    TableSample sample;
+    std::vector<TableSample::Row> rows;
+    const auto count = std::min<std::uint64_t>({rows_, TableSample::max_binary_rows, chunk_end(0)});
+    for (auto& dataset : datasets_)
+      if (!dataset.sample(count, rows)) return sample;
+    for (auto& row : rows) sample.add(std::move(row));
+    return sample;
   }
 
   /// Detects the meaning of the polarities, and the time unit unless `unit` is set, which it
@@ -247,34 +348,42 @@ class NumberTable : public Hdf5Table {
     return *unit;
   }
 
-  /// First row after the chunk of this row.
-  virtual std::uint64_t chunk_end(std::uint64_t row) const = 0;
-
-  /// Unwraps the time of a row, `number`; without the offset.
-  virtual Microseconds unwrapped(std::uint64_t row, std::int64_t number) {
-    if (!wraps_) return number;
-    if (samples_.empty()) read_samples();
-    auto clock = std::prev(std::ranges::upper_bound(samples_, row, {}, &Sample::row))->clock;
-    return clock.follow(static_cast<std::uint32_t>(number));
+  void set_unit(TimeUnit unit, bool is_unsigned_32) {
+    times().set_unit(places_[0].number, unit);
+    wraps_ = is_unsigned_32 && unit == TimeUnit::microseconds;
   }
 
-  PolarityCode polarities_;
-  Microseconds offset_ = 0;
-  bool wraps_ = false;  ///< times have 32 bits and wrap after 71 minutes
-  std::vector<std::int64_t> t_, x_, y_, p_, cause_, object_class_;
+  /// First row after the chunk of this row, in any dataset.
+  std::uint64_t chunk_end(std::uint64_t row) const {
+    auto end = rows_;
+    for (const auto& dataset : datasets_) end = std::min(end, dataset.chunk_end(row));
+    return end;
+  }
 
- private:
-  /// The clock at a row.
-  struct Sample {
-    std::uint64_t row;
-    Clock clock;
-  };
+  /// Unwraps the time of a row, `number`; without the offset.
+  Microseconds unwrapped(std::uint64_t row, std::int64_t number) {
+    if (!wraps_) return number;
+    if (!index_) {
+      if (samples_.empty()) read_samples();
+      auto clock = std::prev(std::ranges::upper_bound(samples_, row, {}, &Sample::row))->clock;
+      return clock.follow(static_cast<std::uint32_t>(number));
+    }
+    constexpr auto lap = static_cast<Microseconds>(Clock::range);
+    if (index_->rows() <= Clock::range / 1000) return number;
+    const auto milliseconds = first_row(index_->rows(), [&](std::uint64_t at) {
+      const auto indexed_row = indexed(at);
+      return indexed_row && *indexed_row <= row;
+    });
+    if (milliseconds == 0 || milliseconds > INT64_MAX / 1000) return number;
+    const auto about = static_cast<Microseconds>((milliseconds - 1) * 1000);
+    return number + std::max<Microseconds>((about - number + lap / 2) / lap, 0) * lap;
+  }
 
   /// Time of a row as stored in the file.
   std::optional<std::int64_t> time_number(std::uint64_t row) {
     std::vector<std::int64_t> numbers;
-    if (!t_dataset().read(row, 1, numbers)) return std::nullopt;
-    return numbers[t_column()];
+    if (!times().read(row, 1, numbers)) return std::nullopt;
+    return numbers[places_[0].number];
   }
 
   /// Samples the clock along the file. Samples must be less than half a wrap, 35 minutes, apart.
@@ -292,160 +401,6 @@ class NumberTable : public Hdf5Table {
     }
   }
 
-  std::vector<Sample> samples_;  ///< read on first use
-  std::uint64_t next_row_ = 0;
-  Clock clock_;  ///< before next_row_
-};
-
-/// A dataset with the numbers of each event in a row: v2e, MVSEC, Metavision without compression,
-/// and others. Detects the order and the unit unless they are known.
-class RowTable final : public NumberTable {
- public:
-  /// Throws UnsupportedFormat.
-  RowTable(Hdf5Format format, Hdf5Dataset events, const std::string& path, SensorSize size,
-           std::optional<ColumnOrder> order, std::optional<TimeUnit> unit)
-      : NumberTable(format), events_(std::move(events)) {
-    events_.require_filters();
-    size_ = size;
-    rows_ = events_.rows();
-    claimed_rows_ = events_.claimed_rows();
-    TableSample sample;
-    std::vector<TableSample::Row> rows;
-    if (events_.sample(std::min(sample_rows(), events_.chunk_end(0)), rows))
-      for (auto& row : rows) sample.add(std::move(row));
-    Columns columns(event_columns);
-    if (order) {
-      for (std::size_t i = 0; i < event_columns; ++i)
-        columns[(*order)[i]] = static_cast<EventColumn>(i);
-    } else {
-      const auto found = sample.find_columns();
-      if (!found || found->size() != event_columns)
-        throw UnsupportedFormat("unknown columns in the HDF5 dataset " + path +
-                                "; set column-order, or store datasets named t, x, y and p");
-      columns = *found;
-    }
-    for (std::size_t i = 0; i < event_columns; ++i)
-      order_[static_cast<std::size_t>(*columns[i])] = i;
-    if (!unit && events_.rank() == 2 && events_.is_unsigned_32()) unit = TimeUnit::microseconds;
-    const auto detected = detect(sample, columns, unit, !events_.is_integers(), path);
-    events_.set_unit(order_[0], detected);
-    wraps_ = events_.rank() == 2 && events_.is_unsigned_32() && detected == TimeUnit::microseconds;
-  }
-
- protected:
-  Hdf5Dataset& t_dataset() override { return events_; }
-  std::size_t t_column() const override { return order_[0]; }
-
-  const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) override {
-    if (!events_.read(row, count, numbers_)) return &events_;
-    std::vector<std::int64_t>* const separate[] = {&t_, &x_, &y_, &p_};
-    for (std::size_t column = 0; column < event_columns; ++column) {
-      separate[column]->resize(count);
-      for (std::size_t i = 0; i < count; ++i)
-        (*separate[column])[i] = numbers_[i * event_columns + order_[column]];
-    }
-    return nullptr;
-  }
-
-  std::uint64_t chunk_end(std::uint64_t row) const override { return events_.chunk_end(row); }
-
- private:
-  Hdf5Dataset events_;
-  ColumnOrder order_ = {};
-  std::vector<std::int64_t> numbers_;
-};
-
-/// Datasets of a group that hold the columns t, x, y and p: the DSEC layout, and others without its
-/// index.
-class DsecTable final : public NumberTable {
- public:
-  /// `group` is empty, or ends with a slash.
-  DsecTable(hid_t file, const std::string& group, const NamedColumns& datasets,
-            std::optional<TimeUnit> set_unit)
-      : NumberTable(Hdf5Format::dsec) {
-    for (const auto& name : datasets.names) columns_.emplace_back(file, group + name);
-    rows_ = columns_[0].rows();
-    for (auto& column : columns_) {
-      if (column.rank() != 1 || !column.is_numbers())
-        throw UnsupportedFormat("HDF5 group /" + group + " must hold columns of numbers");
-      column.require_filters();
-      rows_ = std::min(rows_, column.rows());
-      claimed_rows_ = std::max(claimed_rows_, column.claimed_rows());
-    }
-    read_offset(file);
-    open_index(file);
-    // Nanoseconds of 32 bits would wrap after four seconds.
-    auto known = set_unit;
-    if (!known && (index_ || (columns_[0].is_unsigned_32() && !datasets.unit)))
-      known = TimeUnit::microseconds;
-    const auto unit = detect(read_sample(), *columns_of("txyp"), known ? known : datasets.unit,
-                             !columns_[0].is_integers(), group + datasets.names[0]);
-    columns_[0].set_unit(0, unit);
-    wraps_ = columns_[0].is_unsigned_32() && unit == TimeUnit::microseconds;
-    open_labels(file, group);
-    size_ = size_of_attributes(file);
-    if (size_ == SensorSize{} && !group.empty()) {
-      const Hdf5Handle events(H5Gopen2(file, group.c_str(), H5P_DEFAULT), H5Gclose);
-      size_ = size_of_attributes(events.get());
-    }
-  }
-
-  std::uint64_t row_before(Microseconds t) override {
-    Microseconds since = 0;
-    if (index_ && !__builtin_sub_overflow(t, offset_, &since) && since >= 0) {
-      const auto row = indexed(static_cast<std::uint64_t>(since / 1000));
-      // Ignore the index if it is wrong.
-      if (row && *row <= rows_ && *row > 0) {
-        const auto before = time_at(*row - 1);
-        const auto at = time_at(*row);
-        if (before && *before < t && (!at || *at >= t - 1000)) return *row;
-      }
-    }
-    return NumberTable::row_before(t);
-  }
-
- protected:
-  Hdf5Dataset& t_dataset() override { return columns_[0]; }
-
-  const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) override {
-    std::vector<std::int64_t>* const numbers[] = {&t_, &x_, &y_, &p_, &cause_, &object_class_};
-    for (std::size_t i = 0; i < columns_.size(); ++i)
-      if (!columns_[i].read(row, count, *numbers[i])) return &columns_[i];
-    return nullptr;
-  }
-
-  std::uint64_t chunk_end(std::uint64_t row) const override {
-    auto end = rows_;
-    for (const auto& column : columns_) end = std::min(end, column.chunk_end(row));
-    return end;
-  }
-
-  Microseconds unwrapped(std::uint64_t row, std::int64_t number) override {
-    if (!index_) return NumberTable::unwrapped(row, number);
-    constexpr auto lap = static_cast<Microseconds>(Clock::range);
-    if (!wraps_ || index_->rows() <= Clock::range / 1000) return number;
-    const auto milliseconds = first_row(index_->rows(), [&](std::uint64_t at) {
-      const auto indexed_row = indexed(at);
-      return indexed_row && *indexed_row <= row;
-    });
-    if (milliseconds == 0 || milliseconds > INT64_MAX / 1000) return number;
-    const auto about = static_cast<Microseconds>((milliseconds - 1) * 1000);
-    return number + std::max<Microseconds>((about - number + lap / 2) / lap, 0) * lap;
-  }
-
- private:
-  /// Returns the first rows, up to the end of a chunk; none if they are corrupt.
-  TableSample read_sample() {
-    TableSample sample;
-    std::array<std::vector<TableSample::Row>, event_columns> columns;
-    const auto rows = std::min(sample_rows(), chunk_end(0));
-    for (std::size_t i = 0; i < event_columns; ++i)
-      if (!columns_[i].sample(rows, columns[i])) return sample;
-    for (std::size_t row = 0; row < rows; ++row)
-      sample.add({columns[0][row][0], columns[1][row][0], columns[2][row][0], columns[3][row][0]});
-    return sample;
-  }
-
   /// Opens the columns cause and class, if both are there and have a number for each event.
   void open_labels(hid_t file, const std::string& group) {
     std::vector<Hdf5Dataset> labels;
@@ -455,7 +410,7 @@ class DsecTable final : public NumberTable {
       if (column.rank() != 1 || !column.is_integers() || column.rows() < rows_) return;
       column.require_filters();
     }
-    std::ranges::move(labels, std::back_inserter(columns_));
+    std::ranges::move(labels, std::back_inserter(datasets_));
     has_labels_ = true;
   }
 
@@ -485,8 +440,17 @@ class DsecTable final : public NumberTable {
     return static_cast<std::uint64_t>(row[0]);
   }
 
-  std::vector<Hdf5Dataset> columns_;  ///< t, x, y and p, and labels
-  std::optional<Hdf5Dataset> index_;  ///< first event at or after each millisecond
+  std::vector<Hdf5Dataset> datasets_;               ///< the first has the times
+  std::array<Place, all_columns> places_ = {};      ///< by EventColumn
+  std::size_t step_ = 1;                            ///< numbers in a row of a dataset
+  std::vector<std::vector<std::int64_t>> numbers_;  ///< read last, of each dataset
+  std::optional<Hdf5Dataset> index_;                ///< first event at or after each millisecond
+  PolarityCode polarities_;
+  Microseconds offset_ = 0;
+  bool wraps_ = false;           ///< times have 32 bits and wrap after 71 minutes
+  std::vector<Sample> samples_;  ///< read on first use
+  std::uint64_t next_row_ = 0;
+  Clock clock_;  ///< before next_row_
 };
 
 /// Parses a size such as 1280x720.
@@ -523,8 +487,8 @@ std::unique_ptr<Hdf5Table> open_metavision(hid_t file) {
   const auto size = read_geometry(read_text_attribute(file, "geometry").value_or(""));
   if (events.has_only_filter(ecf_filter))
     return std::make_unique<EcfTable>(std::move(events), size);
-  return std::make_unique<RowTable>(Hdf5Format::metavision, std::move(events), path, size,
-                                    ColumnOrder{0, 1, 2, 3}, TimeUnit::microseconds);
+  return std::make_unique<NumberTable>(std::move(events), path, size, ColumnOrder{0, 1, 2, 3},
+                                       TimeUnit::microseconds);
 }
 
 NamedColumns named_columns(const Hdf5Dataset& events) {
@@ -559,9 +523,8 @@ std::unique_ptr<Hdf5Table> open_rows(hid_t file, const std::string& path,
     if (!columns.are_complete())
       throw UnsupportedFormat("HDF5 dataset /" + path + " has no members t, x, y and p");
     events.choose(columns.names);
-    return std::make_unique<RowTable>(Hdf5Format::v2e, std::move(events), path, size,
-                                      ColumnOrder{0, 1, 2, 3},
-                                      settings.unit ? settings.unit : columns.unit);
+    return std::make_unique<NumberTable>(std::move(events), path, size, ColumnOrder{0, 1, 2, 3},
+                                         settings.unit ? settings.unit : columns.unit);
   }
   if (!is_row_of_numbers(events))
     throw UnsupportedFormat("HDF5 dataset /" + path +
@@ -579,8 +542,7 @@ std::unique_ptr<Hdf5Table> open_rows(hid_t file, const std::string& path,
   if (!order && events.is_integers()) order = ColumnOrder{0, 1, 2, 3};  // v2e
   auto unit = settings.unit;
   if (!unit && is_mvsec) unit = TimeUnit::seconds;
-  return std::make_unique<RowTable>(is_mvsec ? Hdf5Format::mvsec : Hdf5Format::v2e,
-                                    std::move(events), path, size, order, unit);
+  return std::make_unique<NumberTable>(std::move(events), path, size, order, unit);
 }
 
 /// Searches a group of a file for events.
@@ -628,7 +590,7 @@ class EventSearch {
     }
     // Names are sorted, so a left camera comes before a right one.
     if (columns.are_complete()) {
-      if (!table_) table_ = std::make_unique<DsecTable>(file_, group, columns, settings_.unit);
+      if (!table_) table_ = std::make_unique<NumberTable>(file_, group, columns, settings_.unit);
       add_path(group.substr(0, group.size() - (group.empty() ? 0 : 1)));
       return;
     }
@@ -702,8 +664,11 @@ std::unique_ptr<Hdf5Table> Hdf5Table::open(hid_t file, const Hdf5Selection& sele
   const auto begin = std::min(selection.path.find_first_not_of('/'), selection.path.size());
   const auto path = selection.path.substr(begin, selection.path.find_last_not_of('/') + 1 - begin);
   const bool is_metavision = path.empty() || path == "CD" || path == "CD/events";
-  if (is_metavision && Hdf5Dataset::exists(file, "CD/events", H5O_TYPE_DATASET))
-    return open_metavision(file);
+  if (is_metavision && Hdf5Dataset::exists(file, "CD/events", H5O_TYPE_DATASET)) {
+    auto table = open_metavision(file);
+    table->is_metavision_ = true;
+    return table;
+  }
   if (!path.empty()) return open_path(file, path, selection.table);
   EventSearch search(file, "", selection.table);
   auto table = search.table();

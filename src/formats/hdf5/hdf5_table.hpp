@@ -10,7 +10,7 @@
 #include "src/core/sensor_size.hpp"
 #include "src/formats/corruption.hpp"
 #include "src/formats/event_table.hpp"
-#include "src/formats/hdf5/hdf5_format.hpp"
+#include "src/formats/hdf5/hdf5_decoder.hpp"
 #include "src/formats/hdf5/hdf5_handle.hpp"
 
 namespace eventcamera {
@@ -25,9 +25,9 @@ class Hdf5Table {
   /// Throws UnsupportedFormat if the layout is unknown or invalid, or there are no such events.
   static std::unique_ptr<Hdf5Table> open(hid_t file, const Hdf5Selection& selection);
 
-  Hdf5Format format() const { return format_; }
   SensorSize size() const { return size_; }
   bool has_labels() const { return has_labels_; }
+  bool is_metavision() const { return is_metavision_; }
   std::uint64_t rows() const { return rows_; }
   std::uint64_t claimed_rows() const { return claimed_rows_; }
   const std::string& others() const { return others_; }
@@ -43,11 +43,11 @@ class Hdf5Table {
   virtual std::optional<Microseconds> time_at(std::uint64_t row) = 0;
 
  protected:
-  explicit Hdf5Table(Hdf5Format format) : format_(format) {}
+  Hdf5Table() = default;
 
-  Hdf5Format format_;
   SensorSize size_;
   bool has_labels_ = false;
+  bool is_metavision_ = false;  ///< the layout of Metavision
   std::uint64_t rows_ = 0, claimed_rows_ = 0;
   std::string others_;  ///< paths of other events in the file
 };

@@ -11,11 +11,18 @@
 #include "src/core/event.hpp"
 #include "src/core/label.hpp"
 #include "src/core/sensor_size.hpp"
-#include "src/formats/hdf5/hdf5_format.hpp"
 
 namespace eventcamera {
 
 class Hdf5Layout;
+
+enum class Hdf5Format : std::uint8_t {
+  dsec,        ///< datasets t, x, y and p of a group, with /ms_to_idx and /t_offset
+  metavision,  ///< /CD/events and /EXT_TRIGGER/events, compressed with ECF
+};
+
+/// Compression of the DSEC layout.
+enum class Hdf5Compression : std::uint8_t { none, gzip };
 
 /// Writes events to an HDF5 file. All functions throw std::runtime_error if the file cannot be
 /// written, and std::invalid_argument if the layout does not support the data.
@@ -27,7 +34,7 @@ class Hdf5Writer {
   using Compression = Hdf5Compression;
 
   struct Settings {
-    Hdf5Format format = Hdf5Format::dsec;         ///< dsec or metavision
+    Hdf5Format format = Hdf5Format::dsec;
     Compression compression = Compression::gzip;  ///< for DSEC; Metavision always uses ECF
     SensorSize size;
     std::chrono::nanoseconds commit_interval = std::chrono::seconds{1};  ///< 0 = never

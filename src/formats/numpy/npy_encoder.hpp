@@ -18,7 +18,8 @@ namespace eventcamera {
 
 /// Encodes NumPy files: a structured array of x, y (uint16), t (int64, microseconds) and p (uint8,
 /// 1 = ON). The header contains the number of events; until patch() is applied, an impossibly large
-/// one: NpyDecoder then reads to the end, and numpy.load() fails rather than return too few events.
+/// one: the decoder then reads to the end, and numpy.load() fails rather than return too few
+/// events.
 class NpyEncoder final : public Encoder {
  public:
   static constexpr std::size_t event_bytes = 13;

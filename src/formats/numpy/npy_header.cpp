@@ -2,6 +2,7 @@
 #include "src/formats/numpy/npy_header.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <string>
 
@@ -119,32 +120,15 @@ Type read_type(std::string_view text) {
 }
 
 std::optional<NpyField> number_of(const Type& type, std::uint32_t offset) {
-  if (type.order != '<' && type.order != '>' && type.order != '|' && type.order != '=')
-    return std::nullopt;
-  NpyField field;
-  field.big_endian = type.order == '>';
-  field.bytes = type.bytes;
-  field.offset = offset;
-  const bool whole = type.bytes == 1 || type.bytes == 2 || type.bytes == 4 || type.bytes == 8;
-  if (!whole) return std::nullopt;
-  switch (type.kind) {
-    case 'i':
-      field.kind = NpyField::Kind::signed_integer;
-      return field;
-    case 'u':
-      field.kind = NpyField::Kind::unsigned_integer;
-      return field;
-    case 'b':
-      if (type.bytes != 1) return std::nullopt;
-      field.kind = NpyField::Kind::boolean;
-      return field;
-    case 'f':
-      if (type.bytes == 1) return std::nullopt;
-      field.kind = NpyField::Kind::floating;
-      return field;
-    default:
-      return std::nullopt;
-  }
+  constexpr std::string_view orders = "<>|=";
+  constexpr std::string_view kinds = "iufb";  // in the order of NpyField::Kind
+  const auto kind = static_cast<NpyField::Kind>(kinds.find(type.kind));
+  const bool is_known = orders.find(type.order) != orders.npos &&
+                        kinds.find(type.kind) != kinds.npos && std::has_single_bit(type.bytes) &&
+                        type.bytes <= (kind == NpyField::Kind::boolean ? 1U : 8U) &&
+                        type.bytes >= (kind == NpyField::Kind::floating ? 2U : 1U);
+  if (!is_known) return std::nullopt;
+  return NpyField{kind, type.order == '>', type.bytes, offset};
 }
 
 /// Parses the name of a field, which a title may precede: 'x' or ('title', 'x').

@@ -238,7 +238,7 @@ class NpzDecoder final : public Decoder {
       joined_.add(std::move(array), columns);
     }
     add_labels(std::span(indices).subspan(event_columns));
-    decoder_ = std::make_unique<NpyDecoder>(joined_.header(unit), settings_);
+    decoder_ = make_npy_decoder(joined_.header(unit), settings_);
     return true;
   }
 
@@ -268,7 +268,7 @@ class NpzDecoder final : public Decoder {
       try {
         auto array = open_array(*archive_, i);
         if (array.header.columns.size() == 1) continue;
-        decoder_ = std::make_unique<NpyDecoder>(array.header, settings_);
+        decoder_ = make_npy_decoder(array.header, settings_);
         joined_.add(std::move(array), {});
         error_prefix_ = archive_->names()[i] + ": ";
         return;
@@ -285,7 +285,7 @@ class NpzDecoder final : public Decoder {
   std::unique_ptr<ByteSource> bytes_;  ///< collected bytes
   std::optional<ZipArchive> archive_;  ///< set once it can be read
   JoinedColumns joined_;
-  std::unique_ptr<NpyDecoder> decoder_;
+  std::unique_ptr<EventDecoder> decoder_;
   std::string error_prefix_;  ///< name of the array of events
   Corruption corruption_;
   bool size_unreadable_ = false;

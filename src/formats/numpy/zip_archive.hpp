@@ -66,7 +66,6 @@ class ZipArchive {
     }
   }
 
-  /// Names of the files.
   const std::vector<std::string>& names() const { return names_; }
 
   /// Opens the file with this index in names(). Throws UnsupportedFormat if it cannot be
@@ -166,7 +165,7 @@ class ZipWriter {
     put_text(out, "PK\x03\x04");
     put_file(out, checksum, in_zip64, name, 4 + field);
     put_text(out, name);
-    put(out, zip64_field, field, size, size);
+    ByteAppender(out).put(zip64_field, field, size, size);
     end_ += out.size() - begin + size;
   }
 
@@ -177,31 +176,32 @@ class ZipWriter {
     const auto begin = out.size();
     for (const auto& [name, size, checksum, position] : files_) {
       std::vector<std::uint8_t> large;
-      if (!is_small(size)) put(large, size, size);
-      if (!is_small(position)) put(large, position);
+      if (!is_small(size)) ByteAppender(large).put(size, size);
+      if (!is_small(position)) ByteAppender(large).put(position);
       const auto field = static_cast<std::uint16_t>(large.size());
       put_text(out, "PK\x01\x02");
-      put(out, version);
+      ByteAppender(out).put(version);
       put_file(out, checksum, small(size), name, large.empty() ? 0 : 4U + field);
-      put(out, none /* comment */, none /* disk */, none /* internal attributes */,
-          std::uint32_t{0} /* external attributes */, small(position));
+      ByteAppender(out).put(none /* comment */, none /* disk */, none /* internal attributes */,
+                            std::uint32_t{0} /* external attributes */, small(position));
       put_text(out, name);
       if (large.empty()) continue;
-      put(out, zip64_field, field);
+      ByteAppender(out).put(zip64_field, field);
       out.insert(out.end(), large.begin(), large.end());
     }
     const std::uint64_t count = files_.size();
     const std::uint64_t size = out.size() - begin;
     if (!is_small(end_)) {
       put_text(out, "PK\x06\x06");
-      put(out, std::uint64_t{44} /* bytes to follow */, version, version, first_disk, first_disk,
-          count, count, size, end_);
+      ByteAppender(out).put(std::uint64_t{44} /* bytes to follow */, version, version, first_disk,
+                            first_disk, count, count, size, end_);
       put_text(out, "PK\x06\x07");
-      put(out, first_disk, end_ + size, std::uint32_t{1} /* disks */);
+      ByteAppender(out).put(first_disk, end_ + size, std::uint32_t{1} /* disks */);
     }
     const auto few = static_cast<std::uint16_t>(count);
     put_text(out, "PK\x05\x06");
-    put(out, none, none, few, few, static_cast<std::uint32_t>(size), small(end_), none);
+    ByteAppender(out).put(none, none, few, few, static_cast<std::uint32_t>(size), small(end_),
+                          none);
   }
 
  private:
@@ -220,12 +220,6 @@ class ZipWriter {
     return is_small(number) ? static_cast<std::uint32_t>(number) : in_zip64;
   }
 
-  template <class... Numbers>
-  static void put(std::vector<std::uint8_t>& out, Numbers... numbers) {
-    ByteAppender fields(out);
-    (fields.put(numbers), ...);
-  }
-
   static void put_text(std::vector<std::uint8_t>& out, std::string_view text) {
     out.insert(out.end(), text.begin(), text.end());
   }
@@ -234,8 +228,9 @@ class ZipWriter {
   static void put_file(std::vector<std::uint8_t>& out, std::uint32_t checksum, std::uint32_t size,
                        std::string_view name, std::size_t extra) {
     constexpr std::uint16_t none = 0;
-    put(out, version, none /* flags */, none /* stored */, none /* time */, date, checksum, size,
-        size, static_cast<std::uint16_t>(name.size()), static_cast<std::uint16_t>(extra));
+    ByteAppender(out).put(version, none /* flags */, none /* stored */, none /* time */, date,
+                          checksum, size, size, static_cast<std::uint16_t>(name.size()),
+                          static_cast<std::uint16_t>(extra));
   }
 
   struct File {

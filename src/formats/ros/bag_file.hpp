@@ -27,14 +27,12 @@ namespace eventcamera {
 /// counts.
 enum class RosSerialization : std::uint8_t { ros1, cdr };
 
-/// A topic of a bag.
 struct BagTopic {
   std::string name;
   std::string type;                               ///< as in ROS 1: package/Type
   std::optional<RosSerialization> serialization;  ///< none: unknown
 };
 
-/// A message of a topic.
 struct BagMessage {
   std::size_t topic;    ///< as BagFile::AddTopic returned it
   Microseconds logged;  ///< when it was recorded

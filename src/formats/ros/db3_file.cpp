@@ -131,12 +131,21 @@ int authorize(void*, int action, const char* name, const char*, const char*, con
 /// Rows of a query, valid as long as the database.
 class SqliteRows {
  public:
-  SqliteRows() = default;
+  /// `start` is set to the CPU time at the last row.
+  SqliteRows(sqlite3* database, const char* text, std::int64_t parameter, std::int64_t& start)
+      : start_(start) {
+    start_ = cpu_time();
+    sqlite3_stmt* statement = nullptr;
+    failed_ = sqlite3_prepare_v2(database, text, -1, &statement, nullptr) != SQLITE_OK;
+    statement_.reset(statement);
+    if (!failed_ && sqlite3_bind_parameter_count(statement) > 0)
+      sqlite3_bind_int64(statement, 1, parameter);
+  }
 
   /// Goes to the next row, the first at first. False at the end, and if the database is corrupt.
   bool next() {
     if (failed_ || !statement_) return false;
-    *start_ = cpu_time();
+    start_ = cpu_time();
     const auto result = sqlite3_step(statement_.get());
     failed_ = result != SQLITE_ROW && result != SQLITE_DONE;
     if (result != SQLITE_ROW) statement_.reset();
@@ -163,13 +172,12 @@ class SqliteRows {
   }
 
  private:
-  friend class SqliteDatabase;
   struct Deleter {
     void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
   };
 
   std::unique_ptr<sqlite3_stmt, Deleter> statement_;
-  std::int64_t* start_ = nullptr;  ///< of the database
+  std::int64_t& start_;
   bool failed_ = false;
 };
 
@@ -232,15 +240,7 @@ class SqliteDatabase {
 
   /// Rows of a query with one parameter. They fail at once if the columns are not there.
   SqliteRows query(const char* text, std::int64_t parameter = 0) {
-    SqliteRows rows;
-    rows.start_ = &start_;
-    start_ = cpu_time();
-    sqlite3_stmt* statement = nullptr;
-    rows.failed_ = sqlite3_prepare_v2(database_.get(), text, -1, &statement, nullptr) != SQLITE_OK;
-    rows.statement_.reset(statement);
-    if (!rows.failed_ && sqlite3_bind_parameter_count(statement) > 0)
-      sqlite3_bind_int64(statement, 1, parameter);
-    return rows;
+    return {database_.get(), text, parameter, start_};
   }
 
  private:

@@ -9,6 +9,7 @@
 #include "src/formats/evt/words.hpp"
 #include "src/formats/ros/topic_decoder.hpp"
 #include "src/formats/sensor_sizes.hpp"
+#include "src/formats/unwrapped_clock.hpp"
 
 namespace eventcamera {
 
@@ -74,12 +75,7 @@ class EvtPackets {
 
   /// `offset` of the clocks is set with the first event, and then kept.
   bool next(Decoded& out, std::optional<std::uint64_t>& offset) {
-    batch_.open(out, rest_.size());
-    batch_.start = rest_.data();
-    batch_.start_position = position_;
-    const auto* const read = words_->read(rest_.data(), rest_.data() + rest_.size(), batch_);
-    batch_.close();
-    const auto count = static_cast<std::size_t>(read - rest_.data());
+    const auto count = words_->decode(rest_, position_, batch_, out);
     rest_ = rest_.subspan(count);
     if (!out.events.empty() || !out.triggers.empty()) shift(out, offset);
     return count > 0;
@@ -187,7 +183,7 @@ class LibcaerPackets {
     rest_ = packet.events;
     position_ = position;
     base_ = microseconds(packet.time_base);
-    time_ = {};
+    clock_ = {};
     word_state_ = {};
     if (rest_.size() % unit() != 0)
       corruption_.note(position, "an event packet ends within an event");
@@ -213,12 +209,9 @@ class LibcaerPackets {
   /// Polarity events of libcaer: validity in bit 0, polarity in 1, y in 2 to 16, x in 17 to 31, and
   /// microseconds in 32 to 62, which wrap.
   void read_event(std::uint64_t word, std::vector<AbsoluteEvent>& events) {
-    constexpr Microseconds range = Microseconds{1} << 31;
-    const auto low = static_cast<Microseconds>(word >> 32 & 0x7fffffff);
-    if (low < time_ % range - range / 2) time_ += range;
-    time_ = time_ / range * range + low;
+    const auto t = clock_.follow(static_cast<std::uint32_t>(word >> 32 & 0x7fffffff));
     const auto polarity = static_cast<std::uint16_t>((word & 2) << 14);
-    events.push_back({time(time_), static_cast<std::uint16_t>(word >> 17 & 0x7fff),
+    events.push_back({time(t), static_cast<std::uint16_t>(word >> 17 & 0x7fff),
                       static_cast<std::uint16_t>((word >> 2 & 0x7fff) | polarity)});
   }
 
@@ -278,8 +271,8 @@ class LibcaerPackets {
   std::span<const std::uint8_t> rest_;
   std::uint64_t position_ = 0;
   Microseconds base_ = 0;
-  Microseconds time_ = 0;  ///< of the last event of libcaer, since the base
-  WordState word_state_;   ///< of libcaer_cmp
+  UnwrappedClock<31> clock_;  ///< of libcaer, since the base
+  WordState word_state_;      ///< of libcaer_cmp
 };
 
 class EventPacketDecoder final : public TopicDecoder {

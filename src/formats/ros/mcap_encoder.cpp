@@ -71,29 +71,21 @@ void put_record(McapOpcode opcode, std::vector<std::uint8_t>& out, const Put& pu
 
 void put_schema(std::vector<std::uint8_t>& out) {
   put_record(McapOpcode::schema, out, [](ByteAppender& fields) {
-    fields.put(schema_id);
-    fields.put(schema_name);
-    fields.put(std::string_view("ros2msg"));
-    fields.put(schema_text);
+    fields.put(schema_id, schema_name, std::string_view("ros2msg"), schema_text);
   });
 }
 
 void put_channel(std::vector<std::uint8_t>& out) {
   put_record(McapOpcode::channel, out, [](ByteAppender& fields) {
-    fields.put(channel_id);
-    fields.put(schema_id);
-    fields.put(topic);
-    fields.put(std::string_view("cdr"));
+    fields.put(channel_id, schema_id, topic, std::string_view("cdr"));
     fields.put(std::uint32_t{0});  // metadata
   });
 }
 
-/// Magic, header, schema and channel.
 std::string file_start() {
   std::vector<std::uint8_t> bytes(mcap_magic.begin(), mcap_magic.end());
   put_record(McapOpcode::header, bytes, [](ByteAppender& fields) {
-    fields.put(std::string_view("ros2"));
-    fields.put(std::string_view("gst-eventsim"));
+    fields.put(std::string_view("ros2"), std::string_view("gst-eventsim"));
   });
   put_schema(bytes);
   put_channel(bytes);
@@ -124,7 +116,6 @@ class McapEncoder final : public Encoder {
   std::uint64_t pending() const override { return events_in_chunk_; }
 
  private:
-  /// Entry of the index.
   struct Chunk {
     Microseconds first;
     Microseconds last;
@@ -214,24 +205,19 @@ class McapEncoder final : public Encoder {
     messages_.push_back({t, *packet_at_});
     const auto time = nanoseconds(t);
     ByteAppender fields(chunk_);
-    fields.put(McapOpcode::message);
-    fields.put(std::uint64_t{0});
-    fields.put(channel_id);
-    fields.put(static_cast<std::uint32_t>(sequence_));
-    fields.put(time);
-    fields.put(time);
+    fields.put(McapOpcode::message, std::uint64_t{0});
+    fields.put(channel_id, static_cast<std::uint32_t>(sequence_), time, time);
     fields.put(std::uint32_t{0x0100});  // little-endian CDR
     const auto start = chunk_.size();
-    fields.put(static_cast<std::uint32_t>(time / 1'000'000'000));
-    fields.put(static_cast<std::uint32_t>(time % 1'000'000'000));
+    fields.put(static_cast<std::uint32_t>(time / 1'000'000'000),
+               static_cast<std::uint32_t>(time % 1'000'000'000));
     fields.put(std::string_view(frame.data(), frame.size() + 1));
     fields.align(start, 4);
-    fields.put(static_cast<std::uint32_t>(settings_.size.height));
-    fields.put(static_cast<std::uint32_t>(settings_.size.width));
+    fields.put(static_cast<std::uint32_t>(settings_.size.height),
+               static_cast<std::uint32_t>(settings_.size.width));
     fields.align(start, 8);
-    fields.put(std::uint64_t{sequence_++});
-    fields.put(settings_.events == BagEvents::mono ? time : 0);
-    fields.put(name_of(settings_.events));
+    fields.put(std::uint64_t{sequence_++}, settings_.events == BagEvents::mono ? time : 0,
+               name_of(settings_.events));
     fields.put(std::uint8_t{0});  // little-endian
     fields.align(start, 4);
     fields.put(std::uint32_t{0});
@@ -254,12 +240,9 @@ class McapEncoder final : public Encoder {
     const auto before = out.size();
     Chunk chunk{messages_.front().t, messages_.back().t, position_, 0, 0, 0, chunk_.size()};
     put_record(McapOpcode::chunk, out, [&](ByteAppender& fields) {
-      fields.put(nanoseconds(chunk.first));
-      fields.put(nanoseconds(chunk.last));
-      fields.put(chunk.content_size);
-      fields.put(static_cast<std::uint32_t>(crc32_z(0, chunk_.data(), chunk_.size())));
-      fields.put(compression());
-      fields.put(std::uint64_t{0});
+      fields.put(nanoseconds(chunk.first), nanoseconds(chunk.last), chunk.content_size,
+                 static_cast<std::uint32_t>(crc32_z(0, chunk_.data(), chunk_.size())),
+                 compression(), std::uint64_t{0});
       const auto content_at = out.size();
       compressor_.compress(chunk_, out);
       chunk.stored_size = out.size() - content_at;
@@ -267,12 +250,9 @@ class McapEncoder final : public Encoder {
     });
     chunk.size = out.size() - before;
     put_record(McapOpcode::message_index, out, [&](ByteAppender& fields) {
-      fields.put(channel_id);
-      fields.put(static_cast<std::uint32_t>(messages_.size() * 2 * sizeof(std::uint64_t)));
-      for (const auto& message : messages_) {
-        fields.put(nanoseconds(message.t));
-        fields.put(message.offset);
-      }
+      fields.put(channel_id,
+                 static_cast<std::uint32_t>(messages_.size() * 2 * sizeof(std::uint64_t)));
+      for (const auto& message : messages_) fields.put(nanoseconds(message.t), message.offset);
     });
     chunk.index_size = out.size() - before - chunk.size;
     position_ += out.size() - before;
@@ -311,20 +291,12 @@ class McapEncoder final : public Encoder {
     });
     const auto offsets_at = summary_at + out.size() - first;
     for (const auto& group : groups)
-      put_record(McapOpcode::summary_offset, out, [&](ByteAppender& fields) {
-        fields.put(group.opcode);
-        fields.put(group.start);
-        fields.put(group.size);
-      });
+      put_record(McapOpcode::summary_offset, out,
+                 [&](ByteAppender& fields) { fields.put(group.opcode, group.start, group.size); });
     // The checksum covers the summary and the footer up to it.
     std::uint32_t checksum = 0;
-    put_record(McapOpcode::footer, out, [&](ByteAppender& fields) {
-      fields.put(summary_at);
-      fields.put(offsets_at);
-      fields.put(checksum);
-    });
-    const std::uint64_t footer_size = mcap_footer;
-    put_little_endian(footer_size, out.data() + out.size() - mcap_footer - sizeof footer_size);
+    put_record(McapOpcode::footer, out,
+               [&](ByteAppender& fields) { fields.put(summary_at, offsets_at, checksum); });
     checksum = static_cast<std::uint32_t>(
         crc32_z(0, out.data() + first, out.size() - first - sizeof checksum));
     put_little_endian(checksum, out.data() + out.size() - sizeof checksum);
@@ -338,28 +310,20 @@ class McapEncoder final : public Encoder {
       fields.put(std::uint32_t{1});  // channels
       fields.put(std::uint32_t{0});  // attachments
       fields.put(std::uint32_t{0});  // metadata
-      fields.put(static_cast<std::uint32_t>(chunks_.size()));
-      fields.put(chunks_.empty() ? 0 : nanoseconds(chunks_.front().first));
-      fields.put(chunks_.empty() ? 0 : nanoseconds(chunks_.back().last));
-      fields.put(static_cast<std::uint32_t>(sizeof channel_id + sizeof message_count_));
-      fields.put(channel_id);
-      fields.put(message_count_);
+      fields.put(static_cast<std::uint32_t>(chunks_.size()),
+                 chunks_.empty() ? 0 : nanoseconds(chunks_.front().first),
+                 chunks_.empty() ? 0 : nanoseconds(chunks_.back().last),
+                 static_cast<std::uint32_t>(sizeof channel_id + sizeof message_count_), channel_id,
+                 message_count_);
     });
   }
 
   void put_chunk_index(const Chunk& chunk, std::vector<std::uint8_t>& out) const {
     put_record(McapOpcode::chunk_index, out, [&](ByteAppender& fields) {
-      fields.put(nanoseconds(chunk.first));
-      fields.put(nanoseconds(chunk.last));
-      fields.put(chunk.position);
-      fields.put(chunk.size);
-      fields.put(static_cast<std::uint32_t>(sizeof channel_id + sizeof chunk.position));
-      fields.put(channel_id);
-      fields.put(chunk.position + chunk.size);
-      fields.put(chunk.index_size);
-      fields.put(compression());
-      fields.put(chunk.stored_size);
-      fields.put(chunk.content_size);
+      fields.put(nanoseconds(chunk.first), nanoseconds(chunk.last), chunk.position, chunk.size,
+                 static_cast<std::uint32_t>(sizeof channel_id + sizeof chunk.position), channel_id,
+                 chunk.position + chunk.size, chunk.index_size, compression(), chunk.stored_size,
+                 chunk.content_size);
     });
   }
 

@@ -12,10 +12,8 @@ namespace eventcamera {
 /// How events are encoded in the messages of a bag, event_camera_msgs/EventPacket.
 enum class BagEvents : std::uint8_t { evt3, mono };
 
-/// Compression of the chunks of a bag.
 enum class BagCompression : std::uint8_t { none, lz4, zstd };
 
-/// Settings of an MCAP file.
 struct McapSettings {
   SensorSize size;
   BagEvents events = BagEvents::evt3;

@@ -83,7 +83,6 @@ constexpr ImageEncoding encodings[] = {
     {"rgba8", PixelFormat::bgra, true},
 };
 
-/// sensor_msgs/Image.
 class ImageDecoder final : public TopicDecoder {
  public:
   ImageDecoder(const BagTopic& topic, Corruption& corruption)

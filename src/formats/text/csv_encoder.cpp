@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <deque>
 #include <string>
+#include <vector>
 
 namespace eventcamera {
 
@@ -89,95 +91,106 @@ std::string header_text(const CsvFormat& format, SensorSize size) {
   return {};
 }
 
+class CsvEncoder final : public Encoder {
+ public:
+  CsvEncoder(const CsvFormat& format, SensorSize size)
+      : Encoder(header_text(format, size)), format_(format) {}
+
+  std::size_t label(std::span<const Label> labels) override {
+    if (!format_.labels) return 0;
+    labels_.insert(labels_.end(), labels.begin(), labels.end());
+    return labels.size();
+  }
+
+ private:
+  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
+    char text[batch_size * max_line];
+    while (!events.empty()) {
+      const auto count = std::min(events.size(), batch_size);
+      char* at = text;
+      for (const auto& event : events.first(count)) at = write(at, event);
+      out.insert(out.end(), text, at);
+      events = events.subspan(count);
+    }
+  }
+
+  char* write(char* at, Microseconds t) const {
+    if (format_.unit == microseconds) return write_number(at, t);
+    auto magnitude = static_cast<std::uint64_t>(t);
+    if (t < 0) {
+      *at++ = '-';
+      magnitude = 0 - magnitude;
+    }
+    if (format_.unit == nanoseconds) {
+      at = write_number(at, magnitude);
+      if (magnitude == 0) return at;
+      return std::fill_n(at, 3, '0');
+    }
+    at = write_number(at, magnitude / 1'000'000);
+    *at++ = '.';
+    auto fraction = static_cast<std::uint32_t>(magnitude % 1'000'000);
+    for (int digit = 5; digit >= 0; --digit, fraction /= 10)
+      at[digit] = static_cast<char>('0' + fraction % 10);
+    return at + 6;
+  }
+
+  char* write(char* at, const AbsoluteEvent& event) {
+    for (const auto column : format_.order) {
+      switch (column) {
+        case Column::t:
+          at = write(at, event.t);
+          break;
+        case Column::x:
+          at = write_number(at, event.x);
+          break;
+        case Column::y:
+          at = write_number(at, event.y());
+          break;
+        case Column::p:
+          if (event.polarity() == Polarity::on) {
+            *at++ = '1';
+          } else if (format_.minus_one) {
+            *at++ = '-';
+            *at++ = '1';
+          } else {
+            *at++ = '0';
+          }
+          break;
+        case Column::cause:
+        case Column::object_class:
+          break;  // never in the order: they follow the others
+      }
+      *at++ = format_.separator;
+    }
+    if (format_.labels) {
+      Label label;
+      if (!labels_.empty()) {
+        label = labels_.front();
+        labels_.pop_front();
+      }
+      at = write_number(at, static_cast<unsigned>(label.cause));
+      *at++ = format_.separator;
+      at = write_number(at, label.object_class);
+      *at++ = format_.separator;
+    }
+    --at;
+    if (format_.carriage_return) *at++ = '\r';
+    *at++ = '\n';
+    return at;
+  }
+
+  CsvFormat format_;
+  std::deque<Label> labels_;  ///< of the next events
+};
+
 }  // namespace
 
 std::span<const NamedCsvFormat> csv_formats() {
   return formats;
 }
 
-CsvEncoder::CsvEncoder(const CsvFormat& format, SensorSize size)
-    : Encoder(header_text(format, size)), format_(format) {}
-
-char* CsvEncoder::write(char* at, Microseconds t) const {
-  if (format_.unit == microseconds) return write_number(at, t);
-  auto magnitude = static_cast<std::uint64_t>(t);
-  if (t < 0) {
-    *at++ = '-';
-    magnitude = 0 - magnitude;
-  }
-  if (format_.unit == nanoseconds) {
-    at = write_number(at, magnitude);
-    if (magnitude == 0) return at;
-    return std::fill_n(at, 3, '0');
-  }
-  at = write_number(at, magnitude / 1'000'000);
-  *at++ = '.';
-  auto fraction = static_cast<std::uint32_t>(magnitude % 1'000'000);
-  for (int digit = 5; digit >= 0; --digit, fraction /= 10)
-    at[digit] = static_cast<char>('0' + fraction % 10);
-  return at + 6;
-}
-
-std::size_t CsvEncoder::label(std::span<const Label> labels) {
-  if (!format_.labels) return 0;
-  labels_.insert(labels_.end(), labels.begin(), labels.end());
-  return labels.size();
-}
-
-char* CsvEncoder::write(char* at, const AbsoluteEvent& event) {
-  for (const auto column : format_.order) {
-    switch (column) {
-      case Column::t:
-        at = write(at, event.t);
-        break;
-      case Column::x:
-        at = write_number(at, event.x);
-        break;
-      case Column::y:
-        at = write_number(at, event.y());
-        break;
-      case Column::p:
-        if (event.polarity() == Polarity::on) {
-          *at++ = '1';
-        } else if (format_.minus_one) {
-          *at++ = '-';
-          *at++ = '1';
-        } else {
-          *at++ = '0';
-        }
-        break;
-      case Column::cause:
-      case Column::object_class:
-        break;  // never in the order: they follow the others
-    }
-    *at++ = format_.separator;
-  }
-  if (format_.labels) {
-    Label label;
-    if (!labels_.empty()) {
-      label = labels_.front();
-      labels_.pop_front();
-    }
-    at = write_number(at, static_cast<unsigned>(label.cause));
-    *at++ = format_.separator;
-    at = write_number(at, label.object_class);
-    *at++ = format_.separator;
-  }
-  --at;
-  if (format_.carriage_return) *at++ = '\r';
-  *at++ = '\n';
-  return at;
-}
-
-void CsvEncoder::append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
-  char text[batch_size * max_line];
-  while (!events.empty()) {
-    const auto count = std::min(events.size(), batch_size);
-    char* at = text;
-    for (const auto& event : events.first(count)) at = write(at, event);
-    out.insert(out.end(), text, at);
-    events = events.subspan(count);
-  }
+std::unique_ptr<Encoder> make_csv_encoder(const CsvFormat& format, SensorSize size) {
+  return std::make_unique<CsvEncoder>(format, size);
 }
 
 }  // namespace eventcamera

@@ -3,7 +3,7 @@
 
 #include <array>
 #include <cstdint>
-#include <deque>
+#include <memory>
 #include <span>
 #include <string_view>
 
@@ -14,7 +14,6 @@ namespace eventcamera {
 
 using ColumnOrder = std::array<EventColumn, 4>;
 
-/// Format of a text file of events.
 struct CsvFormat {
   /// Lines before the first event.
   enum class Header : std::uint8_t {
@@ -41,23 +40,9 @@ struct NamedCsvFormat {
   CsvFormat format;
 };
 
-/// Formats of other tools.
 std::span<const NamedCsvFormat> csv_formats();
 
 /// Encodes events as lines of text.
-class CsvEncoder final : public Encoder {
- public:
-  CsvEncoder(const CsvFormat& format, SensorSize size);
-
-  std::size_t label(std::span<const Label> labels) override;
-
- private:
-  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
-  char* write(char* at, Microseconds t) const;
-  char* write(char* at, const AbsoluteEvent& event);
-
-  CsvFormat format_;
-  std::deque<Label> labels_;  ///< of the next events
-};
+std::unique_ptr<Encoder> make_csv_encoder(const CsvFormat& format, SensorSize size);
 
 }  // namespace eventcamera
