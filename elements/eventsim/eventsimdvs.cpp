@@ -41,6 +41,7 @@
  *
  * Since: 0.1
  */
+#include "gst/base/properties.hpp"
 #include "gst/simulator/dvs_properties.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 #include "gst/simulator/luma_video_simulator.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/plugin.hpp"
 #include "gst/base/event_pool.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 
 const char* const event_simulator_type_name = "GstEventSimulator";

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "gst/aggregator/sink_pads.hpp"
-#include "gst/base/element.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/seek_request.hpp"
 

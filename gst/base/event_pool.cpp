@@ -5,7 +5,7 @@
 #include <bit>
 #include <new>
 
-#include "gst/base/element.hpp"
+#include "gst/base/element_type.hpp"
 
 G_DECLARE_FINAL_TYPE(GstEventPool, gst_event_pool, GST, EVENT_POOL, GstBufferPool)
 

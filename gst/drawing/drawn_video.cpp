@@ -6,7 +6,7 @@
 #include <iterator>
 #include <string_view>
 
-#include "gst/base/element.hpp"
+#include "gst/base/element_type.hpp"
 
 using namespace eventcamera;
 

@@ -6,6 +6,7 @@
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/properties.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_filter_debug);
 #define GST_CAT_DEFAULT event_filter_debug

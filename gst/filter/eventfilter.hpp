@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "gst/base/element.hpp"
+#include "gst/base/guarded.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/filter/filter.hpp"
 

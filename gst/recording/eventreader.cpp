@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/reader/reader_output.hpp"

@@ -4,7 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "gst/base/element.hpp"
+#include "gst/base/guarded.hpp"
+#include "gst/base/properties.hpp"
 #include "src/formats/decoder.hpp"
 
 /// User-settable values of a recording format, read at the start of a file. A reader has only the

@@ -2,7 +2,9 @@
 #include "gst/recording/eventwriter.hpp"
 
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/sensor_events.hpp"
 #include "gst/recording/writable_events.hpp"

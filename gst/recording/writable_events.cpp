@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 
+#include "gst/base/properties.hpp"
 #include "src/formats/temporary_file.hpp"
 
 using namespace eventcamera;

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "gst/base/element.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/guarded.hpp"
 
 struct Written {
   guint64 events = 0;

@@ -3,6 +3,9 @@
 
 #include <memory>
 
+#include "gst/base/element_type.hpp"
+#include "gst/base/guarded.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "src/simulate/warp.hpp"

@@ -6,6 +6,8 @@
 #include <iterator>
 #include <variant>
 
+#include "gst/base/element_type.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/simulator/camera_profile.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 
+#include "gst/base/element_type.hpp"
 #include "gst/base/event_pool.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/seek_request.hpp"

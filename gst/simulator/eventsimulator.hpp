@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "gst/base/element.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/simulator/caps.hpp"
 #include "gst/simulator/video_simulator.hpp"
 #include "src/simulate/simulator.hpp"

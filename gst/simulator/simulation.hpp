@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 
+#include "gst/base/properties.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 #include "gst/simulator/repeated_frames.hpp"
 #include "src/core/image.hpp"

@@ -15,8 +15,9 @@
 #include <vector>
 
 #include "elements/eventcam/cameras/event_camera.hpp"
-#include "gst/base/element.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/evt_caps.hpp"
 

@@ -28,6 +28,8 @@
  */
 #include "elements/eventcam/drawing/frame_times.hpp"
 #include "elements/eventcam/drawing/frames_with_events.hpp"
+#include "gst/base/element_type.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/base/video_frame.hpp"
 #include "src/reconstruct/complementary_filter.hpp"
 

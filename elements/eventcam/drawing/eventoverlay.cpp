@@ -26,6 +26,8 @@
 #include <limits>
 
 #include "elements/eventcam/drawing/frames_with_events.hpp"
+#include "gst/base/element_type.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/drawing/drawn_video.hpp"
 #include "src/render/overlay.hpp"

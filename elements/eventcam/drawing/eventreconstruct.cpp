@@ -24,6 +24,9 @@
  * Since: 0.1
  */
 #include "elements/eventcam/drawing/event_pictures.hpp"
+#include "gst/base/element_type.hpp"
+#include "gst/base/guarded.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/drawing/drawn_video.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_reconstruct_debug);

@@ -37,6 +37,9 @@
 #include <limits>
 
 #include "elements/eventcam/drawing/event_pictures.hpp"
+#include "gst/base/element_type.hpp"
+#include "gst/base/guarded.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/drawing/drawn_video.hpp"
 #include "src/render/renderer.hpp"
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gst/aggregator/eventaggregator.hpp"
+#include "gst/base/properties.hpp"
 
 /// Video of the pad `video_sink`, and events of the pad `event_sink` up to a running time.
 class FramesWithEvents : public EventAggregator {

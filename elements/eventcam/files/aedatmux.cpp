@@ -38,7 +38,8 @@
 
 #include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element.hpp"
+#include "gst/base/element_type.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/frame_buffer.hpp"

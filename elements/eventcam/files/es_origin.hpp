@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include "gst/base/element.hpp"
+#include "gst/base/element_type.hpp"
 #include "src/formats/es/es.hpp"
 
 /// Property `origin` of the Event Stream reader and writer.

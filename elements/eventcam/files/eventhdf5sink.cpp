@@ -27,7 +27,9 @@
 #include <chrono>
 #include <system_error>
 
+#include "gst/base/element_type.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/recording/file_extensions.hpp"
 #include "gst/recording/sensor_events.hpp"
 #include "gst/recording/writable_events.hpp"

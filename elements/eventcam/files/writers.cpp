@@ -4,6 +4,7 @@
 
 #include "elements/eventcam/files/es_origin.hpp"
 #include "features.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/recording/eventwriter.hpp"
 #include "gst/recording/evt_caps.hpp"
 #include "src/formats/dat/dat.hpp"

@@ -17,6 +17,8 @@
  */
 #include <stdexcept>
 
+#include "gst/base/element_type.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/filter/changed_caps.hpp"
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/crop_filter.hpp"

@@ -33,10 +33,12 @@
 #include <limits>
 
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_pool.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/filter/changed_caps.hpp"
 #include "gst/recording/sensor_events.hpp"
 #include "src/formats/waiting_items.hpp"

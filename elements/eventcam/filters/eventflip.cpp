@@ -20,6 +20,8 @@
  */
 #include <gst/video/video.h>
 
+#include "gst/base/element_type.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/filter/changed_caps.hpp"
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/flip_filter.hpp"

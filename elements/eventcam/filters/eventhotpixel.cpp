@@ -34,7 +34,9 @@
 #include <iterator>
 #include <vector>
 
+#include "gst/base/element_type.hpp"
 #include "gst/base/named_file.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/hot_pixel_filter.hpp"
 

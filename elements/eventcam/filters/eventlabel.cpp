@@ -30,6 +30,7 @@
 #include <limits>
 
 #include "gst/aggregator/eventaggregator.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/video_frame.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_label_debug);

@@ -15,7 +15,9 @@
  *
  * Since: 0.1
  */
+#include "gst/base/element_type.hpp"
 #include "gst/base/named_file.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/pixel_mask.hpp"
 

@@ -41,7 +41,10 @@
 
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/event_pool.hpp"
+#include "gst/base/guarded.hpp"
+#include "gst/base/properties.hpp"
 #include "src/filter/event_merge.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_merge_debug);

@@ -25,7 +25,9 @@
  */
 #include <cmath>
 
+#include "gst/base/element_type.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/filter/changed_caps.hpp"
 #include "gst/filter/eventfilter.hpp"

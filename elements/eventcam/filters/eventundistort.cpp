@@ -22,7 +22,9 @@
  *
  * Since: 0.1
  */
+#include "gst/base/element_type.hpp"
 #include "gst/base/named_file.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/camera_calibration.hpp"
 #include "src/filter/undistort_filter.hpp"

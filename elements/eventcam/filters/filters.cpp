@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// Elements that need only a filter of src/filter and its properties.
+#include "gst/base/element_type.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/filter/eventfilter.hpp"
 #include "src/filter/denoise_filter.hpp"
 #include "src/filter/flicker_filter.hpp"

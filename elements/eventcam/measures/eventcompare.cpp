@@ -57,6 +57,8 @@
  */
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
+#include "gst/base/element_type.hpp"
+#include "gst/base/guarded.hpp"
 #include "src/measure/stream_comparison.hpp"
 #include "src/render/rgb_picture.hpp"
 

@@ -44,6 +44,8 @@
 #include <limits>
 
 #include "elements/eventcam/measures/report.hpp"
+#include "gst/base/element_type.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/base/pads.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/render/rgb_picture.hpp"

@@ -8,8 +8,8 @@
 #include <span>
 #include <string>
 
-#include "gst/base/element.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/properties.hpp"
 #include "src/measure/cause_counts.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/render/rgb_picture.hpp"

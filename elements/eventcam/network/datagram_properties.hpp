@@ -3,7 +3,8 @@
 
 #include <bit>
 
-#include "gst/base/element.hpp"
+#include "gst/base/element_type.hpp"
+#include "gst/base/properties.hpp"
 #include "src/wire/datagrams.hpp"
 
 /// Counts of datagrams. Losses are known only if datagrams have a sequence number.

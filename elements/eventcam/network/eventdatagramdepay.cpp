@@ -42,6 +42,7 @@
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/base/pads.hpp"
 #include "src/wire/datagrams.hpp"
 

@@ -30,6 +30,7 @@
 #include "elements/eventcam/network/flush_timer.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/base/pads.hpp"
 #include "src/wire/datagrams.hpp"
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <thread>
 
-#include "gst/base/element.hpp"
+#include "gst/base/properties.hpp"
 
 /// Settings of payloaders, which hold events to fill packets.
 struct PayloaderSettings {

@@ -51,7 +51,9 @@
 #include "elements/eventcam/network/rtp_events.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/base/pads.hpp"
 #include "src/wire/rtp_unpacker.hpp"
 

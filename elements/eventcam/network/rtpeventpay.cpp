@@ -34,7 +34,9 @@
 
 #include "elements/eventcam/network/flush_timer.hpp"
 #include "elements/eventcam/network/rtp_events.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/recording/sensor_events.hpp"
 #include "src/wire/rtp_packer.hpp"

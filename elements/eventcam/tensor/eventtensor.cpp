@@ -58,10 +58,12 @@
  */
 #include "features.hpp"
 #include "gst/base/buffer_bytes.hpp"
-#include "gst/base/element.hpp"
+#include "gst/base/element_type.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/event_pool.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/properties.hpp"
 #include "src/tensor/event_tensor.hpp"
 #include "src/tensor/window_queue.hpp"
 #ifdef HAVE_TENSOR_META

@@ -32,6 +32,8 @@
 #include <string_view>
 
 #include "gst/aggregator/eventaggregator.hpp"
+#include "gst/base/element_type.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/base/video_frame.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(flow_join_debug);

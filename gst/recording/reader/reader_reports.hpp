@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "gst/base/guarded.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/recording/reader/reader_timeline.hpp"
 #include "src/formats/recording_reader.hpp"
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "gst/base/element.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/seek_request.hpp"
 #include "src/formats/recording_reader.hpp"
