@@ -63,7 +63,8 @@ bool is_part(const std::vector<AbsoluteEvent>& some, const std::vector<AbsoluteE
 }
 
 class EveryPayload : public testing::TestWithParam<RtpEventFormat> {};
-INSTANTIATE_TEST_SUITE_P(, EveryPayload, testing::Values(RtpEventFormat::evt3, RtpEventFormat::xytp),
+INSTANTIATE_TEST_SUITE_P(, EveryPayload,
+                         testing::Values(RtpEventFormat::evt3, RtpEventFormat::xytp),
                          [](const auto& param) {
                            return param.param == RtpEventFormat::evt3 ? "Evt3" : "Xytp";
                          });
