@@ -14,7 +14,6 @@
 #include "src/formats/aedat/aedat4_encoder.hpp"
 #include "src/formats/compression/compressed_frames.hpp"
 #include "tests/formats/aedat_files.hpp"
-#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 #include "tests/formats/shared_data.hpp"
 

@@ -21,8 +21,8 @@
 
 #include "src/core/byte_order.hpp"
 #include "src/formats/compression/compressed_frames.hpp"
+#include "src/formats/ros/bag_decoder.hpp"
 #include "src/formats/ros/mcap_encoder.hpp"
-#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {

@@ -4,7 +4,8 @@
 
 #include <memory>
 
-#include "tests/formats/decoders.hpp"
+#include "src/formats/text/csv_decoder.hpp"
+#include "src/formats/text/csv_encoder.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {

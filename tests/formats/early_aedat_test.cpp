@@ -3,8 +3,8 @@
 // files lose only the corrupt parts.
 #include <gtest/gtest.h>
 
+#include "src/formats/aedat/aedat_decoder.hpp"
 #include "tests/formats/aedat_files.hpp"
-#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 #include "tests/formats/shared_data.hpp"
 

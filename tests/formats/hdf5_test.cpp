@@ -14,9 +14,9 @@
 
 #include "src/formats/byte_source.hpp"
 #include "src/formats/hdf5/ecf.hpp"
+#include "src/formats/hdf5/hdf5_decoder.hpp"
 #include "src/formats/hdf5/hdf5_filters.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
-#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {

@@ -8,11 +8,11 @@
 #include <filesystem>
 #include <map>
 
+#include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/numpy/npz.hpp"
 #include "src/formats/numpy/zip_archive.hpp"
 #include "src/formats/temporary_file.hpp"
-#include "tests/formats/decoders.hpp"
 #include "tests/formats/npz_file.hpp"
 #include "tests/formats/recordings.hpp"
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Recordings without GStreamer: push and pull mode give equal items; seeking and duration.
 #include "src/formats/recording_reader.hpp"
+#include "src/formats/aedat/aedat_decoder.hpp"
+#include "src/formats/numpy/npy_decoder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -18,7 +20,6 @@
 #include "src/formats/es/es.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
-#include "tests/formats/decoders.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace eventcamera {

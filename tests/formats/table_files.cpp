@@ -14,11 +14,15 @@
 #include <memory>
 #include <string>
 
+#include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
+#include "src/formats/hdf5/hdf5_decoder.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
+#include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/numpy/npz.hpp"
-#include "tests/formats/decoders.hpp"
+#include "src/formats/text/csv_decoder.hpp"
+#include "src/formats/text/csv_encoder.hpp"
 #include "tests/formats/recordings.hpp"
 
 namespace {

@@ -13,14 +13,15 @@
 #include <string_view>
 #include <vector>
 
+#include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/numpy/npz.hpp"
 #include "src/formats/ros/mcap_encoder.hpp"
+#include "src/formats/text/csv_encoder.hpp"
 #include "tests/formats/aedat_files.hpp"
 #include "tests/formats/compressed.hpp"
-#include "tests/formats/decoders.hpp"
 #include "tests/formats/formats.hpp"
 #include "tests/formats/npz_file.hpp"
 #include "tests/formats/recordings.hpp"
