@@ -15,7 +15,7 @@ try:
 
     gi.require_version("GstVideo", "1.0")
     from gi.repository import GstVideo
-    from gst_eventcamera.pipeline import Gst, Pipeline, events_of, quoted
+    from gst_eventcamera.pipeline import Gst, Pipeline, PipelineError, events_of, quoted
     from gst_eventcamera.recordings import buffer_of
     from gst_eventcamera.sources import SINK
     from gst_eventcamera.video import VideoFile
@@ -198,18 +198,24 @@ def read_pictures(path, start, end):
     return video
 
 
+def frames_of(pipeline, path):
+    try:
+        yield from pipeline.samples()
+    except PipelineError:
+        if pipeline.has_only_events:
+            raise RuntimeError(f"{path}: events without frames; give the video of the scene, too") from None
+        raise
+
+
 def decode(path, start, end):
     """The frames of a time span, and a few before it."""
     video = Video()
     sinks = (pad for pad in Gst.ElementFactory.find("eventsim-dvs").get_static_pad_templates()
              if pad.direction == Gst.PadDirection.SINK)
     with VideoFile(path, f"capsfilter caps=\"{next(sinks).get_caps().to_string()}\" ! {SINK}") as pipeline:
-        for sample in pipeline.samples():
+        for sample in frames_of(pipeline, path):
             buffer = sample.get_buffer()
             if not video.frames:
-                source = pipeline.element("decoded").get_static_pad("sink").get_peer().get_target()
-                if source.get_parent_element().get_factory().get_name() == "eventrender":
-                    raise RuntimeError(f"{path}: events without frames; give the video of the scene, too")
                 video.caps = sample.get_caps().to_string()
                 info = sample.get_caps().get_structure(0)
                 video.width, video.height = info.get_value("width"), info.get_value("height")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from .pipeline import Gst, Pipeline, quoted
+from .pipeline import GLib, Gst, GstEventCamera, Pipeline, quoted
 
 # The converters pass all formats that simulators read unchanged, and so does deinterlace unless video is interlaced.
 _FRAMES = "videoconvert name=decoded ! deinterlace ! videoconvert name=frames"
@@ -40,14 +40,38 @@ class VideoPipeline(Pipeline):
         return Gst.PadProbeReturn.DROP
 
 
+def _are_events(caps: Gst.Caps) -> bool:
+    return caps.get_structure(0).get_name() == GstEventCamera.MEDIA_TYPE
+
+
 class VideoFile(VideoPipeline):
-    """A pipeline of a video file."""
+    """A pipeline of a video file, or of the frames of a file with frames and events."""
 
     def __init__(self, path: str | os.PathLike[str], rest: str) -> None:
-        super().__init__(f"filesrc location={quoted(path)} ! decodebin", rest)
+        super().__init__(f"filesrc location={quoted(path)} ! decodebin name=decoder", rest)
+        self.has_only_events = False
+        decoder = self.element("decoder")
+        decoder.connect("autoplug-select", self._select)
+        decoder.connect("no-more-pads", self._expect_frames)
         self._left = _pictures_of_gif(path)
         if self._left > 0:
             self.element("decoded").get_static_pad("sink").add_probe(Gst.PadProbeType.BUFFER, self._end_loop)
+
+    @staticmethod
+    def _select(decoder: Gst.Element, pad: Gst.Pad, caps: Gst.Caps, factory: Gst.ElementFactory) -> int:
+        """Leaves events as they are: drawn, they would be taken for the frames if they come first in the file.
+        Returns a GstAutoplugSelectResult, which has no introspection data."""
+        try_factory, expose_pad = 0, 1
+        return expose_pad if _are_events(caps) else try_factory
+
+    def _expect_frames(self, decoder: Gst.Element) -> None:
+        pads = decoder.srcpads
+        self.has_only_events = (any(_are_events(pad.get_current_caps()) for pad in pads)
+                                and not any(pad.is_linked() for pad in pads))
+        if self.has_only_events:
+            error = GLib.Error.new_literal(Gst.StreamError.quark(), "This file has events, but no frames.",
+                                           Gst.StreamError.WRONG_TYPE)
+            decoder.post_message(Gst.Message.new_error(decoder, error, "no video pad"))
 
     def _end_loop(self, pad: Gst.Pad, info: Gst.PadProbeInfo) -> Gst.PadProbeReturn:
         """Ends the video after its last picture. The GIF demuxer of gst-libav 1.22 does not: its gst_ffmpegdata_read()

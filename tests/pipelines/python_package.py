@@ -79,6 +79,21 @@ class VideoFrames(unittest.TestCase):
         self.assertEqual(ended.type, Gst.MessageType.EOS, name)
         return path_of(name)
 
+    def test_events_before_the_frames_of_a_file(self):
+        ball = "videotestsrc pattern=ball num-buffers=20 ! video/x-raw,format=GRAY8"
+        path = self.make("both.aedat4", f"{ball} ! eventsim-frame ! mux.  {ball} ! identity ts-offset=100000000 ! mux."
+                                        "  aedatmux name=mux")
+        recorded = ec.read(path)
+        simulated = np.concatenate(list(ec.simulate(path, "eventsim-frame")))
+        self.assertGreater(len(recorded), 1000)
+        for name in "xyp":
+            np.testing.assert_array_equal(simulated[name], recorded[name])
+        events = path_of("events.raw")
+        ec.write(events, recorded)
+        with self.assertRaisesRegex(ec.PipelineError, "has events, but no frames"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            list(ec.simulate(events))
+
     def test_each_frame_but_the_first_ends_an_interval(self):
         for container, audio, pause in itertools.product(("mkv", "ts", "mp4", "avi", "flv"), (0, 1), (0, 1)):
             film = self.make_film(container, audio, pause)
