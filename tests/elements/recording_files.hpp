@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -67,7 +68,10 @@ class Folder {
  public:
   static std::string path(const std::string& name) {
     static const Folder folder;
-    return folder.path_ / name;
+    auto path = folder.path_ / name;
+    if ((name == "ros1.bag" || name == "ros2.db3") && !std::filesystem::exists(path))
+      folder.save_bags();
+    return path;
   }
 
  private:
@@ -93,6 +97,19 @@ class Folder {
                         " location=" + in_quotes(path_ / ("a." + extension)));
       EXPECT_TRUE(pipeline.play()) << pipeline.error;
     }
+  }
+
+  /// By the writer of tests/formats, which takes seconds under load: only if a test needs them.
+  void save_bags() const {
+    std::ofstream lines(path_ / "events.lines");
+    for (const auto& event : some_events())
+      lines << event.t << ' ' << event.x << ' ' << event.y() << ' '
+            << (event.polarity() == Polarity::on) << '\n';
+    lines.close();
+    const auto script = std::string(g_getenv("SOURCE")) + "/tests/formats/bag_files.py";
+    const auto command = "/usr/bin/python3 " + in_quotes(script) + ' ' + in_quotes(path_ / "") +
+                         " given " + in_quotes(path_ / "events.lines");
+    EXPECT_EQ(std::system(command.c_str()), 0);
   }
 
   /// Those of 240 columns and rows; others do not fit.
@@ -128,11 +145,10 @@ struct File {
 
 inline const std::vector<File>& files() {
   static const auto files = [] {
-    std::vector<File> made = {{"evt2.raw", "evtdec"},
-                              {"evt21.raw", "evtdec"},
-                              {"evt4.raw", "evtdec"},
-                              {"aedat2.aedat", "aedatdemux"},
-                              {"aedat3.aedat", "aedatdemux"}};
+    std::vector<File> made = {{"evt2.raw", "evtdec"},         {"evt21.raw", "evtdec"},
+                              {"evt4.raw", "evtdec"},         {"aedat2.aedat", "aedatdemux"},
+                              {"aedat3.aedat", "aedatdemux"}, {"ros1.bag", "eventbagdemux"},
+                              {"ros2.db3", "eventbagdemux"}};
     auto readers = elements_with("input-extensions");
     for (const auto& [extension, writer] : elements_with("output-extensions"))
       made.push_back({"a." + extension, readers.at(extension)});

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Writes ROS bags from the specifications of their formats, without this project's code:
   bag_files.py DIRECTORY [many]
-The events are in events.lines (t x y p), the frames in frames.lines (t and the value of all pixels).
-many.db3 has a message 200,000 times.
+    The events are in events.lines (t x y p), the frames in frames.lines (t and the value of all pixels).
+    many.db3 has a message 200,000 times.
+  bag_files.py DIRECTORY given EVENTS
+    Writes ros1.bag and ros2.db3 with the events of lines "t x y p".
 
 mcap.dev/spec; wiki.ros.org/Bags/Format/2.0; github.com/ros2/rosbag2 (rosbag2_storage_sqlite3)."""
 import bz2
@@ -345,8 +347,21 @@ def write_db3(path, all_messages, topics, page_size=4096):
     database.close()
 
 
+def write_given(folder, path):
+    global EVENTS, PER_PACKET
+    EVENTS = [tuple(map(int, line.split())) for line in path.read_text().splitlines()]
+    PER_PACKET = 1000
+    FRAMES.clear()
+    topics = {"/camera/events": EVENT_TYPES["array"]}
+    write_bag(folder / "ros1.bag", messages(Ros1, "array"), topics)
+    write_db3(folder / "ros2.db3", messages(Cdr, "array"), topics)
+
+
 def main():
     folder = Path(sys.argv[1])
+    if sys.argv[2:3] == ["given"]:
+        write_given(folder, Path(sys.argv[3]))
+        return
     for name, rows in ("events", EVENTS), ("frames", FRAMES):
         (folder / f"{name}.lines").write_text("".join(" ".join(map(str, row)) + "\n" for row in rows))
     for name, kind, encoding, image in [("evt3", "packet", "evt3", "mono8"), ("mono", "packet", "mono", "rgb8"),
