@@ -13,7 +13,7 @@
 #include "gst/recording/reader/reader_timeline.hpp"
 #include "src/formats/recording_reader.hpp"
 
-class ReaderPad;
+struct ReaderPad;
 
 /// Caps of events read from a file, which have no framerate.
 #define FILE_EVENTS_CAPS EVENT_CAPS ", framerate = (fraction) 0/1"
