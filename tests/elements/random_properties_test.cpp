@@ -80,7 +80,7 @@ void randomize(GParamSpec* spec, Random& random, GValue* value) {
         g_value_set_static_string(value, random() % 2 == 0 ? "" : "events");
       else if (spec->name == std::string_view("topics"))
         g_value_set_static_string(value,
-                                  random() % 2 == 0 ? "" : "/event_camera/events,/dvs/events");
+                                  random() % 2 == 0 ? "" : "/event_camera/events,/camera/events");
       else if (spec->name == std::string_view("profile"))
         g_value_take_string(value, g_strdup(random() % 2 == 0 ? "" : profile().c_str()));
       else if (spec->owner_type == g_type_from_name("GstEventHotPixel"))
