@@ -104,7 +104,7 @@ struct LayoutOf {
 /// with the low 32 bits of the time. AEStream reads at most 512 bytes, without timestamps, and
 /// spiffer at most 1024.
 template <bool has_timestamps>
-class Spif : public LayoutOf<has_timestamps ? 8 : 4, 128 * (has_timestamps ? 8 : 4)> {
+class Spif : public LayoutOf<has_timestamps ? 8 : 4, has_timestamps ? 1024 : 512> {
  public:
   explicit Spif(const DatagramSettings& settings) : order_(settings.byte_order) {}
 
