@@ -27,7 +27,7 @@ TEST_P(EveryFormat, IsReadAsItWasWrittenHoweverItIsSplit) {
                 "application/x-event-camera, format=(string)XYTP, width=(int)320, height=(int)240, "
                 "framerate=(fraction)0/1");
     }
-    EXPECT_EQ(h.warning() + h.error(), "");
+    EXPECT_EQ(h.warning_or_error(), "");
     EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
   }
 }
@@ -307,7 +307,7 @@ TEST_P(EveryStream, WarnsOnceOfCorruptionAndTellsWhere) {
   const auto position = std::stoul(text.substr(found + 13));
   EXPECT_LT(position, file.size());
   EXPECT_GE(position + 13, file.size());  // size of the longest event
-  EXPECT_EQ(h.warning() + h.error(), "");
+  EXPECT_EQ(h.warning_or_error(), "");
   // Nearly all events were intact.
   const auto read = pull_events(h);
   ASSERT_GT(read.size(), events.size() - 40);

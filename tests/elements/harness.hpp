@@ -249,6 +249,10 @@ class Harness {
   /// Texts of the next warning and the next error, or empty.
   std::string warning() { return text_of(message(GST_MESSAGE_WARNING).get()); }
   std::string error() { return text_of(message(GST_MESSAGE_ERROR).get()); }
+  std::string warning_or_error() {
+    constexpr auto either = static_cast<GstMessageType>(GST_MESSAGE_WARNING | GST_MESSAGE_ERROR);
+    return text_of(message(either).get());
+  }
 
   std::string out_caps() const {
     return text_of(Owned<GstCaps>(gst_pad_get_current_caps(h_->sinkpad)));

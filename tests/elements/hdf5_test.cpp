@@ -137,7 +137,7 @@ TEST_F(Hdf5Sink, WritesToAnotherFileAfterAStop) {
   gst_harness_set_src_caps_str(sink.get(), events_caps);
   EXPECT_EQ(sink.push({early}, 0), GST_FLOW_OK);
   push_eos(sink.get());
-  EXPECT_EQ(sink.warning() + sink.error(), "");
+  EXPECT_EQ(sink.warning_or_error(), "");
   EXPECT_TRUE(read(path) == Events{late});
   EXPECT_TRUE(read(second) == Events{early});
 }
@@ -151,7 +151,7 @@ TEST_F(Hdf5Sink, LeavesOutWhatItCannotWrite) {
   EXPECT_EQ(sink.warning(), "");
   push_eos(sink.get());
   EXPECT_TRUE(sink.warning().starts_with("Dropped 1 event earlier"));
-  EXPECT_EQ(sink.warning() + sink.error(), "");
+  EXPECT_EQ(sink.warning_or_error(), "");
   EXPECT_TRUE(read(path) == (Events{events[0], early}));
 }
 
@@ -165,7 +165,7 @@ TEST_F(Hdf5Sink, WritesAnewAfterAFlush) {
   }
   EXPECT_EQ(sink.push({early}, 0), GST_FLOW_OK);
   push_eos(sink.get());
-  EXPECT_EQ(sink.warning() + sink.error(), "");
+  EXPECT_EQ(sink.warning_or_error(), "");
   EXPECT_TRUE(read(path) == Events{early});
 }
 
