@@ -76,12 +76,6 @@ void add_table_properties(FormatProperties& properties) {
                        "xytp; empty = as stated in the file, or detected from its first rows");
 }
 
-template <class TableDecoder>
-std::unique_ptr<Decoder> make_table_decoder(const GstCaps* /*caps*/,
-                                            const FormatSettings& settings) {
-  return std::make_unique<TableDecoder>(table_settings(settings));
-}
-
 /// For words without a header, takes format and size from the caps; files have a header.
 std::unique_ptr<Decoder> make_raw_decoder(const GstCaps* caps, const FormatSettings& /*settings*/) {
   if (caps != nullptr) {
