@@ -347,20 +347,21 @@ def write_db3(path, all_messages, topics, page_size=4096):
     database.close()
 
 
-def write_given(folder, path):
+def write_arrays(bag, db3, events, per_packet, page_size=4096):
+    """Bags of ROS 1 and of ROS 2 with nothing but these events."""
     global EVENTS, PER_PACKET
-    EVENTS = [tuple(map(int, line.split())) for line in path.read_text().splitlines()]
-    PER_PACKET = 1000
+    EVENTS, PER_PACKET = events, per_packet
     FRAMES.clear()
     topics = {"/camera/events": EVENT_TYPES["array"]}
-    write_bag(folder / "ros1.bag", messages(Ros1, "array"), topics)
-    write_db3(folder / "ros2.db3", messages(Cdr, "array"), topics)
+    write_bag(bag, messages(Ros1, "array"), topics)
+    write_db3(db3, messages(Cdr, "array"), topics, page_size)
 
 
 def main():
     folder = Path(sys.argv[1])
     if sys.argv[2:3] == ["given"]:
-        write_given(folder, Path(sys.argv[3]))
+        events = [tuple(map(int, line.split())) for line in Path(sys.argv[3]).read_text().splitlines()]
+        write_arrays(folder / "ros1.bag", folder / "ros2.db3", events, per_packet=1000)
         return
     for name, rows in ("events", EVENTS), ("frames", FRAMES):
         (folder / f"{name}.lines").write_text("".join(" ".join(map(str, row)) + "\n" for row in rows))

@@ -7,11 +7,6 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "formats"))
 import bag_files  # noqa: E402
 
-del bag_files.EVENTS[24:]
-bag_files.FRAMES.clear()
-bag_files.PER_PACKET = 6
 folder = pathlib.Path(sys.argv[1])
-topics = {"/camera/events": bag_files.EVENT_TYPES["array"]}
-bag_files.write_bag(folder / "rosbag", bag_files.messages(bag_files.Ros1, "array"), topics)
 # The smallest pages.
-bag_files.write_db3(folder / "db3", bag_files.messages(bag_files.Cdr, "array"), topics, page_size=512)
+bag_files.write_arrays(folder / "rosbag", folder / "db3", bag_files.EVENTS[:24], per_packet=6, page_size=512)
